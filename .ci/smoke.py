@@ -1,4 +1,5 @@
-"""Two scenes, solved by the archord that is installed: forces at their last step, to the digits of every other place.
+"""Two scenes, solved by the archord that is installed: forces at their last step, to the digits of
+every other place.
 
 ``[mpirun -n 2] python3 .ci/smoke.py FOLDER`` solves into a new folder.
 """
@@ -20,4 +21,6 @@ for name, (column, value) in EXPECTED.items():
     if abs(found / value - 1) > 1e-9:
         sys.exit(f"{name}: {column} is {found}, and {value} elsewhere ({versions})")
     if MPI.COMM_WORLD.rank == 0:
-        print(f"{name}: {column} = {found}, with dolfinx {versions['dolfinx']} and PETSc {versions['petsc']}")
+        print(
+            f"{name}: {column} = {found}, with dolfinx {versions['dolfinx']} and PETSc {versions['petsc']}"
+        )

@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
     from archord.materials.finite import LargeStrain
-    from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
+    from archord.materials.hardening import (
+        LinearHardening,
+        SwiftHardening,
+        TabularHardening,
+        VoceHardening,
+    )
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
     from archord.postprocess.pictures.pictures import draw_run
@@ -45,11 +50,14 @@ _HOME = {
     "KinematicMaterial": "archord.materials.kinematic",
     "System": "archord.solver.system",
     **dict.fromkeys(
-        ("LinearHardening", "SwiftHardening", "TabularHardening", "VoceHardening"), "archord.materials.hardening"
+        ("LinearHardening", "SwiftHardening", "TabularHardening", "VoceHardening"),
+        "archord.materials.hardening",
     ),
     "Scene": "archord.scene.scene",
     "ProblemScene": "archord.scene.problem",
-    **dict.fromkeys(("Body", "Coupling", "Interaction", "Load", "Mesh", "Support"), "archord.scene.parts"),
+    **dict.fromkeys(
+        ("Body", "Coupling", "Interaction", "Load", "Mesh", "Support"), "archord.scene.parts"
+    ),
 }
 
 

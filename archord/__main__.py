@@ -8,9 +8,12 @@ from time import perf_counter
 
 
 def main() -> None:
-    """Run the command line. Exit codes: 0 done, 2 bad input, 3 a solve that could not go on, 1 anything else."""
+    """Run the command line. Exit codes: 0 done, 2 bad input, 3 a solve that could not go on, 1
+    anything else."""
     begun = perf_counter()
-    gc.set_threshold(200_000, 1, 1)  # imports make 100 thousand objects and no garbage: looking for it takes 0.04 s
+    gc.set_threshold(
+        200_000, 1, 1
+    )  # imports make 100 thousand objects and no garbage: looking for it takes 0.04 s
     from archord.cli import run
 
     code = run(sys.argv[1:], begun)

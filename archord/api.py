@@ -1,4 +1,5 @@
-"""archord from Python: load results, load scenes, solve them. The names are those of the package: ``archord.load``."""
+"""archord from Python: load results, load scenes, solve them. The names are those of the package:
+``archord.load``."""
 
 from __future__ import annotations
 
@@ -27,16 +28,20 @@ if TYPE_CHECKING:
 
 
 def load(folder: str | Path) -> Any:
-    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises `InputError` for neither."""
+    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises
+    `InputError` for neither."""
     if not Path(folder).is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder of a run or of a sweep.")
     return Sweep(folder) if is_sweep(folder) else Run(folder)
 
 
 def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> AnyScene:
-    """Read a scene file with ``changes`` like ``{"joint.clearance": 0.01}``; None or "none" drops a key. Raises
-    `InputError`."""
-    given = ((key, ABSENT if value is None else toml_value(plain(value))) for key, value in (changes or {}).items())
+    """Read a scene file with ``changes`` like ``{"joint.clearance": 0.01}``; None or "none" drops a
+    key. Raises `InputError`."""
+    given = (
+        (key, ABSENT if value is None else toml_value(plain(value)))
+        for key, value in (changes or {}).items()
+    )
     return scene_file.load_scene(path, [f"{key}={value}" for key, value in given])
 
 
@@ -50,10 +55,12 @@ def Problem(
     supports: Sequence[Any] = (),
     **sections: Any,
 ) -> ProblemScene:
-    """A general scene in the words of scene files: parts are of the classes `Body`, `Load` and so on, or tables.
+    """A general scene in the words of scene files: parts are of the classes `Body`, `Load` and so
+    on, or tables.
 
-    ``mesh`` is a mesh file, gmsh with a model (meshed or not), a dolfinx mesh with tags ``(mesh, cells, facets)``, or a
-    `Mesh` or its table. Other ``sections`` are those of a scene: ``path``, ``analysis``, ... Raises `InputError`.
+    ``mesh`` is a mesh file, gmsh with a model (meshed or not), a dolfinx mesh with tags ``(mesh,
+    cells, facets)``, or a `Mesh` or its table. Other ``sections`` are those of a scene: ``path``,
+    ``analysis``, ... Raises `InputError`.
     """
     if isinstance(mesh, (str, Path, Mapping, Mesh)):
         mesh = {"file": str(mesh)} if isinstance(mesh, (str, Path)) else plain(mesh)
@@ -64,16 +71,25 @@ def Problem(
             raise InputError(f"archord.Problem: mesh must be {kinds}, not {shortened(repr(mesh))}.")
         name = f"mesh {len(LIVE) + 1}{GIVEN}"
         LIVE[name], mesh = mesh, {"file": name}
-    parts = {"body": bodies, "interaction": interactions, "coupling": couplings, "support": supports, "load": loads}
+    parts = {
+        "body": bodies,
+        "interaction": interactions,
+        "coupling": couplings,
+        "support": supports,
+        "load": loads,
+    }
     for name, part in parts.items():
         if not isinstance(part, (list, tuple)):
-            raise InputError(f"archord.Problem: {name} must be a list of parts, not {shortened(repr(part))}.")
+            raise InputError(
+                f"archord.Problem: {name} must be a list of parts, not {shortened(repr(part))}."
+            )
     sections |= {"mesh": mesh, **{name: list(part) for name, part in parts.items()}}
     return ProblemScene(**sections)
 
 
 def _scene_of(given: Any) -> AnyScene:
-    """A scene that is one already, a file with one, or the table of such a file. Raises `InputError`."""
+    """A scene that is one already, a file with one, or the table of such a file. Raises
+    `InputError`."""
     if isinstance(given, (str, Path)):
         return load_scene(given)
     if isinstance(given, Mapping):
@@ -92,12 +108,13 @@ def solve(
     progress: bool = False,
     comm: MPI.Comm | None = None,
 ) -> Run:
-    """Solve ``scene`` (or the scene file of that name, or the table of such a file) into ``folder``, and give back the
-    run. Collective over ``comm`` (all ranks).
+    """Solve ``scene`` (or the scene file of that name, or the table of such a file) into
+    ``folder``, and give back the run. Collective over ``comm`` (all ranks).
 
-    An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as ``archord solve`` does. Of
-    a run that could not reach its end (status "stopped") the logger "archord" warns. Raises `InputError` on all ranks,
-    and KeyboardInterrupt for Ctrl-C (SystemExit for SIGTERM and SIGHUP) once the accepted steps are on disk.
+    An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as
+    ``archord solve`` does. Of a run that could not reach its end (status "stopped") the logger
+    "archord" warns. Raises `InputError` on all ranks, and KeyboardInterrupt for Ctrl-C (SystemExit
+    for SIGTERM and SIGHUP) once the accepted steps are on disk.
     """
     from mpi4py import MPI
 

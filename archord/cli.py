@@ -19,7 +19,9 @@ from archord.options import Group
 from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.scene.errors import InputError
 
-_HEARD = 0.3  # seconds in which a launcher (MPICH's) hands on what a rank said, which it drops with a job that aborts
+# seconds in which a launcher (MPICH's) hands on what a rank said, which it drops with a job that
+# aborts
+_HEARD = 0.3
 
 FILES = {
     "solve_commands": ("solve", "scene", "mesh"),
@@ -29,7 +31,14 @@ FILES = {
     "law_commands": ("laws", "law", "fit"),
     "benchmark_commands": ("reproduce", "benchmark"),
 }
-SOLVERS = ("mpi4py", "dolfinx", "petsc4py", "basix", "ufl", "gmsh")  # what only solving and meshing need
+SOLVERS = (
+    "mpi4py",
+    "dolfinx",
+    "petsc4py",
+    "basix",
+    "ufl",
+    "gmsh",
+)  # what only solving and meshing need
 COMMANDS = {command: file for file, commands in FILES.items() for command in commands}
 
 
@@ -49,11 +58,13 @@ class _Commands(Group):
 @click.group(cls=_Commands, context_settings={"show_default": True})
 @click.version_option(archord.__version__, message="archord %(version)s", help="print the version")
 def app() -> None:
-    """Conformal contact of pins in holes: P(delta), pressure and plastic zone, by finite elements."""
+    """Conformal contact of pins in holes: P(delta), pressure and plastic zone, by finite
+    elements."""
 
 
 def run(arguments: list[str], begun: float | None = None) -> int:
-    """The exit code of the command line ``arguments``, ``begun`` at that time of `perf_counter`; only rank 0 prints."""
+    """The exit code of the command line ``arguments``, ``begun`` at that time of `perf_counter`;
+    only rank 0 prints."""
     since = perf_counter() if begun is None else begun
     return run_on_ranks(_command(arguments), lambda: _run(arguments, since))
 
@@ -73,9 +84,14 @@ def _run(arguments: list[str], begun: float) -> int:
         if launcher_rank() == 0:
             error.show()
         return error.exit_code
-    except (BrokenPipeError, SystemExit):  # the reader, like head, has seen enough; click makes one of the other
+    except (
+        BrokenPipeError,
+        SystemExit,
+    ):  # the reader, like head, has seen enough; click makes one of the other
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 128 + signal.SIGPIPE if _command(arguments) in COLLECTIVE else 0  # what solves is not done
+        return (
+            128 + signal.SIGPIPE if _command(arguments) in COLLECTIVE else 0
+        )  # what solves is not done
     except (KeyboardInterrupt, click.exceptions.Abort, InputError) as error:
         bad = isinstance(error, InputError)
         if launcher_rank() == 0:
@@ -93,7 +109,8 @@ def _run(arguments: list[str], begun: float) -> int:
 
 
 def _fail(error: Exception) -> int:
-    """Report an unexpected error with its traceback from the rank that has it, and end all ranks."""
+    """Report an unexpected error with its traceback from the rank that has it, and end all
+    ranks."""
     traceback.print_exception(error)
     mpi = sys.modules.get("mpi4py.MPI")
     if mpi is not None and mpi.Is_initialized() and mpi.COMM_WORLD.size > 1:

@@ -1,4 +1,5 @@
-"""``archord laws``, ``law`` and ``fit``: laws of the joint, listed, tabulated, drawn, and calibrated on runs."""
+"""``archord laws``, ``law`` and ``fit``: laws of the joint, listed, tabulated, drawn, and
+calibrated on runs."""
 
 from __future__ import annotations
 
@@ -73,11 +74,17 @@ def laws() -> int:
 )
 @file("--scene", "take the joint from this scene file", None)
 @overrides()
-@click.option("--radius", type=float, help="radius of the pin; this and the next change the joint of a scene")
+@click.option(
+    "--radius", type=float, help="radius of the pin; this and the next change the joint of a scene"
+)
 @click.option("--clearance", type=float, help="radius of the hole less that of the pin")
 @click.option("--E-star", "E_star", type=float, help="contact modulus E*; not beside a scene")
 @click.option("--yield-stress", type=float, help="yield stress")
-@click.option("--length", type=float, help="length of the joint, for the laws that need one; a scene's thickness")
+@click.option(
+    "--length",
+    type=float,
+    help="length of the joint, for the laws that need one; a scene's thickness",
+)
 @click.option("--k", type=float, help="Winkler's coefficient [0.85]")
 @click.option("--c", type=float, help="plateau of the pressure over the yield stress [1]")
 @click.option("--plane", help="plane of the joint: strain or stress")
@@ -86,7 +93,12 @@ def laws() -> int:
 @click.option("--to", type=float, default=2.0, help="last row: delta in clearances, or P in E* dR")
 @click.option("--points", type=int, default=20, help="rows, in equal steps from zero")
 @flag("--extrapolate", "evaluate formulas outside the range of the law")
-@click.option("--deepest", type=float, default=0.0, help="archord: the way back from this displacement, in clearances")
+@click.option(
+    "--deepest",
+    type=float,
+    default=0.0,
+    help="archord: the way back from this displacement, in clearances",
+)
 @file("--plot", "draw the laws into this file instead of a table", None)
 @click.option(
     "--export",
@@ -115,7 +127,13 @@ def law(
     """Print a table of laws of the joint, draw them against each other, or export archord's."""
     from archord.output.user_file import check_target
     from archord.postprocess.laws.law import LawRangeWarning
-    from archord.postprocess.laws.law_report import draw_laws, law_table, sample, says_nothing, too_elastic
+    from archord.postprocess.laws.law_report import (
+        draw_laws,
+        law_table,
+        sample,
+        says_nothing,
+        too_elastic,
+    )
     from archord.postprocess.laws.laws import default_law, find_law
     from archord.scene.file import files_read
 
@@ -136,9 +154,18 @@ def law(
         if [entry.name for entry in chosen] != ["archord"]:
             raise InputError(f"{option}: is for the law archord alone, which needs plane and nu.")
         if not 0 <= deepest <= chosen[0].limit(joint) / joint.clearance:
-            raise InputError(f"--deepest {deepest:g}: must be from 0 to 3 clearances, the range of the law.")
+            raise InputError(
+                f"--deepest {deepest:g}: must be from 0 to 3 clearances, the range of the law."
+            )
         if exports:
-            return _export(joint, units, thickness, exports, files_read(scene, overrides) if scene else [], force)
+            return _export(
+                joint,
+                units,
+                thickness,
+                exports,
+                files_read(scene, overrides) if scene else [],
+                force,
+            )
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
     if plot:
         check_target(plot, files_read(scene, overrides) if scene else [], force=True)
@@ -146,7 +173,9 @@ def law(
     for entry in chosen:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", LawRangeWarning)
-            state = sample(entry, joint, by_load, to, _LINE if plot else points, extrapolate, deepest)
+            state = sample(
+                entry, joint, by_load, to, _LINE if plot else points, extrapolate, deepest
+            )
         told = [str(warning.message) for warning in caught]
         if says_nothing(state, by_load):
             silent.append([f"{entry.name}: has no number here", *told][-1])
@@ -158,13 +187,21 @@ def law(
     if plot:
         print(draw_laws(states, joint, plot, by_load, to))
     else:
-        print(*(law_table(entry, joint, state, units, thickness) for entry, state in states), sep="\n\n")
+        print(
+            *(law_table(entry, joint, state, units, thickness) for entry, state in states),
+            sep="\n\n",
+        )
     _warn(*said, *silent)
     return 0
 
 
 def _export(
-    joint: LawJoint, units: dict[str, str], thickness: float, exports: tuple[Path, ...], inputs: list[Path], force: bool
+    joint: LawJoint,
+    units: dict[str, str],
+    thickness: float,
+    exports: tuple[Path, ...],
+    inputs: list[Path],
+    force: bool,
 ) -> int:
     from archord.postprocess.laws.exports.export import export_curve
     from archord.postprocess.laws.general.general_law import general_law
@@ -175,7 +212,9 @@ def _export(
         warnings.simplefilter("always", LawRangeWarning)
         LAWS["archord"].check(joint)
     law = general_law(joint)
-    about = law.about | {"units": {name: units[name] for name in ("length", "force", "stress") if name in units}}
+    about = law.about | {
+        "units": {name: units[name] for name in ("length", "force", "stress") if name in units}
+    }
     if units:
         law = dataclasses.replace(law, length_unit=units["length"], force_unit=units["force"])
     law = dataclasses.replace(law, force=law.force * thickness, pin_length=thickness, about=about)
@@ -199,7 +238,8 @@ def _refuse_contradictions() -> None:
     typed = {
         parameter.name: parameter.opts[0]
         for parameter in context.command.params
-        if parameter.name and context.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE
+        if parameter.name
+        and context.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE
     }
     for option, idle in _IDLE.items():
         clash = [typed[name] for name in idle if name in typed]
@@ -224,8 +264,9 @@ def _refuse_unused(chosen: list[Law], given: dict[str, Any]) -> None:
 def _joint(
     scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any], needed: dict[str, str]
 ) -> tuple[LawJoint, dict[str, str], float]:
-    """The joint of the scene, which the options given change as ``--set`` would, or of the options alone; the names of
-    the units; and the thickness. ``needed`` has the law by each parameter that one needs."""
+    """The joint of the scene, which the options given change as ``--set`` would, or of the options
+    alone; the names of the units; and the thickness. ``needed`` has the law by each parameter that
+    one needs."""
     from archord.postprocess.laws.general.joint import LawJoint
 
     values = {name: value for name, value in given.items() if value is not None}
@@ -238,13 +279,16 @@ def _joint(
         raise InputError(_ask_for(missing, needed))
     for name, other in (("plane", "nu"), ("nu", "plane")):
         if name in values and other not in values:
-            raise InputError(f"{_option(name)}: says nothing without {_option(other)}; give both or none.")
+            raise InputError(
+                f"{_option(name)}: says nothing without {_option(other)}; give both or none."
+            )
     strength = values.pop("yield_stress", None)
     return LawJoint(**values, pin_yield=strength, block_yield=strength), {}, 1.0
 
 
 def _ask_for(missing: list[str], needed: dict[str, str]) -> str:
-    """The sentence that asks for all that is ``missing`` of a joint; ``needed`` has the law by parameter."""
+    """The sentence that asks for all that is ``missing`` of a joint; ``needed`` has the law by
+    parameter."""
     names = ", ".join(map(_option, missing))
     by_law: dict[str, list[str]] = {}
     for name in missing:
@@ -268,7 +312,9 @@ def _joint_of_scene(
         said = "does not go with --scene, which has E* of E and nu of its bodies; change these by --set"
         raise InputError(f"--E-star {values['E_star']:g}: {said}.")
     before = _law_scene(path, overrides)
-    changes = {f"{key}={value}": name for name, value in values.items() for key in _keys(before, name)}
+    changes = {
+        f"{key}={value}": name for name, value in values.items() for key in _keys(before, name)
+    }
     typed = {change: f"{_option(name)} {values[name]}" for change, name in changes.items()}
     set_keys = {override.partition("=")[0].strip(): override for override in overrides}
     for change, option in typed.items():
@@ -303,7 +349,8 @@ def _law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
 
 
 def _keys(scene: Scene, name: str) -> list[str]:
-    """The keys of a scene that the option ``name`` changes: a yield stress in the bodies that yield, or in both."""
+    """The keys of a scene that the option ``name`` changes: a yield stress in the bodies that
+    yield, or in both."""
     if name not in _OF_BODIES:
         return [_KEYS[name]] if name in _KEYS else []
     bodies = list(scene.solids)
@@ -313,17 +360,28 @@ def _keys(scene: Scene, name: str) -> list[str]:
 
 
 @click.command()
-@argument("folders", "RUN...|SWEEP", "run folders, or the folder of a sweep", nargs=-1, required=True)
+@argument(
+    "folders", "RUN...|SWEEP", "run folders, or the folder of a sweep", nargs=-1, required=True
+)
 @click.option(
-    "--range", "load_range", type=(float, float), help="steps to fit: delta from ... to ..., in clearances [all]"
+    "--range",
+    "load_range",
+    type=(float, float),
+    help="steps to fit: delta from ... to ..., in clearances [all]",
 )
 @file("--json", "write law and fits", parameter="json_file")
 @file("--picture", "draw data, law and residuals")
 @file("--python", "write force and stiffness over delta as a module that needs only math")
 @click.option(
-    "--table", "tables", type=Path, multiple=True, help="write P(delta) of one run, and back: .json .py .h .mo .m"
+    "--table",
+    "tables",
+    type=Path,
+    multiple=True,
+    help="write P(delta) of one run, and back: .json .py .h .mo .m",
 )
-@click.option("--of", help="--table: the load of a general scene that P and delta are of, if it has several")
+@click.option(
+    "--of", help="--table: the load of a general scene that P and delta are of, if it has several"
+)
 @flag("--force", "overwrite files other than pictures and SWEEP/fit.csv")
 @_sentences()
 def fit(
@@ -338,8 +396,8 @@ def fit(
 ) -> int:
     """Fit the plastic-Winkler law to P(delta) of runs: k, and c where the joint yields.
 
-    Of a sweep, k and c of every case, printed and in SWEEP/fit.csv. With --table no fit, but P(delta) of the run itself
-    and its way back, of any scene.
+    Of a sweep, k and c of every case, printed and in SWEEP/fit.csv. With --table no fit, but
+    P(delta) of the run itself and its way back, of any scene.
     """
     from archord.output.folder import FILES, is_sweep
     from archord.output.user_file import check_target
@@ -349,12 +407,16 @@ def fit(
 
     if tables or of:
         if not tables or len(folders) > 1 or any((load_range, json_file, picture, python)):
-            raise InputError("--table: takes one run, and but for --of and --force no other option.")
+            raise InputError(
+                "--table: takes one run, and but for --of and --force no other option."
+            )
         return _write_table(folders[0], tables, of, force)
     deltas, first = load_range or (0.0, math.inf), folders[0]
     if any(map(is_sweep, folders)):
         if len(folders) > 1 or json_file or python or picture:
-            raise InputError(f"{first}: a sweep is fitted alone; --json, --python and --picture are for runs.")
+            raise InputError(
+                f"{first}: a sweep is fitted alone; --json, --python and --picture are for runs."
+            )
         return _fit_sweep(first, deltas)
     calibration = calibrate([Run(folder).curve.loading() for folder in folders], deltas)
     inputs, files = [folder / name for folder in folders for name in FILES], []
@@ -362,9 +424,13 @@ def fit(
         check_target(picture, inputs, force=True)
         files.append(fit_report.draw_fit(calibration, picture))
     files += _write(
-        [(json_file, fit_report.as_json(calibration)), (python, calibration.law().to_python())], inputs, force
+        [(json_file, fit_report.as_json(calibration)), (python, calibration.law().to_python())],
+        inputs,
+        force,
     )
-    print(fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files, sep="\n")
+    print(
+        fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files, sep="\n"
+    )
     _warn(*fit_report.doubts(calibration))
     return 0
 
@@ -376,7 +442,9 @@ def _write_table(folder: Path, targets: tuple[Path, ...], of: str | None, force:
     from archord.postprocess.run import Run
 
     curve = run_table(Run(folder), of)
-    texts: list[tuple[Path | None, str]] = [(target, export_curve(curve, target)) for target in targets]
+    texts: list[tuple[Path | None, str]] = [
+        (target, export_curve(curve, target)) for target in targets
+    ]
     files = _write(texts, [folder / name for name in FILES], force)
     print(*(f"{name}: {value}" for name, value in curve.about.items()), *files, sep="\n")
     return 0
@@ -386,13 +454,17 @@ def _fit_sweep(sweep: Path, deltas: tuple[float, float]) -> int:
     from archord.studies.sweep_fit import fit_sweep
 
     found = fit_sweep(sweep, deltas)
-    print(found, *_write([(sweep / "fit.csv", found.as_csv())], [sweep / "sweep.toml"], force=True), sep="\n")
+    print(
+        found,
+        *_write([(sweep / "fit.csv", found.as_csv())], [sweep / "sweep.toml"], force=True),
+        sep="\n",
+    )
     return 0
 
 
 def _write(texts: list[tuple[Path | None, str]], inputs: list[Path], force: bool) -> list[Path]:
-    """Write the files that are named, and return them. Raises `InputError` before for one of the ``inputs`` among them,
-    for two of one name, and, without ``force``, for files that are there."""
+    """Write the files that are named, and return them. Raises `InputError` before for one of the
+    ``inputs`` among them, for two of one name, and, without ``force``, for files that are there."""
     from archord.output.user_file import check_target, writing
 
     named = [(target, text) for target, text in texts if target]

@@ -20,7 +20,11 @@ class Group(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Each command with the whole first sentence of its help, wrapped."""
         found = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        rows = [(name, command.get_short_help_str(_SENTENCE)) for name, command in found if command is not None]
+        rows = [
+            (name, command.get_short_help_str(_SENTENCE))
+            for name, command in found
+            if command is not None
+        ]
         if rows:
             with formatter.section("Commands"):
                 formatter.write_dl(rows)
@@ -29,7 +33,11 @@ class Group(click.Group):
         """The command of ``args``. Raises `click.UsageError`."""
         if self.get_command(ctx, args[0]) is None and args[0][:1] != "-":
             near = difflib.get_close_matches(args[0], self.list_commands(ctx), 1)
-            ctx.fail(" ".join([f"No such command {args[0]!r}.", *(f"Did you mean {name}?" for name in near)]))
+            ctx.fail(
+                " ".join(
+                    [f"No such command {args[0]!r}.", *(f"Did you mean {name}?" for name in near)]
+                )
+            )
         return super().resolve_command(ctx, args)
 
 
@@ -46,7 +54,9 @@ class _Argument(click.Argument):
 
 def argument(name: str, metavar: str, help: str, **settings: Any) -> Decorator:
     """A path, or several with ``nargs=-1``, or of another ``type``."""
-    return click.argument(name, metavar=metavar, help=help, cls=_Argument, **{"type": PATH, **settings})
+    return click.argument(
+        name, metavar=metavar, help=help, cls=_Argument, **{"type": PATH, **settings}
+    )
 
 
 def flag(name: str, help: str) -> Decorator:
@@ -54,7 +64,9 @@ def flag(name: str, help: str) -> Decorator:
     return click.option(name, is_flag=True, help=help)
 
 
-def file(name: str, help: str, metavar: str | None = "FILE", parameter: str | None = None) -> Decorator:
+def file(
+    name: str, help: str, metavar: str | None = "FILE", parameter: str | None = None
+) -> Decorator:
     """An option that takes a path; ``parameter`` is its name in the function."""
     return click.option(*filter(None, (name, parameter)), type=PATH, metavar=metavar, help=help)
 

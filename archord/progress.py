@@ -1,4 +1,5 @@
-"""A solve and its progress on rank 0: a line for every step, and on a terminal one that moves until the next."""
+"""A solve and its progress on rank 0: a line for every step, and on a terminal one that moves until
+the next."""
 
 from __future__ import annotations
 
@@ -35,8 +36,8 @@ Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value o
 
 
 def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
-    """What is solved in words, the columns of its steps (of a general scene displacement and force of each load), and
-    name and unit of what tells how accurate a mesh is."""
+    """What is solved in words, the columns of its steps (of a general scene displacement and force
+    of each load), and name and unit of what tells how accurate a mesh is."""
     kind, plane = "elastic-plastic" if scene.plastic else "elastic", f"plane {scene.analysis.plane}"
     if isinstance(scene, Scene):
         dR, R, E_star = scene.joint.dR, scene.joint.radius, scene.E_star
@@ -46,7 +47,11 @@ def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
             f"{kind} joint, {plane}, dR/R = {dR / R:g}",
             [
                 ("delta/dR", "9.5g", lambda m: m.delta / dR),
-                ("P/(E* R)", "11.7f", lambda m: round(m.P / unit, 7) + 0.0),  # no minus before a zero
+                (
+                    "P/(E* R)",
+                    "11.7f",
+                    lambda m: round(m.P / unit, 7) + 0.0,
+                ),  # no minus before a zero
                 ("eps/deg", "8.3f", lambda m: math.degrees(m.eps)),
                 ("p0/E*", "9.6f", lambda m: m.p0 / E_star),
                 ("PEEQ max", "9.2e", lambda m: m.peeq_max),
@@ -59,17 +64,27 @@ def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
         return name, f"{max(14, len(name))}.6g", lambda m: m.values[name]
 
     def peeq(m: Any) -> float:
-        return max((value for name, value in m.values.items() if name.endswith("peeq_max")), default=0.0)
+        return max(
+            (value for name, value in m.values.items() if name.endswith("peeq_max")), default=0.0
+        )
 
-    loads = [value(f"{load.name} {what}") for load in scene.load[:_LOADS_SHOWN] for what in ("displacement", "force")]
+    loads = [
+        value(f"{load.name} {what}")
+        for load in scene.load[:_LOADS_SHOWN]
+        for what in ("displacement", "force")
+    ]
     bodies = "1 body" if len(scene.body) == 1 else f"{len(scene.body)} bodies"
-    columns: list[Column] = [("load factor", "11.5g", lambda m: m.at), *loads, ("PEEQ max", "9.2e", peeq)]
+    columns: list[Column] = [
+        ("load factor", "11.5g", lambda m: m.at),
+        *loads,
+        ("PEEQ max", "9.2e", peeq),
+    ]
     return f"{bodies}, {kind}, {plane}", columns, "last value", 1.0
 
 
 class Progress:
-    """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and only the steps of the last
-    one, at the end."""
+    """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and only the
+    steps of the last one, at the end."""
 
     def __init__(self, scene: AnyScene, silent: bool, verbose: bool = False) -> None:
         self.silent, self.verbose = silent, verbose and not silent
@@ -84,12 +99,21 @@ class Progress:
             from rich.progress import Progress as Moving
             from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-            self.moving = Moving(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True)
+            self.moving = Moving(
+                SpinnerColumn(),
+                TextColumn("{task.description}"),
+                TimeElapsedColumn(),
+                transient=True,
+            )
             self.moving.add_task("meshing", total=None)
-        self.cells = scene.joint.expected_cells if isinstance(scene, Scene) and not self.by_mesh else 0.0
+        self.cells = (
+            scene.joint.expected_cells if isinstance(scene, Scene) and not self.by_mesh else 0.0
+        )
         self.title, self.columns, last, self.unit = _shown(scene)
         if self.by_mesh:
-            self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
+            self.print(
+                f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value"
+            )
             self.strengths()
             costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
             sizes = "elements/R" if isinstance(scene, Scene) or scene.mesh.shape else "size/file"
@@ -102,8 +126,8 @@ class Progress:
         self.move(f"load {load:.6g}, {self.iterations} Newton iterations")
 
     def iterate(self, load: float, result: Newton) -> None:
-        """Show where the present solve is: moving on a terminal; by a line of each iteration if ``verbose``, and where
-        nothing was said for long."""
+        """Show where the present solve is: moving on a terminal; by a line of each iteration if
+        ``verbose``, and where nothing was said for long."""
         if self.silent:
             return
         seconds = perf_counter() - self._begun
@@ -123,7 +147,8 @@ class Progress:
             self.moving.update(self.moving.task_ids[0], description=said, refresh=at_once)
 
     def phase(self, name: str) -> None:
-        """Show a phase before the first load is tried: on a terminal, or of a large mesh by a line."""
+        """Show a phase before the first load is tried: on a terminal, or of a large mesh by a
+        line."""
         said = {"mesh": "meshing", "setup": "setting up"}.get(name)
         if said is None:
             return
@@ -148,13 +173,17 @@ class Progress:
     def start(self, system: Any) -> None:
         """Say what is going to be solved."""
         ranks = f"{system.comm.size} rank{'s' if system.comm.size > 1 else ''}"
-        self.print(f"{self.title}: {system.n_cells} {system.cell_kind}, {system.n_dofs} dofs, {ranks}")
+        self.print(
+            f"{self.title}: {system.n_cells} {system.cell_kind}, {system.n_dofs} dofs, {ranks}"
+        )
         self.strengths()
         self.headings()
 
     def level(self, level: Level) -> None:
         """Show a mesh that is solved."""
-        mesh, steps = ("" if e is None else f"{e:.1e}" for e in (level.mesh_error, level.step_error))
+        mesh, steps = (
+            "" if e is None else f"{e:.1e}" for e in (level.mesh_error, level.step_error)
+        )
         self.print(
             f"{level.mesh:5d}  {level.element_size:10.4g}  {level.growth:6.4g}  {level.substeps:8d}  {level.dofs:7d}  "
             f"{level.last / self.unit:10.7f}  {mesh:>13s}  {steps:>14s}  {level.seconds:7.1f}"
@@ -163,7 +192,11 @@ class Progress:
     def headings(self) -> None:
         """Print the headings of steps."""
         widths = ((name, int(form.partition(".")[0])) for name, form, _ in self.columns)
-        self.print("  ".join([" step", *(f"{name:>{width}s}" for name, width in widths), "iterations  cutbacks"]))
+        self.print(
+            "  ".join(
+                [" step", *(f"{name:>{width}s}" for name, width in widths), "iterations  cutbacks"]
+            )
+        )
 
     def step(self, m: Any) -> None:
         """Show an accepted output step."""
@@ -200,8 +233,9 @@ def solve_and_report(
     begun: float | None = None,
     **options: Any,
 ) -> tuple[AnyScene, Outcome]:
-    """Solve the scene that ``load`` gives rank 0 into ``folder``, claimed by ``force`` if it has to be, or go on from
-    ``start``, and report it on rank 0 unless ``silent``, each iteration if ``verbose``. Collective.
+    """Solve the scene that ``load`` gives rank 0 into ``folder``, claimed by ``force`` if it has to
+    be, or go on from ``start``, and report it on rank 0 unless ``silent``, each iteration if
+    ``verbose``. Collective.
 
     If this process is for it alone, it has ``begun`` at that time of `perf_counter`.
     """
@@ -215,7 +249,9 @@ def solve_and_report(
 
     scene, new = agreed(comm, claimed)
     from archord.report.timer import Timer
-    from archord.studies.accuracy import solve_to_accuracy  # with all of dolfinx: bad input is told before
+    from archord.studies.accuracy import (
+        solve_to_accuracy,
+    )  # with all of dolfinx: bad input is told before
 
     report = Progress(scene, silent or comm.rank != 0, verbose)
     options |= {"on_attempt": report.show, "on_iteration": report.iterate}

@@ -1,4 +1,5 @@
-"""Commands under an MPI launcher: on which ranks they work, and how all ranks end with one exit code.
+"""Commands under an MPI launcher: on which ranks they work, and how all ranks end with one exit
+code.
 
 MPI is loaded only by commands that all ranks work on, and only where a launcher started several.
 """
@@ -24,15 +25,16 @@ def launcher_rank() -> int:
 
 
 def launched_with_others() -> bool:
-    """Whether a launcher may have started other ranks too, without loading MPI. PMIx tells no number of ranks."""
+    """Whether a launcher may have started other ranks too, without loading MPI. PMIx tells no
+    number of ranks."""
     if any(os.environ.get(name, "1") != "1" for name in _SIZE):
         return True
     return "PMIX_RANK" in os.environ and "OMPI_COMM_WORLD_SIZE" not in os.environ
 
 
 def on_terminal() -> bool:
-    """Whether somebody watches stdout. Under a launcher nobody can tell: Open MPI gives its ranks a terminal of their
-    own even where it writes to a file itself."""
+    """Whether somebody watches stdout. Under a launcher nobody can tell: Open MPI gives its ranks a
+    terminal of their own even where it writes to a file itself."""
     return sys.stdout.isatty() and not any(name in os.environ for name in _RANK)
 
 
@@ -44,9 +46,10 @@ def terminal_width() -> int:
 def run_on_ranks(command: str, work: Callable[[], int]) -> int:
     """Exit code of ``work``, done by all ranks for a command of `COLLECTIVE`, else by rank 0 alone.
 
-    Alone means without the launcher: dolfinx and PETSc start collectively, and would wait for ranks that never come. So
-    rank 0 forgets who started it, and the others, which have nothing to say, are done. With a collective command no
-    rank leaves with bad input before rank 0 has spoken, as a launcher then ends all others at once.
+    Alone means without the launcher: dolfinx and PETSc start collectively, and would wait for ranks
+    that never come. So rank 0 forgets who started it, and the others, which have nothing to say,
+    are done. With a collective command no rank leaves with bad input before rank 0 has spoken, as a
+    launcher then ends all others at once.
     """
     if not launched_with_others():
         return work()

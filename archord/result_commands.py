@@ -1,4 +1,5 @@
-"""Commands that read what solves left: `show`, `compare`, `export`, `picture`, `report`, `probe`; and `export-deck`."""
+"""Commands that read what solves left: `show`, `compare`, `export`, `picture`, `report`, `probe`;
+and `export-deck`."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from archord.scene.errors import InputError
 @output("picture to draw [picture.png in the folder]")
 @pictures("the picture")
 def show(folder: Path, output: Path | None, pictures: bool) -> int:
-    """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them."""
+    """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw
+    them."""
     from archord.output.folder import is_sweep
     from archord.postprocess.pictures.pictures import draw_run, draw_runs
     from archord.postprocess.run import Run
@@ -29,10 +31,15 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
         sweep = Sweep(folder)
         text, drawn = sweep_text(sweep), None
         if pictures and sweep.runs:
-            drawn = draw_runs(list(sweep.runs.values()), [sweep.label(case) for case in sweep.runs], target)
+            drawn = draw_runs(
+                list(sweep.runs.values()), [sweep.label(case) for case in sweep.runs], target
+            )
     else:
         run = Run(folder)
-        text, drawn = run_text(run, terminal_width()), draw_run(run, target) if pictures and run.steps else None
+        text, drawn = (
+            run_text(run, terminal_width()),
+            draw_run(run, target) if pictures and run.steps else None,
+        )
     print(text, *([f"\n{drawn}"] if drawn else []), sep="\n")
     return 0
 
@@ -42,8 +49,8 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
 @output("picture to draw", "comparison.png", "FILE")
 @pictures("the picture")
 def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
-    """Compare runs with the first: P, p0 and eps at common displacements (delta at common forces, where forces
-    load all of them), scenes, cost; and draw them.
+    """Compare runs with the first: P, p0 and eps at common displacements (delta at common forces,
+    where forces load all of them), scenes, cost; and draw them.
 
     Where units, R, dR or E* differ, they are compared in dimensionless form.
     """
@@ -68,7 +75,8 @@ def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
 @click.option("--step", type=int, metavar="N", help="write .vtkhdf files of this step alone [all]")
 @flag("--force", "overwrite files that are there")
 def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, force: bool) -> int:
-    """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
+    """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything
+    else."""
     from archord.postprocess.export import export_csv, export_vtk
     from archord.postprocess.run import Run
 
@@ -85,19 +93,39 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
 @click.command()
 @argument("folder", "RUN", "run folder")
 @click.option(
-    "--step", "steps", type=int, multiple=True, metavar="N", help="step to draw; repeated: of curves [last, or loaded]"
+    "--step",
+    "steps",
+    type=int,
+    multiple=True,
+    metavar="N",
+    help="step to draw; repeated: of curves [last, or loaded]",
 )
 @click.option(
-    "--field", default="", help="stress, peeq, displacement, pressure, mean_stress, stress_xx, p1, ... [peeq or stress]"
+    "--field",
+    default="",
+    help="stress, peeq, displacement, pressure, mean_stress, stress_xx, p1, ... [peeq or stress]",
 )
-@click.option("--edge", "edges", multiple=True, metavar="NAME", help="draw the field along this edge [hoop stress]")
+@click.option(
+    "--edge",
+    "edges",
+    multiple=True,
+    metavar="NAME",
+    help="draw the field along this edge [hoop stress]",
+)
 @output("file to draw [RUN/picture.png]")
-def picture(folder: Path, steps: tuple[int, ...], field: str, edges: tuple[str, ...], output: Path | None) -> int:
-    """Draw a run: a field on the bodies, contact pressure or a field along edges, and the force of the loads."""
+def picture(
+    folder: Path, steps: tuple[int, ...], field: str, edges: tuple[str, ...], output: Path | None
+) -> int:
+    """Draw a run: a field on the bodies, contact pressure or a field along edges, and the force of
+    the loads."""
     from archord.postprocess.pictures.pictures import draw_run
     from archord.postprocess.run import Run
 
-    print(draw_run(Run(folder), output or folder / "picture.png", steps=steps, field=field, edges=edges))
+    print(
+        draw_run(
+            Run(folder), output or folder / "picture.png", steps=steps, field=field, edges=edges
+        )
+    )
     return 0
 
 
@@ -106,7 +134,8 @@ def picture(folder: Path, steps: tuple[int, ...], field: str, edges: tuple[str, 
 @output("PDF file to write [RUN/report.pdf]")
 @flag("--force", "overwrite a file that is there")
 def report(folder: Path, output: Path | None, force: bool) -> int:
-    """Write a run as a PDF report: scene, mesh, pictures, convergence, balances, steps, warnings, versions."""
+    """Write a run as a PDF report: scene, mesh, pictures, convergence, balances, steps, warnings,
+    versions."""
     from archord.postprocess.pictures.report import write_report
     from archord.postprocess.run import Run
 
@@ -120,13 +149,26 @@ def report(folder: Path, output: Path | None, force: bool) -> int:
 @click.option("--line", type=float, nargs=4, metavar="X0 Y0 X1 Y1", help="along this line")
 @click.option("--step", type=int, metavar="N", help="at this step [the last]")
 @click.option(
-    "--quantity", default="", help="hoop [of an edge], von_mises [of a line], pressure, stress_xx, p1, ux, ..."
+    "--quantity",
+    default="",
+    help="hoop [of an edge], von_mises [of a line], pressure, stress_xx, p1, ux, ...",
 )
-@click.option("--angle", "angles", type=float, multiple=True, help="tell the value at this angle of an arc [°]")
-@click.option("--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section")
+@click.option(
+    "--angle",
+    "angles",
+    type=float,
+    multiple=True,
+    help="tell the value at this angle of an arc [°]",
+)
+@click.option(
+    "--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section"
+)
 @output("table (.csv) or picture to write")
-def probe(folder: Path, angles: tuple[float, ...], over: float | None, output: Path | None, **asked: Any) -> int:
-    """Print a quantity along an edge or a line of a run, its largest and smallest value and where; and draw it."""
+def probe(
+    folder: Path, angles: tuple[float, ...], over: float | None, output: Path | None, **asked: Any
+) -> int:
+    """Print a quantity along an edge or a line of a run, its largest and smallest value and where;
+    and draw it."""
     from archord.postprocess.run import Run
     from archord.postprocess.tables import probe_text
 
@@ -157,7 +199,9 @@ def export_deck(scene: Path, output: Path | None, overrides: tuple[str, ...], fo
     check_target(path, files_read(scene, overrides), force=force)
     system = system_of(checked)
     try:
-        text = deck(system, deck_mesh(system), checked.targets, f"{scene.stem} in {checked.units.length}")
+        text = deck(
+            system, deck_mesh(system), checked.targets, f"{scene.stem} in {checked.units.length}"
+        )
     except ValueError as error:
         raise InputError(f"{scene}: {error}.") from error
     with writing(path) as new:

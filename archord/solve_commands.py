@@ -55,13 +55,19 @@ def solve(
         return _solve(lambda: load_scene(scene, overrides), folder, begun, force=force, **told)
     if output is not None and scene.is_dir():
         raise click.UsageError("-o does not go with a run folder")
-    folder, file = (scene, scene / "scene.toml") if scene.is_dir() else (output or Path("runs") / scene.stem, scene)
+    folder, file = (
+        (scene, scene / "scene.toml")
+        if scene.is_dir()
+        else (output or Path("runs") / scene.stem, scene)
+    )
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
     from archord.output.restart import plan_restart  # on all ranks: it imports PETSc
 
-    planned = agreed(MPI.COMM_WORLD, lambda: plan_restart(folder, load_scene(file, overrides), extend=extend))
+    planned = agreed(
+        MPI.COMM_WORLD, lambda: plan_restart(folder, load_scene(file, overrides), extend=extend)
+    )
     if not quiet:
         print(f"{planned.said}.", flush=True)
     if planned.finished:
@@ -69,7 +75,9 @@ def solve(
     return _solve(lambda: planned.scene, folder, begun, force=True, start=planned.start, **told)
 
 
-def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, *, quiet: bool, **options: Any) -> int:
+def _solve(
+    load: Callable[[], AnyScene], folder: Path, begun: float, *, quiet: bool, **options: Any
+) -> int:
     """`solve_and_report`, with its ``options``; returns the exit code."""
     from mpi4py import MPI
 
@@ -88,16 +96,23 @@ def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, *, quiet: b
     if outcome.warnings:
         from archord.postprocess.tables import first_of_each_kind
 
-        for warning in first_of_each_kind([warning for warning in outcome.warnings if warning not in told]):
+        for warning in first_of_each_kind(
+            [warning for warning in outcome.warnings if warning not in told]
+        ):
             print(f"archord: warning: {warning}.", file=sys.stderr)
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)
-        print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
+        print(
+            f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.",
+            file=sys.stderr,
+        )
     elif comm.rank == 0 and not quiet:
         said = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
         if outcome.accuracy is not None and outcome.accuracy.estimated is not None:
             name, asked = scene.accurate, outcome.accuracy.asked
-            said += f", estimated error of {name} {outcome.accuracy.estimated:.1e} (asked {asked:g})"
+            said += (
+                f", estimated error of {name} {outcome.accuracy.estimated:.1e} (asked {asked:g})"
+            )
         print(f"{said}, results in {folder}")
     return {"done": 0, "stopped": 3, "interrupted": 128 + outcome.signal}[outcome.status]
 
@@ -107,11 +122,17 @@ def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, *, quiet: b
 @flag("--general", "print a commented example of a general scene")
 @flag("--reference", "print all keys as Markdown tables")
 @flag("--materials", "print the metals that a scene may name, as a Markdown table")
-@click.option("--expand", type=PATH, metavar="SCENE", help="print the general scene that SCENE stands for")
-def scene(example: bool, general: bool, reference: bool, materials: bool, expand: Path | None) -> int:
+@click.option(
+    "--expand", type=PATH, metavar="SCENE", help="print the general scene that SCENE stands for"
+)
+def scene(
+    example: bool, general: bool, reference: bool, materials: bool, expand: Path | None
+) -> int:
     """Print what a scene file may hold."""
     if example + general + reference + materials + (expand is not None) != 1:
-        raise click.UsageError("choose one of --example, --general, --reference, --materials and --expand")
+        raise click.UsageError(
+            "choose one of --example, --general, --reference, --materials and --expand"
+        )
     from archord.scene import reference as pages
     from archord.scene.file import load_scene, parse_any, resolved
     from archord.scene.scene import Scene
@@ -119,7 +140,9 @@ def scene(example: bool, general: bool, reference: bool, materials: bool, expand
 
     if expand is not None:
         given = load_scene(expand)
-        print(resolved(parse_any(general_joint(given)) if isinstance(given, Scene) else given), end="")
+        print(
+            resolved(parse_any(general_joint(given)) if isinstance(given, Scene) else given), end=""
+        )
     elif materials:
         print(pages.materials(), end="")
     else:
@@ -133,7 +156,8 @@ def scene(example: bool, general: bool, reference: bool, materials: bool, expand
 @overrides()
 @pictures("the mesh with its named sets")
 def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: bool) -> int:
-    """Print what is in a mesh: kind and order of its cells, named sets, circles and warnings; and draw it.
+    """Print what is in a mesh: kind and order of its cells, named sets, circles and warnings; and
+    draw it.
 
     Keys of [mesh] may be set of a mesh file, too: --set mesh.scale=1000.
     """

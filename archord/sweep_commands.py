@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 @overrides("base scene")
 @output("folder [runs/<sweep name>]")
 @flag("--dry-run", "print the cases and stop")
-@click.option("--array", default="1/1", metavar="I/N", help="solve part I of N of the cases, for a job array")
+@click.option(
+    "--array", default="1/1", metavar="I/N", help="solve part I of N of the cases, for a job array"
+)
 @flag("--gather", "write the tables of what is there and stop")
 @flag("--retry", "try cases again that stopped or failed")
 @flag("--force", "solve all cases again, and overwrite their results")
@@ -42,8 +44,8 @@ def sweep(
 ) -> int:
     """Solve all cases of a sweep; under mpirun side by side, on one rank each.
 
-    Solved cases are not solved again: a sweep that was killed goes on by the same command, and one whose file was
-    changed solves what is new.
+    Solved cases are not solved again: a sweep that was killed goes on by the same command, and one
+    whose file was changed solves what is new.
     """
     begun = perf_counter()
     if force + gather + retry > 1:
@@ -52,14 +54,22 @@ def sweep(
 
     from archord.output.ranks import agreed
     from archord.studies.cases import read_sweep
-    from archord.studies.sweep import FILE, claim, expected_seconds, open_cases, part_of, write_tables
+    from archord.studies.sweep import (
+        FILE,
+        claim,
+        expected_seconds,
+        open_cases,
+        part_of,
+        write_tables,
+    )
 
     comm = MPI.COMM_WORLD
     source = file / FILE if file.is_dir() else file
     folder = output or (file if file.is_dir() else Path("runs") / file.stem.removesuffix(".sweep"))
 
     def say(text: str) -> None:
-        """Print on rank 0; if nobody reads any more, that is no reason to stop, nor to leave other ranks waiting."""
+        """Print on rank 0; if nobody reads any more, that is no reason to stop, nor to leave other
+        ranks waiting."""
         try:
             if comm.rank == 0 and not quiet:
                 print(text, flush=True)
@@ -82,13 +92,19 @@ def sweep(
             return design, mine, [], []
         ended, left, damaged = open_cases(mine, folder, retry=retry, force=force)
         for result in damaged:
-            print(f"archord: warning: {result.message}: the case is solved again.", file=sys.stderr, flush=True)
+            print(
+                f"archord: warning: {result.message}: the case is solved again.",
+                file=sys.stderr,
+                flush=True,
+            )
         if ended:
             say(f"{len(ended)} of {len(mine)} cases are there already")
         return design, mine, ended, left
 
     found: list = []
-    agreed(comm, lambda: found.append(prepared()))  # rank 0 keeps what it found: the others need none of it
+    agreed(
+        comm, lambda: found.append(prepared())
+    )  # rank 0 keeps what it found: the others need none of it
     if dry_run:
         return 0
     design, mine, results, cases = found[0] if found else (None, [], [], [])
@@ -113,9 +129,16 @@ def sweep(
         say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
         for result in (result for result in known.values() if result.damaged):
             print(f"archord: warning: {result.message}.", file=sys.stderr)
-        failed = [(case, known[case.run]) for case in mine if known[case.run].status in ("stopped", "failed")]
+        failed = [
+            (case, known[case.run])
+            for case in mine
+            if known[case.run].status in ("stopped", "failed")
+        ]
         for case, result in failed:
-            print(f"archord: case {case.number}, {case.run}: {result.status}: {result.message}.", file=sys.stderr)
+            print(
+                f"archord: case {case.number}, {case.run}: {result.status}: {result.message}.",
+                file=sys.stderr,
+            )
         return bool(failed)
 
     failed = agreed(comm, concluded)
@@ -126,8 +149,20 @@ def _table(design) -> Table:
     """A line for each case: what is varied, and what it may cost."""
     from archord.studies.sweep import expected_seconds, heading, shown
 
-    table = Table("case", "run", *(heading(key, design.cases[0].scene) for key in design.keys), "steps", "seconds")
+    table = Table(
+        "case",
+        "run",
+        *(heading(key, design.cases[0].scene) for key in design.keys),
+        "steps",
+        "seconds",
+    )
     for case in design.cases:
         values = [shown(case.value(key)) or "-" for key in design.keys]
-        table.add(case.number, case.run, *values, len(case.scene.targets), f"{expected_seconds(case.scene):.2g}")
+        table.add(
+            case.number,
+            case.run,
+            *values,
+            len(case.scene.targets),
+            f"{expected_seconds(case.scene):.2g}",
+        )
     return table

@@ -1,4 +1,5 @@
-"""What benchmarks share: a named scene with what is expected of it, the joint that most of them vary, and tables."""
+"""What benchmarks share: a named scene with what is expected of it, the joint that most of them
+vary, and tables."""
 
 from __future__ import annotations
 
@@ -27,9 +28,11 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Expected:
-    """``quantity`` (a key of `quantities`) at the last step must be ``value`` within the relative ``tolerance``.
+    """``quantity`` (a key of `quantities`) at the last step must be ``value`` within the relative
+    ``tolerance``.
 
-    ``value`` is a number or, times ``factor``, that of another case by name. ``source`` says where it comes from.
+    ``value`` is a number or, times ``factor``, that of another case by name. ``source`` says where
+    it comes from.
     """
 
     quantity: str
@@ -43,8 +46,9 @@ class Expected:
 class Case:
     """A scene by name, in a ``group`` of its benchmark, and how its run must end.
 
-    With ``stops``, a part of the sentence that the run must end with (exit code 3); with ``warns``, a part of one of
-    its warnings. At most ``budget`` Newton iterations, failed attempts included, where the benchmark limits them.
+    With ``stops``, a part of the sentence that the run must end with (exit code 3); with ``warns``,
+    a part of one of its warnings. At most ``budget`` Newton iterations, failed attempts included,
+    where the benchmark limits them.
     """
 
     name: str
@@ -69,9 +73,11 @@ class Case:
         return report.get("status") == "done" and scene == resolved(self.scene)
 
     def attempt(self, parent: Path, **hooks: Any) -> Outcome:
-        """Solve into the folder below ``parent``, on this rank alone; ``hooks`` are those of `solve_scene`.
+        """Solve into the folder below ``parent``, on this rank alone; ``hooks`` are those of
+        `solve_scene`.
 
-        Raises KeyboardInterrupt if a signal interrupted the run, and `InputError` if the folder cannot be written.
+        Raises KeyboardInterrupt if a signal interrupted the run, and `InputError` if the folder
+        cannot be written.
         """
         claim_folder(self.folder(parent), force=True)
         outcome = solve_to_accuracy(self.scene, self.folder(parent), MPI.COMM_SELF, **hooks)
@@ -90,9 +96,11 @@ class Case:
 def paper_joint(
     element_size: float = 0.04, steps: int = 4, yield_stress: float | None = None, **sections: dict
 ) -> Scene:
-    """Plane strain, like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R, delta = 2 dR, with R = E* = 1.
+    """Plane strain, like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R, delta = 2 dR, with R = E* =
+    1.
 
-    ``sections`` override keys of the scene's sections, as in ``joint={"clearance": 0.01}``; None drops a key.
+    ``sections`` override keys of the scene's sections, as in ``joint={"clearance": 0.01}``; None
+    drops a key.
     """
     solid = {"E": E, "nu": 0.3} | ({"yield_stress": yield_stress} if yield_stress else {})
     data: dict = {
@@ -110,16 +118,23 @@ def varied(scene: Scene, **sections: dict) -> Scene:
 
 
 def _overridden(data: dict[str, Any], sections: dict[str, dict]) -> dict[str, Any]:
-    """``data`` with the keys of ``sections``, without those that are None; a rigid pin has no other."""
-    merged = data | {name: keys if keys.get("rigid") else data.get(name, {}) | keys for name, keys in sections.items()}
+    """``data`` with the keys of ``sections``, without those that are None; a rigid pin has no
+    other."""
+    merged = data | {
+        name: keys if keys.get("rigid") else data.get(name, {}) | keys
+        for name, keys in sections.items()
+    }
     return {
-        name: {key: value for key, value in keys.items() if value is not None} if isinstance(keys, dict) else keys
+        name: {key: value for key, value in keys.items() if value is not None}
+        if isinstance(keys, dict)
+        else keys
         for name, keys in merged.items()
     }
 
 
 def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
-    """What cases are compared by at the step ``last``: of a joint without units, of a general scene the columns."""
+    """What cases are compared by at the step ``last``: of a joint without units, of a general scene
+    the columns."""
     if not isinstance(scene, Scene):
         return last.values
     E_star, R, P = scene.E_star, scene.joint.radius, last.P / scene.thickness
@@ -138,17 +153,26 @@ def slug(name: str) -> str:
 
 
 def matches(pattern: str, *names: str) -> bool:
-    """Whether ``pattern`` (with * and ?) is one of ``names``, or part of one, in any case of letters."""
-    return any(pattern.lower() in name.lower() or fnmatch(name.lower(), pattern.lower()) for name in names)
+    """Whether ``pattern`` (with * and ?) is one of ``names``, or part of one, in any case of
+    letters."""
+    return any(
+        pattern.lower() in name.lower() or fnmatch(name.lower(), pattern.lower()) for name in names
+    )
 
 
-def side_by_side(comm: MPI.Comm, items: Sequence[Item], function: Callable[[Item], Result]) -> list[Result]:
-    """``function`` of every item, in order, the ranks taking turns; the same list on all ranks. Collective."""
+def side_by_side(
+    comm: MPI.Comm, items: Sequence[Item], function: Callable[[Item], Result]
+) -> list[Result]:
+    """``function`` of every item, in order, the ranks taking turns; the same list on all ranks.
+    Collective."""
     parts = comm.allgather([function(item) for item in items[comm.rank :: comm.size]])
     return [parts[k % comm.size][k // comm.size] for k in range(len(items))]
 
 
-def write_table(folder: Path, name: str, rows: Sequence[Row], below: str = "") -> tuple[str, list[Path]]:
-    """`write_report` of a table with a text ``below``; returns the Markdown and the files, nothing without rows."""
+def write_table(
+    folder: Path, name: str, rows: Sequence[Row], below: str = ""
+) -> tuple[str, list[Path]]:
+    """`write_report` of a table with a text ``below``; returns the Markdown and the files, nothing
+    without rows."""
     text = Table.of(rows).markdown() + below if rows else ""
     return text, write_report(folder, name, rows, text) if rows else []

@@ -1,4 +1,5 @@
-"""The general law on joints that it has not seen: errors of P, stiffness, p0, eps and the way back, and its own word.
+"""The general law on joints that it has not seen: errors of P, stiffness, p0, eps and the way back,
+and its own word.
 
     python3 -m archord.studies.law_design --fresh 200 --seed 1 > fresh.sweep.toml
     mpirun -n 2 archord sweep fresh.sweep.toml -o runs/fresh
@@ -24,19 +25,31 @@ from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.general_law import law_of_numbers
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
-from archord.postprocess.laws.general.law_fit import SOFT, NodeRun, complete, first_loading, rms_largest, solved_joints
+from archord.postprocess.laws.general.law_fit import (
+    SOFT,
+    NodeRun,
+    complete,
+    first_loading,
+    rms_largest,
+    solved_joints,
+)
 from archord.postprocess.run import Run
 from archord.report.table import Table
 
-_RANGES = {"P to 0.1 dR": (0.0, 0.099), "P 0.1 to 2 dR": (0.099, 2.001), "P 2 to 3 dR": (2.001, 3.001)}
+_RANGES = {
+    "P to 0.1 dR": (0.0, 0.099),
+    "P 0.1 to 2 dR": (0.099, 2.001),
+    "P 2 to 3 dR": (2.001, 3.001),
+}
 _LEFT = {"3 % left": 0.03, "1 % left": 0.01}  # parts of the largest force on the way back
 
 
 @dataclass(frozen=True)
 class Off:
-    """Errors of one joint: by quantity an array, relative in per cent but for eps [degrees]; of the stiffness over the
-    larger of itself and P/delta, as it vanishes where the whole contact yields in plane stress, and over itself.
-    ``kind`` is plane and what yields; ``inside`` which errors of P are within the expected ones."""
+    """Errors of one joint: by quantity an array, relative in per cent but for eps [degrees]; of the
+    stiffness over the larger of itself and P/delta, as it vanishes where the whole contact yields
+    in plane stress, and over itself. ``kind`` is plane and what yields; ``inside`` which errors of
+    P are within the expected ones."""
 
     kind: str
     errors: dict[str, Array]
@@ -66,7 +79,8 @@ def off(numbers: tuple[float, ...], runs: list[NodeRun]) -> Off:
 
 
 def kind_of(numbers: tuple[float, ...]) -> str:
-    """Plane and what yields of the joint with these ``numbers``, in words; and whether the pin is soft."""
+    """Plane and what yields of the joint with these ``numbers``, in words; and whether the pin is
+    soft."""
     strain, p, m, _, _, *stresses = numbers
     pin, block = stresses
     if np.isinf(stresses).all():
@@ -80,14 +94,18 @@ def kind_of(numbers: tuple[float, ...]) -> str:
 
 
 def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
-    """Errors of a way back, in per cent: of P over the largest P, of the displacements at which parts of it are left
-    over dR, of the energy lost over the work of loading, of P on reloading; and where P is within what is expected."""
+    """Errors of a way back, in per cent: of P over the largest P, of the displacements at which
+    parts of it are left over dR, of the energy lost over the work of loading, of P on reloading;
+    and where P is within what is expected."""
     (x, y), largest = run.back.T, run.back[0, 1]
     state = law.at(x[None], x[0])
     load = state.load[0]
     fine = np.linspace(0.0, x[0], 2000)
     loading = PchipInterpolator(*np.vstack([[0.0, 0.0], run.nodes[: run.loading, :2]]).T)(fine)
-    ways = [PchipInterpolator(np.append(-1.0, x[::-1]), np.append(0.0, values[::-1]))(fine) for values in (y, load)]
+    ways = [
+        PchipInterpolator(np.append(-1.0, x[::-1]), np.append(0.0, values[::-1]))(fine)
+        for values in (y, load)
+    ]
     left = {
         name: [fine[np.searchsorted(way, share * largest)] for way in ways]
         for name, share in _LEFT.items()
@@ -108,13 +126,26 @@ def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
 
 
 def table_of(found: list[Off]) -> Table:
-    """rms and largest of every quantity by kind of joint; and the share of P within the expected error."""
-    names = [*_RANGES, "stiffness", "own stiffness", "p0", "eps", "back", *_LEFT, "energy", "reloaded"]
+    """rms and largest of every quantity by kind of joint; and the share of P within the expected
+    error."""
+    names = [
+        *_RANGES,
+        "stiffness",
+        "own stiffness",
+        "p0",
+        "eps",
+        "back",
+        *_LEFT,
+        "energy",
+        "reloaded",
+    ]
     table = Table("joints", "number", *names, "inside", "back inside")
     kinds = defaultdict(list)
     for one in found:
         soft = ", soft pin" if "soft" in one.kind else ""
-        together = one.kind if "elastic" in one.kind else f"{one.kind.split()[0]} yielding{soft}, all"
+        together = (
+            one.kind if "elastic" in one.kind else f"{one.kind.split()[0]} yielding{soft}, all"
+        )
         for kind in {one.kind, together, "all"}:
             kinds[kind].append(one)
     for kind in sorted(kinds):
@@ -131,8 +162,9 @@ def table_of(found: list[Off]) -> Table:
 
 
 def other_laws(solved: dict[tuple[float, ...], list[NodeRun]]) -> Table:
-    """rms and largest error of P from 0.1 to 2 dR, in per cent, of the paper's law with k = 0.85, with the k that is
-    best for all joints together, and with each joint's own k and c; and of the general law."""
+    """rms and largest error of P from 0.1 to 2 dR, in per cent, of the paper's law with k = 0.85,
+    with the k that is best for all joints together, and with each joint's own k and c; and of the
+    general law."""
     data = []
     for numbers, runs in solved.items():
         x, y = first_loading(runs)[:, :2].T
@@ -154,7 +186,9 @@ def other_laws(solved: dict[tuple[float, ...], list[NodeRun]]) -> Table:
     for name, law in laws.items():
         off = defaultdict(list)
         for numbers, x, y in data:
-            kind = "elastic" if np.isinf(numbers[5:]).all() else "strain" if numbers[0] else "stress"
+            kind = (
+                "elastic" if np.isinf(numbers[5:]).all() else "strain" if numbers[0] else "stress"
+            )
             off[kind].append(100 * (law(numbers, x, y) / y - 1))
         cells = [np.concatenate(off[kind]) for kind in ("elastic", "strain", "stress")]
         table.add(name, *map(rms_largest, cells))
@@ -172,13 +206,21 @@ def _paper(numbers: tuple[float, ...], x: Array, k: float, c: float = 1.0) -> Ar
 def _paper_fitted(numbers: tuple[float, ...], x: Array, y: Array) -> Array:
     """y of the paper's law with this joint's best k, and c where it yields."""
     starts = [[0.8]] if np.isinf(min(numbers[5:])) else [[0.8, c] for c in (0.8, 1.2, 2.0)]
-    return _paper(numbers, x, *fit(lambda values: _paper(numbers, x, *map(float, values)), starts, y)[0])
+    return _paper(
+        numbers, x, *fit(lambda values: _paper(numbers, x, *map(float, values)), starts, y)[0]
+    )
 
 
 def main(folder: Path) -> None:
     """Print the tables of the sweep in ``folder``."""
-    runs = (Run(run).curve for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
-    solved = {numbers: nodes for numbers, nodes in solved_joints(runs).items() if complete(numbers, nodes)}
+    runs = (
+        Run(run).curve
+        for run in sorted((folder / "cases").iterdir())
+        if (run / "run.json").exists()
+    )
+    solved = {
+        numbers: nodes for numbers, nodes in solved_joints(runs).items() if complete(numbers, nodes)
+    }
     print(table_of([off(numbers, nodes) for numbers, nodes in solved.items()]).markdown())
     print(other_laws(solved).markdown())
 

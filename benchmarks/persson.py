@@ -1,5 +1,5 @@
-"""Persson's joint and its theory: a pin in a ring of 100 R under a force at its core, in units of R = E* = 1, by
-Persson (1964) with the load-angle relation of Ciavarella and Decuzzi (2001)."""
+"""Persson's joint and its theory: a pin in a ring of 100 R under a force at its core, in units of R
+= E* = 1, by Persson (1964) with the load-angle relation of Ciavarella and Decuzzi (2001)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,23 @@ DR = 1e-4
 UNLIKE = ((3.0, 0.2), (1.0, 0.4))  # shear modulus and nu of two bodies with Dundurs' beta = 0
 
 
-def persson_joint(load: float, element_size: float = 0.04, steps: int = 1, **sections: dict) -> Scene:
-    """The joint at E* dR/P = ``load`` (negative: dR < 0); ``sections`` override keys of the scene's sections."""
+def persson_joint(
+    load: float, element_size: float = 0.04, steps: int = 1, **sections: dict
+) -> Scene:
+    """The joint at E* dR/P = ``load`` (negative: dR < 0); ``sections`` override keys of the scene's
+    sections."""
     ring = {"model": "ring", "clearance": DR * float(np.sign(load))}
     force = {"displacement": None, "relative_force": DR / abs(load)}
     return varied(paper_joint(element_size, steps, joint=ring, load=force), **sections)
 
 
 def unlike(pin: tuple[float, float], block: tuple[float, float]) -> tuple[dict[str, dict], float]:
-    """Sections and Dundurs' alpha (positive: the pin is stiffer) of bodies given by shear modulus and nu."""
-    bodies = {name: {"E": 2 * mu * (1 + nu), "nu": nu} for name, (mu, nu) in (("pin", pin), ("block", block))}
+    """Sections and Dundurs' alpha (positive: the pin is stiffer) of bodies given by shear modulus
+    and nu."""
+    bodies = {
+        name: {"E": 2 * mu * (1 + nu), "nu": nu}
+        for name, (mu, nu) in (("pin", pin), ("block", block))
+    }
     modulus = [2 * mu / (1 - nu) for mu, nu in (pin, block)]
     return bodies, (modulus[0] - modulus[1]) / sum(modulus)
 

@@ -1,9 +1,9 @@
 """Whole processes timed from outside, in turn.
 
-As a program, ``python3 -I -S timing.py SECONDS COMMAND...``, it runs one command in the current folder with one thread,
-stops it after SECONDS, and prints as JSON what it took. What the command prints goes to stdout.txt and stderr.txt. This
-file imports the standard library alone: Linux counts the memory of the process that a command is started from as the
-command's own.
+As a program, ``python3 -I -S timing.py SECONDS COMMAND...``, it runs one command in the current
+folder with one thread, stops it after SECONDS, and prints as JSON what it took. What the command
+prints goes to stdout.txt and stderr.txt. This file imports the standard library alone: Linux counts
+the memory of the process that a command is started from as the command's own.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ class Failure(RuntimeError):
 
 @dataclass(frozen=True)
 class Process:
-    """A ``command`` to be timed in its ``folder``, for ``limit`` seconds at most; ``name`` tells it from others.
+    """A ``command`` to be timed in its ``folder``, for ``limit`` seconds at most; ``name`` tells it
+    from others.
 
-    ``read`` gives the result of a process that ended with code 0, and raises `Failure` if there is none. The files
-    and folders ``clear`` of an earlier run are removed before. The first process of a ``kind`` runs once before all,
-    untimed, so that what is compiled on first use is there.
+    ``read`` gives the result of a process that ended with code 0, and raises `Failure` if there is
+    none. The files and folders ``clear`` of an earlier run are removed before. The first process of
+    a ``kind`` runs once before all, untimed, so that what is compiled on first use is there.
     """
 
     name: str
@@ -52,7 +53,8 @@ class Process:
 
 @dataclass(frozen=True)
 class Run:
-    """Wall and processor time in seconds, largest resident memory in bytes, and result of one process."""
+    """Wall and processor time in seconds, largest resident memory in bytes, and result of one
+    process."""
 
     seconds: float
     cpu: float
@@ -82,11 +84,14 @@ class Timing:
 Said = Callable[[str], None]
 
 
-def time_all(processes: Sequence[Process], repeats: int, said: Said = lambda sentence: None) -> list[Timing]:
-    """Run every process ``repeats`` times, in turn, so that noise hits all alike; one that fails is not tried again.
+def time_all(
+    processes: Sequence[Process], repeats: int, said: Said = lambda sentence: None
+) -> list[Timing]:
+    """Run every process ``repeats`` times, in turn, so that noise hits all alike; one that fails is
+    not tried again.
 
-    ``said(sentence)`` follows every run. After Ctrl-C what was timed is kept, and the others have a failure; it is
-    raised again before the first result.
+    ``said(sentence)`` follows every run. After Ctrl-C what was timed is kept, and the others have a
+    failure; it is raised again before the first result.
     """
     timings = [Timing(process) for process in processes]
     kinds: set[Hashable] = {None}
@@ -102,7 +107,9 @@ def time_all(processes: Sequence[Process], repeats: int, said: Said = lambda sen
         if not any(timing.runs for timing in timings):
             raise
         for timing in timings:
-            timing.failure = timing.failure or ("" if timing.runs else "interrupted before its first run")
+            timing.failure = timing.failure or (
+                "" if timing.runs else "interrupted before its first run"
+            )
     return timings
 
 
@@ -131,8 +138,12 @@ def run_once(process: Process) -> Run:
     if found["late"]:
         raise Failure(f"more than the {process.limit:g} s allowed")
     if found["exit"]:
-        texts = [(folder / name).read_text(errors="replace") for name in ("stderr.txt", "stdout.txt")]
-        raise Failure(_last_line(texts[0]) or _last_line(texts[1]) or f"ended with code {found['exit']}")
+        texts = [
+            (folder / name).read_text(errors="replace") for name in ("stderr.txt", "stdout.txt")
+        ]
+        raise Failure(
+            _last_line(texts[0]) or _last_line(texts[1]) or f"ended with code {found['exit']}"
+        )
     return Run(found["seconds"], found["cpu"], found["memory"], process.read())
 
 
@@ -147,10 +158,14 @@ def main(limit: float, command: list[str]) -> None:
         raise TimeoutError
 
     signal.signal(signal.SIGALRM, stop)
-    environment = os.environ | dict.fromkeys(THREADS, "1") | {"ARCHORD_KEEP_MESHES": "0"}  # each makes its own
+    environment = (
+        os.environ | dict.fromkeys(THREADS, "1") | {"ARCHORD_KEEP_MESHES": "0"}
+    )  # each makes its own
     with open("stdout.txt", "w") as out, open("stderr.txt", "w") as err:
         start = perf_counter()
-        process = subprocess.Popen(command, stdout=out, stderr=err, env=environment, start_new_session=True)
+        process = subprocess.Popen(
+            command, stdout=out, stderr=err, env=environment, start_new_session=True
+        )
         signal.setitimer(signal.ITIMER_REAL, limit)
         try:
             with suppress(TimeoutError):
@@ -162,7 +177,11 @@ def main(limit: float, command: list[str]) -> None:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    found = {"seconds": seconds, "cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024}
+    found = {
+        "seconds": seconds,
+        "cpu": used.ru_utime + used.ru_stime,
+        "memory": used.ru_maxrss * 1024,
+    }
     print(json.dumps(found | {"exit": process.returncode, "late": late}))
 
 

@@ -1,9 +1,10 @@
 """What archord is checked against, as a table: ``python3 -m archord.benchmarks.verification``.
 
-References, for the quarter joint of the paper in plane strain (like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R, delta
-= 2 dR), were computed with independent solvers, each refined until the digits stood: GetFEM 5.4 (Q2 elements of 0.5 %R)
-with closest points on the deformed curves, NGSolve 6.2 (order 4) with fixed pairs, NGSolve for concentric circles;
-at large strain CalculiX 2.20 on the same mesh (benchmarks/peers/calculix.py).
+References, for the quarter joint of the paper in plane strain (like bodies, nu = 0.3, dR/R = 0.5 %,
+block 100 R, delta = 2 dR), were computed with independent solvers, each refined until the digits
+stood: GetFEM 5.4 (Q2 elements of 0.5 %R) with closest points on the deformed curves, NGSolve 6.2
+(order 4) with fixed pairs, NGSolve for concentric circles; at large strain CalculiX 2.20 on the
+same mesh (benchmarks/peers/calculix.py).
 """
 
 from __future__ import annotations
@@ -24,9 +25,16 @@ def _solve(scene: Scene) -> tuple[list[Measures], str]:
     """The steps of ``scene``, and their cost in words."""
     start, dofs = perf_counter(), []
     with tempfile.TemporaryDirectory() as folder:
-        steps = Case("joint", scene).solve(Path(folder), on_start=lambda joint: dofs.append(joint.n_dofs)).steps
+        steps = (
+            Case("joint", scene)
+            .solve(Path(folder), on_start=lambda joint: dofs.append(joint.n_dofs))
+            .steps
+        )
     iterations = sum(m.iterations for m in steps) / len(steps)
-    return steps, f"{dofs[0]} dofs, {iterations:.1f} iterations a step, {perf_counter() - start:.1f} s"
+    return (
+        steps,
+        f"{dofs[0]} dofs, {iterations:.1f} iterations a step, {perf_counter() - start:.1f} s",
+    )
 
 
 def main() -> None:
@@ -35,9 +43,19 @@ def main() -> None:
     runs: list[list[Measures]] = []  # whose balances are told: the Hertzian one has a single step
 
     def compare(what: str, reference: float, source: str, ours: float, cost: str) -> None:
-        table.add(what, f"{reference:.7g}", source, f"{ours:.7g}", f"{abs(ours / reference - 1):.1e}", cost)
+        table.add(
+            what,
+            f"{reference:.7g}",
+            source,
+            f"{ours:.7g}",
+            f"{abs(ours / reference - 1):.1e}",
+            cost,
+        )
 
-    for kinematics, force, source in (("current", 0.0127785, "GetFEM"), ("reference", 0.0127596, "NGSolve")):
+    for kinematics, force, source in (
+        ("current", 0.0127785, "GetFEM"),
+        ("reference", 0.0127596, "NGSolve"),
+    ):
         steps, cost = _solve(paper_joint(0.04, 8, analysis={"kinematics": kinematics}))
         runs.append(steps)
         compare(f"elastic P/(E* R), `{kinematics}`", force, source, steps[-1].P, cost)
@@ -74,8 +92,13 @@ def main() -> None:
         compare(f"pin in a ring{name}: eps [rad]", eps, "Ciavarella, Decuzzi", found[-1].eps, "")
     print(table.markdown())
     force = max(m.force_balance for steps in runs for m in steps)
-    energy = max(abs(m.work - m.elastic_energy - dissipated(m)) / m.work for m in (steps[-1] for steps in runs))
-    print(f"Forces at pin, contact and block differ by at most {force:.0e} of P in any step; work differs from")
+    energy = max(
+        abs(m.work - m.elastic_energy - dissipated(m)) / m.work
+        for m in (steps[-1] for steps in runs)
+    )
+    print(
+        f"Forces at pin, contact and block differ by at most {force:.0e} of P in any step; work differs from"
+    )
     print(f"stored and dissipated energy by at most {energy:.1e} of the work.")
 
 

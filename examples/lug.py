@@ -6,12 +6,20 @@ import archord
 
 gmsh.initialize()
 cad = gmsh.model.occ
-plate, _ = cad.fuse([(2, cad.addRectangle(-60, -20, 0, 60, 40))], [(2, cad.addDisk(0, 0, 0, 20, 20))])
+plate, _ = cad.fuse(
+    [(2, cad.addRectangle(-60, -20, 0, 60, 40))], [(2, cad.addDisk(0, 0, 0, 20, 20))]
+)
 lug, _ = cad.cut(plate, [(2, cad.addDisk(0, 0, 0, 10, 10))])
-pin, _ = cad.intersect([(2, cad.addDisk(0.1, 0, 0, 9.9, 9.9))], [(2, cad.addRectangle(0.1, -10, 0, 20, 20))])
+pin, _ = cad.intersect(
+    [(2, cad.addDisk(0.1, 0, 0, 9.9, 9.9))], [(2, cad.addRectangle(0.1, -10, 0, 20, 20))]
+)
 cad.synchronize()
 within = lambda x0, x1: set(gmsh.model.getEntitiesInBoundingBox(x0, -20.1, -1, x1, 20.1, 1, 1))  # noqa: E731
-edges = {"clamp": within(-60.1, -59.9), "flat": within(0, 0.2), "hole": within(-10.1, 10.1) - within(0, 10.1)}
+edges = {
+    "clamp": within(-60.1, -59.9),
+    "flat": within(0, 0.2),
+    "hole": within(-10.1, 10.1) - within(0, 10.1),
+}
 edges["bolt"] = within(0, 10.1) - edges["flat"]
 for name, entities in ({"lug": lug, "pin": pin} | edges).items():
     gmsh.model.addPhysicalGroup(1 if name in edges else 2, [tag for _, tag in entities], name=name)

@@ -1,15 +1,17 @@
-"""A slider-crank with clearance in its small end, in Exudyn: the law of the joint as its contact force, with impacts.
+"""A slider-crank with clearance in its small end, in Exudyn: the law of the joint as its contact
+force, with impacts.
 
     pip install exudyn
     python3 examples/slider_crank.py docs/slider_crank.png
 
-A crank of constant speed drives a slider in a plane by a rod. The slider's pin has clearance in the rod's hole: ``e``
-goes from the hole's centre to the pin's, ``delta = |e| - dR``, and the pin is pressed back along e by ``P(delta,
-deepest) (1 + c d(delta)/dt)``, the law of the joint and what an oil film damps (Hunt and Crossley 1975). ``deepest``,
-the memory of a joint that yields, belongs to a place, and the contact wanders. Here one number serves for the whole
-hole, as if it were flattened all round: no spot yields twice, and the energy lost is a lower bound. (With a number for
-each impact every one would meet a fresh hole: an upper bound, in which no joint settles.) It advances with accepted
-steps, never within Newton's iterations. Units: mm, N, s, so tonnes and N mm.
+A crank of constant speed drives a slider in a plane by a rod. The slider's pin has clearance in the
+rod's hole: ``e`` goes from the hole's centre to the pin's, ``delta = |e| - dR``, and the pin is
+pressed back along e by ``P(delta, deepest) (1 + c d(delta)/dt)``, the law of the joint and what an
+oil film damps (Hunt and Crossley 1975). ``deepest``, the memory of a joint that yields, belongs to
+a place, and the contact wanders. Here one number serves for the whole hole, as if it were flattened
+all round: no spot yields twice, and the energy lost is a lower bound. (With a number for each
+impact every one would meet a fresh hole: an upper bound, in which no joint settles.) It advances
+with accepted steps, never within Newton's iterations. Units: mm, N, s, so tonnes and N mm.
 """
 
 import sys
@@ -42,16 +44,23 @@ ROD_MASS, SLIDER_MASS = 2e-3, 15e-3
 ROD_INERTIA = ROD_MASS * ROD**2 / 12
 FILM = 0.002  # c [s/mm]: what comes at 100 mm/s goes back at 88
 STEPS = 40000  # a turn: 2.5 microseconds, 1/200 of an impact
-START = SLIDER_MASS * CRANK * SPEED**2 * (1 + CRANK / ROD) / WIDTH  # P in the outer dead centre, where all begins
+START = (
+    SLIDER_MASS * CRANK * SPEED**2 * (1 + CRANK / ROD) / WIDTH
+)  # P in the outer dead centre, where all begins
 
 
 def mechanism(force, start):
-    """The mechanism in its outer dead centre, its pin ``start`` off the hole's centre; its joint and its drive."""
+    """The mechanism in its outer dead centre, its pin ``start`` off the hole's centre; its joint
+    and its drive."""
     mbs = exudyn.SystemContainer().AddSystem()
 
     def body(mass, inertia, x, *velocity):
-        node = mbs.AddNode(item.NodeRigidBody2D(referenceCoordinates=[x, 0, 0], initialVelocities=[0, *velocity]))
-        return node, mbs.AddObject(item.ObjectRigidBody2D(nodeNumber=node, mass=mass, inertia=inertia))
+        node = mbs.AddNode(
+            item.NodeRigidBody2D(referenceCoordinates=[x, 0, 0], initialVelocities=[0, *velocity])
+        )
+        return node, mbs.AddObject(
+            item.ObjectRigidBody2D(nodeNumber=node, mass=mass, inertia=inertia)
+        )
 
     def at(body, x):
         return mbs.AddMarker(item.MarkerBodyPosition(bodyNumber=body, localPosition=[x, 0, 0]))
@@ -62,22 +71,34 @@ def mechanism(force, start):
     def join(kind, *markers, **properties):
         return mbs.AddObject(kind(markerNumbers=list(markers), **properties))
 
-    fixed, ground = coordinate(mbs.AddNode(item.NodePointGround()), 0), mbs.AddObject(item.ObjectGround())
+    fixed, ground = (
+        coordinate(mbs.AddNode(item.NodePointGround()), 0),
+        mbs.AddObject(item.ObjectGround()),
+    )
     shaft, crank = body(1.0, 1.0, 0, 0, SPEED)
     _, rod = body(ROD_MASS, ROD_INERTIA, CRANK + ROD / 2, CRANK * SPEED / 2, -CRANK * SPEED / ROD)
-    guide = mbs.AddNode(item.NodePoint2D(referenceCoordinates=[CRANK + ROD, 0], initialCoordinates=[start, 0]))
+    guide = mbs.AddNode(
+        item.NodePoint2D(referenceCoordinates=[CRANK + ROD, 0], initialCoordinates=[start, 0])
+    )
     slider = mbs.AddObject(item.ObjectMassPoint2D(nodeNumber=guide, mass=SLIDER_MASS))
     join(item.ObjectJointRevolute2D, at(ground, 0), at(crank, 0))
     join(item.ObjectJointRevolute2D, at(crank, CRANK), at(rod, -ROD / 2))
     join(item.ObjectConnectorCoordinate, fixed, coordinate(guide, 1))
-    drive = join(item.ObjectConnectorCoordinate, fixed, coordinate(shaft, 2), velocityLevel=True, offset=SPEED)
+    drive = join(
+        item.ObjectConnectorCoordinate,
+        fixed,
+        coordinate(shaft, 2),
+        velocityLevel=True,
+        offset=SPEED,
+    )
     spring = item.ObjectConnectorCartesianSpringDamper
     return mbs, join(spring, at(rod, ROD / 2), at(slider, 0), springForceUserFunction=force), drive
 
 
 def simulate(law, start, steps=STEPS, turns=TURNS):
-    """Turn the crank with ``law(delta, deepest)`` [N/mm] in the joint, first at ``start``. Returns a column a step
-    (time, e, its rate, deepest, torque, velocities), the seconds it took, those in the law, and its calls."""
+    """Turn the crank with ``law(delta, deepest)`` [N/mm] in the joint, first at ``start``. Returns
+    a column a step (time, e, its rate, deepest, torque, velocities), the seconds it took, those in
+    the law, and its calls."""
     deepest, columns, calls, seconds, kinds = start, [], 0, 0.0, exudyn.OutputVariableType
 
     def force(mbs, t, number, e, rate, *unused):
@@ -93,7 +114,9 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
 
     def accept(mbs, t):
         nonlocal deepest
-        e, rate = (mbs.GetObjectOutput(joint, kind)[:2] for kind in (kinds.Displacement, kinds.Velocity))
+        e, rate = (
+            mbs.GetObjectOutput(joint, kind)[:2] for kind in (kinds.Displacement, kinds.Velocity)
+        )
         torque = -mbs.GetObjectOutput(drive, kinds.Force)
         columns.append((t, *e, *rate, deepest, torque, *mbs.systemData.GetODE2Coordinates_t()))
         deepest = max(deepest, hypot(*e) - DR)
@@ -104,15 +127,18 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
     mbs.Assemble()
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False
-    settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = turns * 2 * pi / SPEED, turns * steps
+    settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = (
+        turns * 2 * pi / SPEED,
+        turns * steps,
+    )
     begin = perf_counter()
     mbs.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.TrapezoidalIndex2)
     return np.array(columns).T, perf_counter() - begin, seconds, calls
 
 
 def energies(columns, curve):
-    """The force P [N] at all steps, and energies [N mm] by name, whose sum stays. What the joint has stored is what it
-    gives back until it opens."""
+    """The force P [N] at all steps, and energies [N mm] by name, whose sum stays. What the joint
+    has stored is what it gives back until it opens."""
     (t,), e, rate, (deepest,), (torque,), v = np.split(columns, [1, 3, 5, 6, 7])
     distance, (points, weights) = np.hypot(*e), np.polynomial.legendre.leggauss(12)
     delta = np.maximum(distance - DR, 0)
@@ -120,29 +146,46 @@ def energies(columns, curve):
     most, where = np.unique(np.maximum(deepest, delta), return_inverse=True)
     opens = curve.residual(most)[where]
     half = np.maximum(delta - opens, 0) / 2
-    stored = WIDTH * half * (weights @ curve.at(opens + half * (points[:, None] + 1), most[where]).load)
+    stored = (
+        WIDTH * half * (weights @ curve.at(opens + half * (points[:, None] + 1), most[where]).load)
+    )
     lost = stored[0] - stored + cumulative_trapezoid(P, delta, initial=0)
     film = cumulative_trapezoid(P * FILM * (e * rate).sum(0) / distance, delta, initial=0)
-    kinetic = np.array([0, 0, 0, ROD_MASS, ROD_MASS, ROD_INERTIA, SLIDER_MASS, SLIDER_MASS]) @ v**2 / 2
+    kinetic = (
+        np.array([0, 0, 0, ROD_MASS, ROD_MASS, ROD_INERTIA, SLIDER_MASS, SLIDER_MASS]) @ v**2 / 2
+    )
     drive = -cumulative_trapezoid(torque * SPEED, t, initial=0)
-    return P, {"stored": stored, "lost, law": lost, "lost, film": film, "kinetic": kinetic, "drive": drive}
+    return P, {
+        "stored": stored,
+        "lost, law": lost,
+        "lost, film": film,
+        "kinetic": kinetic,
+        "drive": drive,
+    }
 
 
 def table(law):
-    """A closed-form law as a table up to 2 dR or the end of its formula; it comes back the way it went, and knows no
-    other."""
+    """A closed-form law as a table up to 2 dR or the end of its formula; it comes back the way it
+    went, and knows no other."""
     x = np.concatenate([[0], np.geomspace(1e-3, 2, 80)])
     state = law.at_displacement(JOINT, x * DR, extrapolate=True)
     known = np.isfinite(state.load)
     y, dy = state.load[known] / JOINT.unit, state.stiffness[known] * DR / JOINT.unit
     one, none, unknown = np.ones_like(y), np.zeros_like(y), [np.full_like(y, np.nan)] * 4
-    return JointCurve(x[known], y, dy, y, dy, one, none, none, none[:0], *unknown, none, none, DR, JOINT.unit)
+    return JointCurve(
+        x[known], y, dy, y, dy, one, none, none, none[:0], *unknown, none, none, DR, JOINT.unit
+    )
 
 
 def study(curve, steps=STEPS, turns=TURNS):
-    """The crank turned with a law, exported: columns of `simulate`, force, energies, and numbers by name."""
-    exec(export_curve(curve, Path("joint.py")), module := {"__name__": "joint"})  # `archord law --export` writes it
-    columns, whole, inside, calls = simulate(module["force"], curve.displacement([START]).item(), steps, turns)
+    """The crank turned with a law, exported: columns of `simulate`, force, energies, and numbers by
+    name."""
+    exec(
+        export_curve(curve, Path("joint.py")), module := {"__name__": "joint"}
+    )  # `archord law --export` writes it
+    columns, whole, inside, calls = simulate(
+        module["force"], curve.displacement([START]).item(), steps, turns
+    )
     P, parts = energies(columns, curve)
     angle = columns[0] * SPEED
     return columns, P, parts, {
@@ -169,12 +212,19 @@ def draw(runs, target):
             orbit.plot(*columns[1:3, second] / DR, lw=0.7, label=name)
     parts = runs[name][2]
     total = sum(parts.values())
-    for name, values in (*list(parts.items())[:3], ("balance, times 100", 100 * (total - total[0]))):
+    for name, values in (
+        *list(parts.items())[:3],
+        ("balance, times 100", 100 * (total - total[0])),
+    ):
         energy.plot(angle, values, lw=0.7, label=name)
     orbit.add_patch(Circle((0, 0), 1, fill=False, ls=":"))
-    impacts.set(xlabel="crank angle [degrees]", ylabel="force of the joint [kN]", title="first impacts")
+    impacts.set(
+        xlabel="crank angle [degrees]", ylabel="force of the joint [kN]", title="first impacts"
+    )
     orbit.set(xlabel="$e_x$/dR", ylabel="$e_y$/dR", title="the pin in its hole", aspect="equal")
-    energy.set(xlabel="crank angle [degrees]", ylabel="N mm", title="energies of the yielding joint")
+    energy.set(
+        xlabel="crank angle [degrees]", ylabel="N mm", title="energies of the yielding joint"
+    )
     for axes, place in ((impacts, "upper left"), (orbit, "center"), (energy, "upper left")):
         axes.legend(fontsize=8, loc=place)
     with replacing(target) as new:
@@ -182,9 +232,16 @@ def draw(runs, target):
 
 
 def laws():
-    """The laws by name: those of the literature, and archord's own of the joint without a yield stress and with it."""
-    curves = {name: table(LAWS[name]) for name in ("paper", "paper-plastic", "lankarani-nikravesh", "johnson")}
-    return curves | {"elastic": general_law(replace(JOINT, block_yield=None)), "yielding": general_law(JOINT)}
+    """The laws by name: those of the literature, and archord's own of the joint without a yield
+    stress and with it."""
+    curves = {
+        name: table(LAWS[name])
+        for name in ("paper", "paper-plastic", "lankarani-nikravesh", "johnson")
+    }
+    return curves | {
+        "elastic": general_law(replace(JOINT, block_yield=None)),
+        "yielding": general_law(JOINT),
+    }
 
 
 if __name__ == "__main__":

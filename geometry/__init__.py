@@ -1,1 +1,2 @@
-"""The joint as curved meshes: gmsh models, contact curves and their projections. Knows nothing of forms."""
+"""The joint as curved meshes: gmsh models, contact curves and their projections. Knows nothing of
+forms."""

@@ -1,4 +1,5 @@
-"""Lagrange bases and their physical gradients at points of curved triangles and quadrilaterals, as arrays."""
+"""Lagrange bases and their physical gradients at points of curved triangles and quadrilaterals, as
+arrays."""
 
 from __future__ import annotations
 
@@ -23,17 +24,25 @@ TRIANGLE, QUADRILATERAL = basix.CellType.triangle, basix.CellType.quadrilateral
 
 
 def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.FiniteElement:
-    """Lagrange element on the reference ``cell``, with equispaced nodes as in gmsh's curved meshes."""
-    return basix.create_element(basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.equispaced)
+    """Lagrange element on the reference ``cell``, with equispaced nodes as in gmsh's curved
+    meshes."""
+    return basix.create_element(
+        basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.equispaced
+    )
 
 
 def cell_kind(nodes: int) -> tuple[basix.CellType, int]:
     """Kind and order of a cell of Lagrange's with so many ``nodes``. Raises ValueError."""
     for order in (1, 2, 3):
-        for cell, needs in ((TRIANGLE, (order + 1) * (order + 2) // 2), (QUADRILATERAL, (order + 1) ** 2)):
+        for cell, needs in (
+            (TRIANGLE, (order + 1) * (order + 2) // 2),
+            (QUADRILATERAL, (order + 1) ** 2),
+        ):
             if nodes == needs:
                 return cell, order
-    raise ValueError(f"cells of {nodes} nodes are not known: triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16")
+    raise ValueError(
+        f"cells of {nodes} nodes are not known: triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16"
+    )
 
 
 @dataclass(frozen=True)
@@ -53,7 +62,8 @@ class CellBasis:
 
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
-    """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``, or ``(n, q, 2)`` of each."""
+    """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``, or ``(n,
+    q, 2)`` of each."""
     geometry = tabulate(mesh.basix_cell(), cell_degree(mesh), X)
     table = tabulate(mesh.basix_cell(), degree, X)
     nodes = mesh.geometry.x[cell_nodes(mesh)[cells], :2]
@@ -78,12 +88,14 @@ def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
 
 
 def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
-    """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no volumetric locking.
+    """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no
+    volumetric locking.
 
-    Plastic flow in plane strain keeps the volume at every point, which must be fewer conditions than a mesh has dofs
-    (Nagtegaal, Parks and Rice 1974). A quadrilateral of degree p adds ``2 p^2`` dofs; the divergence on a parallelogram
-    spans ``(p + 1)^2 - 1`` functions. At ``p^2`` points the strains of three deformations would vanish. Distorted
-    second-order ones have 9 conditions: somewhat stiff where they are large, but convergent.
+    Plastic flow in plane strain keeps the volume at every point, which must be fewer conditions
+    than a mesh has dofs (Nagtegaal, Parks and Rice 1974). A quadrilateral of degree p adds ``2
+    p^2`` dofs; the divergence on a parallelogram spans ``(p + 1)^2 - 1`` functions. At ``p^2``
+    points the strains of three deformations would vanish. Distorted second-order ones have 9
+    conditions: somewhat stiff where they are large, but convergent.
     """
     return 2 * degree - 2 if cell == TRIANGLE else 2 * degree
 
@@ -94,7 +106,8 @@ def bulk_quadrature(cell: basix.CellType, degree: int) -> tuple[Array, Array]:
 
 
 def strain_matrix(gradient: Array) -> Array:
-    """``B`` ``(..., 3, 2 a)`` with ``B u = [eps_xx, eps_yy, gamma_xy]`` for nodal ``u = [ux0, uy0, ux1, ...]``."""
+    """``B`` ``(..., 3, 2 a)`` with ``B u = [eps_xx, eps_yy, gamma_xy]`` for nodal ``u = [ux0, uy0,
+    ux1, ...]``."""
     B = np.zeros((*gradient.shape[:-2], 3, 2 * gradient.shape[-2]))
     B[..., 0, 0::2] = B[..., 2, 1::2] = gradient[..., 0]
     B[..., 1, 1::2] = B[..., 2, 0::2] = gradient[..., 1]
@@ -102,13 +115,15 @@ def strain_matrix(gradient: Array) -> Array:
 
 
 def displacement_gradient(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
-    """Displacement gradient ``(n, q, 4)``, ``[xx, yy, xy, yx]`` with xy that of the displacement along x by y."""
+    """Displacement gradient ``(n, q, 4)``, ``[xx, yy, xy, yx]`` with xy that of the displacement
+    along x by y."""
     (xx, yx), (xy, yy) = np.moveaxis(np.swapaxes(gradient, 2, 3) @ u[dofs][:, None], (2, 3), (0, 1))
     return np.stack([xx, yy, xy, yx], axis=-1)
 
 
 def strain(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
-    """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal displacements ``(nodes, 2)``."""
+    """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal
+    displacements ``(nodes, 2)``."""
     n, q, a, _ = gradient.shape
     result = np.empty((n, q, 3))
     arrays: tuple[npt.NDArray[Any], ...] = (gradient, dofs, u, result)

@@ -1,10 +1,12 @@
-"""Superconvergent patch recovery: nodal values from those at the integration points of the cells around.
+"""Superconvergent patch recovery: nodal values from those at the integration points of the cells
+around.
 
-Zienkiewicz and Zhu (1992, Int. J. Numer. Meth. Engng 33, 1331): around every vertex a polynomial of the degree of the
-displacements is fitted by least squares to the values at the integration points of the cells that meet there. A vertex
-inside a body has the value of its own polynomial, one on the boundary the mean of those of its neighbours inside, as
-its own would extrapolate from one side. Where it has no such neighbour (corners, walls of one cell), its polynomial is
-fitted to two layers of cells, of which near ones count more. Nodes on edges have the mean of both ends, nodes within
+Zienkiewicz and Zhu (1992, Int. J. Numer. Meth. Engng 33, 1331): around every vertex a polynomial of
+the degree of the displacements is fitted by least squares to the values at the integration points
+of the cells that meet there. A vertex inside a body has the value of its own polynomial, one on the
+boundary the mean of those of its neighbours inside, as its own would extrapolate from one side.
+Where it has no such neighbour (corners, walls of one cell), its polynomial is fitted to two layers
+of cells, of which near ones count more. Nodes on edges have the mean of both ends, nodes within
 quadrilaterals that of the corners.
 """
 
@@ -16,22 +18,32 @@ import numpy as np
 
 from archord.geometry.basis import Array
 
-_CORE = 0.05  # squared distance over that of the farthest point, within which points of wide patches count alike
+# squared distance over that of the farthest point, within which points of wide patches count alike
+_CORE = 0.05
 _SINGULAR = 1e-13  # of patches with fewer points than coefficients, which get the smallest ones
 
 
 class PatchRecovery:
-    """From the ``points`` ``(m, q, 2)`` of ``cells`` ``(m, k)``, their corners in turn, to ``nodes`` ``(n, 2)``.
+    """From the ``points`` ``(m, q, 2)`` of ``cells`` ``(m, k)``, their corners in turn, to
+    ``nodes`` ``(n, 2)``.
 
-    The first nodes are the vertices; ``between`` are the vertices ``(i, e)`` that the further nodes lie between, one
-    array after the other. Bodies share no vertex, so that nothing is smoothed over their boundaries.
+    The first nodes are the vertices; ``between`` are the vertices ``(i, e)`` that the further nodes
+    lie between, one array after the other. Bodies share no vertex, so that nothing is smoothed over
+    their boundaries.
     """
 
     def __init__(
-        self, nodes: Array, cells: np.ndarray, between: Sequence[np.ndarray], points: Array, degree: int
+        self,
+        nodes: Array,
+        cells: np.ndarray,
+        between: Sequence[np.ndarray],
+        points: Array,
+        degree: int,
     ) -> None:
         n_vertices, (n_cells, k) = len(nodes) - sum(map(len, between)), cells.shape
-        sides = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+        sides = np.sort(
+            np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1
+        )
         number, count = np.unique(sides[:, 0] * n_vertices + sides[:, 1], return_counts=True)
         edges = np.column_stack(np.divmod(number, n_vertices))
         outside = np.zeros(n_vertices, dtype=bool)
@@ -48,7 +60,10 @@ class PatchRecovery:
         wide, keep = np.repeat(alone[vertex], k), ~outside[vertex]
         place, wider = _joined(cells[cell].ravel()[wide], vertex, cell)
         wider = np.unique(np.repeat(vertex, k)[wide][place] * n_cells + wider)
-        vertex, self._cell = np.append(vertex[keep], wider // n_cells), np.append(cell[keep], wider % n_cells)
+        vertex, self._cell = (
+            np.append(vertex[keep], wider // n_cells),
+            np.append(cell[keep], wider % n_cells),
+        )
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
         self._patch = np.zeros(n_vertices, dtype=np.int64)
         self._patch[vertex[self._first]] = np.arange(len(self._first))
@@ -66,7 +81,10 @@ class PatchRecovery:
         self._fit = np.linalg.inv(M)[patch] @ np.swapaxes(P * weight[..., None], 1, 2)
 
         groups = [np.arange(n_vertices)[:, None], *between]
-        end, n_ends = np.concatenate([g.ravel() for g in groups]), [np.full(len(g), g.shape[1]) for g in groups]
+        end, n_ends = (
+            np.concatenate([g.ravel() for g in groups]),
+            [np.full(len(g), g.shape[1]) for g in groups],
+        )
         count = np.concatenate(n_ends)
         place, source = _joined(end, wanted, source)
         node = np.repeat(np.arange(len(nodes)), count)[place]

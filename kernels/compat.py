@@ -1,5 +1,5 @@
-"""What differs where archord runs: dolfinx 0.9 to 0.11 and PETSc 3.22 to 3.25, of Debian, conda or PyPI. What uses
-dolfinx imports this first."""
+"""What differs where archord runs: dolfinx 0.9 to 0.11 and PETSc 3.22 to 3.25, of Debian, conda or
+PyPI. What uses dolfinx imports this first."""
 
 from __future__ import annotations
 
@@ -20,16 +20,25 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
-    # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the process with a page
+    # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the
+    # process with a page
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 _REASONS = vars(PETSc.SNES.ConvergedReason)
-RESIDUAL_NOT_FINITE = _REASONS.get("DIVERGED_FNORM_NAN", _REASONS.get("DIVERGED_FUNCTION_NANORINF"))  # until PETSc 3.24
-_KINDS = hasattr(Geometry, "dofmaps")  # of cells, of which dolfinx from 0.11 on may have several in a mesh
+RESIDUAL_NOT_FINITE = _REASONS.get(
+    "DIVERGED_FNORM_NAN", _REASONS.get("DIVERGED_FUNCTION_NANORINF")
+)  # until PETSc 3.24
+_KINDS = hasattr(
+    Geometry, "dofmaps"
+)  # of cells, of which dolfinx from 0.11 on may have several in a mesh
 
 # of Debian (gmsh needs it), of conda on Linux and macOS, and beside PyPI's dolfinx
 _FOLDERS = ("", f"{sys.prefix}/lib/", f"{Path(dolfinx.__file__).parents[1]}/dolfinx_solver/lib/")
-METIS = tuple(folder + name for folder in _FOLDERS for name in ("libmetis.so.5", "libmetis.so", "libmetis.dylib"))
+METIS = tuple(
+    folder + name
+    for folder in _FOLDERS
+    for name in ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
+)
 
 
 def cell_nodes(mesh: Mesh) -> np.ndarray:

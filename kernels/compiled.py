@@ -1,5 +1,6 @@
-"""C sources as functions on numpy arrays, declared by a header beside them: compiled once, by the compiler that dolfinx
-needs for its forms, and kept in the user's cache. (Numba would cost 0.4 s of every run: dolfinx imports it if it can.)
+"""C sources as functions on numpy arrays, declared by a header beside them: compiled once, by the
+compiler that dolfinx needs for its forms, and kept in the user's cache. (Numba would cost 0.4 s of
+every run: dolfinx imports it if it can.)
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ import numpy.typing as npt
 
 _FLAGS = ["-std=c11", "-O3", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off"]
 _ffi = cffi.FFI()
-_TYPES = {np.dtype(a): _ffi.typeof(c) for a, c in (("d", "double[]"), ("i", "int32_t[]"), ("?", "uint8_t[]"))}
+_TYPES = {
+    np.dtype(a): _ffi.typeof(c)
+    for a, c in (("d", "double[]"), ("i", "int32_t[]"), ("?", "uint8_t[]"))
+}
 
 
 class CompilerError(RuntimeError):
@@ -31,14 +35,15 @@ class CompilerError(RuntimeError):
 
 
 def library(source: Path, libraries: tuple[str, ...] = ()) -> Any:
-    """The functions of the C file ``source`` that the header beside it declares; they need other ``libraries``. Raises
-    `CompilerError`."""
+    """The functions of the C file ``source`` that the header beside it declares; they need other
+    ``libraries``. Raises `CompilerError`."""
     return _loaded(source, libraries)[1]
 
 
 def structure(source: Path, kind: str, members: Sequence[int | float | np.ndarray]) -> Any:
-    """A pointer to a structure of the type ``kind``, declared in the header of ``source``, with numbers and pointers to
-    arrays, which have to live as long as it is used. Raises `CompilerError`."""
+    """A pointer to a structure of the type ``kind``, declared in the header of ``source``, with
+    numbers and pointers to arrays, which have to live as long as it is used. Raises
+    `CompilerError`."""
     values = [pointer(m) if isinstance(m, np.ndarray) else m for m in members]
     return _loaded(source, ())[0].new(f"{kind} *", values)
 
@@ -66,8 +71,8 @@ def pointer(array: npt.NDArray[Any]) -> Any:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what is made once and used again; one of this process where that cannot be written, or
-    where another user may write."""
+    """The user's folder for what is made once and used again; one of this process where that cannot
+    be written, or where another user may write."""
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "archord"
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -93,16 +98,25 @@ def _temporary() -> tempfile.TemporaryDirectory[str]:
 
 
 def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str, ...]) -> None:
-    """Several processes may compile at once: each into a file of its own, and the last one stays."""
+    """Several processes may compile at once: each into a file of its own, and the last one
+    stays."""
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         made = Path(folder) / path.name
-        command = [*command, "-o", str(made), str(source), *(f"-l{name}" for name in ("m", *libraries))]
+        command = [
+            *command,
+            "-o",
+            str(made),
+            str(source),
+            *(f"-l{name}" for name in ("m", *libraries)),
+        ]
         try:
             result = subprocess.run(command, capture_output=True, text=True)
         except OSError as error:
             raise CompilerError(f"no C compiler ({error}); install gcc, or set CC") from None
         if result.returncode:
-            said = [line for line in result.stderr.splitlines() if "error" in line] or [f"exit {result.returncode}"]
+            said = [line for line in result.stderr.splitlines() if "error" in line] or [
+                f"exit {result.returncode}"
+            ]
             raise CompilerError(f"{source.name} could not be compiled: {said[0]}")
         made.chmod(0o700)
         os.replace(made, path)

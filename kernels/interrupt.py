@@ -1,4 +1,5 @@
-"""Ctrl-C and kill, heeded where a run can stop cleanly: between two residuals, by all ranks together."""
+"""Ctrl-C and kill, heeded where a run can stop cleanly: between two residuals, by all ranks
+together."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ class Interrupted(Exception):
 
 
 class Interrupt:
-    """Within this context the first signal is only noted, as ``received``; a second one acts as it did outside."""
+    """Within this context the first signal is only noted, as ``received``; a second one acts as it
+    did outside."""
 
     def __init__(self) -> None:
         self.received = 0

@@ -1,4 +1,5 @@
-"""Forms whose compilation a kill ended: ffcx leaves a file behind that makes every later process wait, and fail."""
+"""Forms whose compilation a kill ended: ffcx leaves a file behind that makes every later process
+wait, and fail."""
 
 from __future__ import annotations
 
@@ -15,14 +16,16 @@ _TRIES = 3
 
 
 def without_stale_forms(make: Callable[[], T]) -> T:
-    """What ``make()`` returns, which compiles forms, after removing files that a kill left in ffcx' cache, unless
-    another process has just begun to compile."""
+    """What ``make()`` returns, which compiles forms, after removing files that a kill left in ffcx'
+    cache, unless another process has just begun to compile."""
     for _ in range(_TRIES - 1):
         try:
             return make()
         except (TimeoutError, RuntimeError) as error:
             named = re.search(r"JIT compilation timed out.*remove (.*?)\)", str(error), re.DOTALL)
-            if named is None and "just-in-time compilation" not in str(error):  # as the group's other ranks say
+            if named is None and "just-in-time compilation" not in str(
+                error
+            ):  # as the group's other ranks say
                 raise
             with suppress(OSError):
                 if named is not None and time.time() - Path(named[1]).stat().st_mtime > _WAIT:

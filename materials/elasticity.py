@@ -10,7 +10,8 @@ from archord.materials.material import Array, Material, Plane, State
 
 
 def contact_modulus(E: float, nu: float, plane: Plane) -> float:
-    """Modulus that one body brings to the contact: ``E / (1 - nu^2)`` in plane strain, ``E`` in plane stress."""
+    """Modulus that one body brings to the contact: ``E / (1 - nu^2)`` in plane strain, ``E`` in
+    plane stress."""
     return E / (1 - nu**2) if plane == "strain" else E
 
 
@@ -21,13 +22,14 @@ def von_mises(stress: Array) -> Array:
 
 
 def mean_stress(stress: Array) -> Array:
-    """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(...,)`` of ``(..., 4)`` stresses, tension positive."""
+    """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(...,)`` of ``(..., 4)`` stresses, tension
+    positive."""
     return stress[..., :3].sum(axis=-1) / 3
 
 
 def principal_stresses(stress: Array) -> tuple[Array, Array]:
-    """Principal stresses ``(..., 3)`` of ``(..., 4)`` stresses, the largest first, and the angle ``(...,)`` from the x
-    axis of the larger one in the plane, in (-pi/2, pi/2]."""
+    """Principal stresses ``(..., 3)`` of ``(..., 4)`` stresses, the largest first, and the angle
+    ``(...,)`` from the x axis of the larger one in the plane, in (-pi/2, pi/2]."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     values = np.sort(np.stack([middle + radius, middle - radius, zz], axis=-1), axis=-1)
@@ -70,4 +72,6 @@ class Elastic(Material):
         _, mu = self.lame
         bulk, mean = self.E / (3 * (1 - 2 * self.nu)), mean_stress(stress)
         deviator = stress - mean[:, None] * np.array([1.0, 1.0, 1.0, 0.0])
-        return mean**2 / (2 * bulk) + ((deviator[:, :3] ** 2).sum(axis=1) + 2 * deviator[:, 3] ** 2) / (4 * mu)
+        return mean**2 / (2 * bulk) + (
+            (deviator[:, :3] ** 2).sum(axis=1) + 2 * deviator[:, 3] ** 2
+        ) / (4 * mu)

@@ -13,15 +13,18 @@ from archord.materials.material import Array
 
 
 class Hardening(Protocol):
-    """A yield stress that does not decrease with PEEQ; arguments and results are arrays ``(n,)``."""
+    """A yield stress that does not decrease with PEEQ; arguments and results are arrays
+    ``(n,)``."""
 
     @property
     def linear(self) -> tuple[float, float] | None:
-        """Yield stress at PEEQ 0 and slope of a law that is a straight line: its return map needs no iteration."""
+        """Yield stress at PEEQ 0 and slope of a law that is a straight line: its return map needs
+        no iteration."""
         return None
 
     def knots(self) -> Array:
-        """PEEQ between which straight lines are the law, or are close to it up to 1: what a table of it needs."""
+        """PEEQ between which straight lines are the law, or are close to it up to 1: what a table
+        of it needs."""
         return np.append(0.0, np.geomspace(1e-4, 1.0, 60))
 
     def stress(self, peeq: Array) -> Array:
@@ -67,7 +70,8 @@ class Scaled(Hardening):
 
 @dataclass(frozen=True)
 class LinearHardening(Hardening):
-    """``yield_stress + modulus PEEQ``, in units of Young's modulus; perfect plasticity without ``modulus``."""
+    """``yield_stress + modulus PEEQ``, in units of Young's modulus; perfect plasticity without
+    ``modulus``."""
 
     yield_stress: float
     modulus: float = 0.0
@@ -96,9 +100,11 @@ class LinearHardening(Hardening):
 
 @dataclass(frozen=True)
 class TabularHardening(Hardening):
-    """Straight lines between points ``(peeq, yield_stress)``, the first at PEEQ 0; constant beyond the last.
+    """Straight lines between points ``(peeq, yield_stress)``, the first at PEEQ 0; constant beyond
+    the last.
 
-    A yield plateau (Lueders) is two points of equal stress. Raises ValueError for points that are no such law.
+    A yield plateau (Lueders) is two points of equal stress. Raises ValueError for points that are
+    no such law.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -113,8 +119,9 @@ class TabularHardening(Hardening):
 
     @classmethod
     def from_engineering(cls, points: Sequence[Sequence[float]], E: float) -> TabularHardening:
-        """From points (engineering strain, engineering stress) of a tension test, the first at first yield: true
-        stress ``s (1 + e)``, PEEQ ``ln(1 + e) - s (1 + e) / E``, but 0 at the first. Raises ValueError."""
+        """From points (engineering strain, engineering stress) of a tension test, the first at
+        first yield: true stress ``s (1 + e)``, PEEQ ``ln(1 + e) - s (1 + e) / E``, but 0 at the
+        first. Raises ValueError."""
         e, s = np.array(points, dtype=float).T
         true = s * (1 + e)
         peeq = np.log1p(e) - true / E
@@ -155,8 +162,8 @@ class TabularHardening(Hardening):
 
 @dataclass(frozen=True)
 class VoceHardening(Hardening):
-    """From ``yield_stress`` to ``saturation``: ``saturation - (saturation - yield_stress) exp(-rate PEEQ)`` (Voce,
-    1948)."""
+    """From ``yield_stress`` to ``saturation``: ``saturation - (saturation - yield_stress) exp(-rate
+    PEEQ)`` (Voce, 1948)."""
 
     yield_stress: float
     saturation: float

@@ -40,7 +40,8 @@ class J2Material(Elastic):
         return 0.0
 
     def stiffening(self, old: PlasticState, new: PlasticState) -> Array | float:
-        """By how much the middle moves per PEEQ at the end of a step, as a stress ``(n,)`` in tension."""
+        """By how much the middle moves per PEEQ at the end of a step, as a stress ``(n,)`` in
+        tension."""
         return 0.0
 
     def dissipation(self, state: PlasticState) -> Array:

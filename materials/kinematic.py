@@ -1,12 +1,15 @@
-"""J2 plasticity with kinematic hardening of Armstrong and Frederick beside the isotropic one, for cyclic loads.
+"""J2 plasticity with kinematic hardening of Armstrong and Frederick beside the isotropic one, for
+cyclic loads.
 
-The elastic range has the radius that the isotropic hardening gives, and its centre is a sum of back stresses, each with
-``d a = 2/3 C d eps_p - gamma a d_peeq`` (Armstrong and Frederick 1966; Chaboche 1986): in tension it moves by ``C``
-per plastic strain at first, and saturates at ``C / gamma``. Backward Euler leaves one scalar equation a point for the
-increment of PEEQ (Kobayashi and Ohno 2002), which decreases monotonically.
+The elastic range has the radius that the isotropic hardening gives, and its centre is a sum of back
+stresses, each with ``d a = 2/3 C d eps_p - gamma a d_peeq`` (Armstrong and Frederick 1966; Chaboche
+1986): in tension it moves by ``C`` per plastic strain at first, and saturates at ``C / gamma``.
+Backward Euler leaves one scalar equation a point for the increment of PEEQ (Kobayashi and Ohno
+2002), which decreases monotonically.
 
-Stresses and strains of this file have four components, ``[xx, yy, zz, xy]``, and products of two of them count shear
-twice. In plane stress the strain out of the plane is found such that the stress out of it is zero.
+Stresses and strains of this file have four components, ``[xx, yy, zz, xy]``, and products of two of
+them count shear twice. In plane stress the strain out of the plane is found such that the stress
+out of it is zero.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ _PLANE = np.array([0, 1, 3])
 
 @dataclass(frozen=True)
 class KinematicState(PlasticState):
-    """History of ``n`` points, with ``m`` back stresses ``(n, m, 4)`` and the plastic work density ``(n,)``."""
+    """History of ``n`` points, with ``m`` back stresses ``(n, m, 4)`` and the plastic work density
+    ``(n,)``."""
 
     back_stress: Array
     work: Array
@@ -36,16 +40,19 @@ class KinematicState(PlasticState):
 
 @dataclass(frozen=True)
 class KinematicMaterial(J2Material):
-    """Elastic-plastic solid with isotropic ``hardening`` and ``back_stresses`` ``(C, gamma)``, moduli and rates of
-    recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With recovery its tangent is not symmetric. Raises
-    ValueError unless C is positive and gamma is not negative."""
+    """Elastic-plastic solid with isotropic ``hardening`` and ``back_stresses`` ``(C, gamma)``,
+    moduli and rates of recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With
+    recovery its tangent is not symmetric. Raises ValueError unless C is positive and gamma is not
+    negative."""
 
     back_stresses: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
         """Check the back stresses."""
         if not all(C > 0 and gamma >= 0 for C, gamma in self.back_stresses):
-            raise ValueError("moduli of back stresses must be positive, rates of recovery must not be negative")
+            raise ValueError(
+                "moduli of back stresses must be positive, rates of recovery must not be negative"
+            )
 
     @property
     def _moduli(self) -> Array:
@@ -61,17 +68,23 @@ class KinematicMaterial(J2Material):
         """The return map; in plane stress with the strain out of the plane as one more unknown."""
         whole = np.zeros((len(strain), 4))
         whole[:, _PLANE] = strain
-        stress, tangent, new = (self._return if self.plane == "strain" else self._plane_stress)(whole, state)
+        stress, tangent, new = (self._return if self.plane == "strain" else self._plane_stress)(
+            whole, state
+        )
         flows = new.peeq > state.peeq
         if self.plane == "stress":
             ratio = tangent[:, :, 2] / tangent[:, 2, 2, None]
             tangent = tangent - ratio[:, :, None] * tangent[:, 2, None]
-            stress = stress - ratio * stress[:, 2, None]  # all normal stresses share the pressure's round-off
+            stress = (
+                stress - ratio * stress[:, 2, None]
+            )  # all normal stresses share the pressure's round-off
         in_plane = np.tile(self.elastic_tangent, (len(strain), 1, 1))
         in_plane[flows] = tangent[flows][:, _PLANE[:, None], _PLANE]
         return stress, in_plane, new
 
-    def _plane_stress(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
+    def _plane_stress(
+        self, strain: Array, old: KinematicState
+    ) -> tuple[Array, Array, KinematicState]:
         """`_return` at the ``eps_zz`` at which ``s_zz`` vanishes, which increases with it."""
         modulus = self.lame[0] + 2 * self.lame[1]
 
@@ -88,7 +101,8 @@ class KinematicMaterial(J2Material):
         return tuple(found)
 
     def _return(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
-        """Stress ``(n, 4)``, tangent ``(n, 4, 4)`` and new state at engineering strains ``(n, 4)``."""
+        """Stress ``(n, 4)``, tangent ``(n, 4, 4)`` and new state at engineering strains ``(n,
+        4)``."""
         lam, mu = self.lame
         bulk = lam + 2 * mu / 3
         trial = 2 * mu * (strain - old.plastic_strain * _TWICE) @ _DEVIATOR
@@ -99,7 +113,9 @@ class KinematicMaterial(J2Material):
         if not len(p):
             return stress, tangent, old
         hardening = self.hardening.at(p)
-        d_peeq, fall, theta, eta, rate = self._increment(trial[p], old.back_stress[p], old.peeq[p], hardening)
+        d_peeq, fall, theta, eta, rate = self._increment(
+            trial[p], old.back_stress[p], old.peeq[p], hardening
+        )
         length = _norm(eta)
         n = eta / length[:, None]
         flow = np.sqrt(1.5) * d_peeq[:, None] * n
@@ -107,11 +123,16 @@ class KinematicMaterial(J2Material):
         before, after, (C, gamma) = old.back_stress[p], old.peeq[p] + d_peeq, self._moduli
         back = theta[:, :, None] * (before + 2 / 3 * C[:, None] * flow[:, None, :])
 
-        # stress . d eps_p = yield stress d_peeq + sum of d(a . a) 3 / (4 C) + gamma a . a 3 / (2 C) d_peeq
-        now, between, then = (_dot(a, b) / C for a, b in ((back, back), (back, before), (before, before)))
+        # stress . d eps_p = yield stress d_peeq + sum of d(a . a) 3 / (4 C) + gamma a . a 3 / (2 C)
+        # d_peeq
+        now, between, then = (
+            _dot(a, b) / C for a, b in ((back, back), (back, before), (before, before))
+        )
         kept, lost = 0.75 * (now - then).sum(axis=1), 0.75 * d_peeq * ((now + between) @ gamma)
         isotropic = hardening.work(after) - hardening.work(old.peeq[p])
-        new = KinematicState(*(a.copy() for a in (old.plastic_strain, old.peeq, old.back_stress, old.work)))
+        new = KinematicState(
+            *(a.copy() for a in (old.plastic_strain, old.peeq, old.back_stress, old.work))
+        )
         new.plastic_strain[p] += flow
         new.peeq[p], new.back_stress[p] = after, back
         new.work[p] += isotropic + kept + lost
@@ -126,9 +147,9 @@ class KinematicMaterial(J2Material):
     def _increment(
         self, trial: Array, back: Array, peeq: Array, hardening: Hardening
     ) -> tuple[Array, Array, Array, Array, Array]:
-        """The increment of PEEQ at which ``sqrt(1.5) |eta| = (3 mu + sum of theta C) d_peeq + yield stress``, with
-        ``theta = 1 / (1 + gamma d_peeq)`` and ``eta = trial - sum of theta a``; how fast the difference falls, with
-        ``theta``, ``eta`` and its derivative."""
+        """The increment of PEEQ at which ``sqrt(1.5) |eta| = (3 mu + sum of theta C) d_peeq + yield
+        stress``, with ``theta = 1 / (1 + gamma d_peeq)`` and ``eta = trial - sum of theta a``; how
+        fast the difference falls, with ``theta``, ``eta`` and its derivative."""
         (_, mu), (C, gamma) = self.lame, self._moduli
         high = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
         close, start = 1e-14 * high, np.zeros(len(trial))
@@ -139,10 +160,17 @@ class KinematicMaterial(J2Material):
             rate = np.einsum("nk,nki->ni", gamma * theta**2, back)
             length, after = _norm(eta), peeq + d_peeq
             value = (3 * mu + theta @ C) * d_peeq + hardening.stress(after) - np.sqrt(1.5) * length
-            fall = 3 * mu + theta**2 @ C + hardening.slope(after) - np.sqrt(1.5) * _dot(rate, eta) / length
+            fall = (
+                3 * mu
+                + theta**2 @ C
+                + hardening.slope(after)
+                - np.sqrt(1.5) * _dot(rate, eta) / length
+            )
             return value, fall, close, theta, eta, rate
 
-        d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(off, start, start, high, STEEP * mu)
+        d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(
+            off, start, start, high, STEEP * mu
+        )
         return d_peeq, fall, theta, eta, rate
 
     def centre(self, state: State) -> Array:

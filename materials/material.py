@@ -1,9 +1,10 @@
-"""What the solver asks of a material: strain and state in, stress, tangent and state out; and points of it, with their
-history.
+"""What the solver asks of a material: strain and state in, stress, tangent and state out; and
+points of it, with their history.
 
-Arrays are those of ``n`` points: strains ``(n, 3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering shear), stresses
-``(n, 4)`` are ``[s_xx, s_yy, s_zz, s_xy]``, tension positive. A state is None (no history) or a dataclass of arrays
-whose first axis is that of the points, which is how checkpoints store it.
+Arrays are those of ``n`` points: strains ``(n, 3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering
+shear), stresses ``(n, 4)`` are ``[s_xx, s_yy, s_zz, s_xy]``, tension positive. A state is None (no
+history) or a dataclass of arrays whose first axis is that of the points, which is how checkpoints
+store it.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ COMPONENTS = ("xx", "yy", "zz", "xy")  # of stresses and plastic strains
 
 
 class Material(Protocol):
-    """A constitutive law in the plane; every method is a pure function. What it does not define is that of a material
-    without history, to inherit.
+    """A constitutive law in the plane; every method is a pure function. What it does not define is
+    that of a material without history, to inherit.
 
-    One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; one that is ``finite`` gets
-    displacement gradients for strains (see finite.py). A body that neither holds for is assembled once, from the
-    elastic tangent alone.
+    One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; one that is
+    ``finite`` gets displacement gradients for strains (see finite.py). A body that neither holds
+    for is assembled once, from the elastic tangent alone.
     """
 
     yields: ClassVar[bool] = False
@@ -33,15 +34,18 @@ class Material(Protocol):
 
     @property
     def elastic_tangent(self) -> Array:
-        """The elastic moduli ``(3, 3)``, symmetric, from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``."""
+        """The elastic moduli ``(3, 3)``, symmetric, from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx,
+        s_yy, s_xy]``."""
         ...
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
-        """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from ``state``.
+        """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n,
+        3)`` from ``state``.
 
-        The tangent equals `elastic_tangent` to the bit at points that do not flow; it may be a view, not to be written
-        to. If it is not symmetric, `TangentMatrix.border` takes it as such under force control: more iterations, the
-        same equilibrium. A stress that does not exist is not a number: the solver takes the step back.
+        The tangent equals `elastic_tangent` to the bit at points that do not flow; it may be a
+        view, not to be written to. If it is not symmetric, `TangentMatrix.border` takes it as such
+        under force control: more iterations, the same equilibrium. A stress that does not exist is
+        not a number: the solver takes the step back.
         """
         ...
 
@@ -50,7 +54,8 @@ class Material(Protocol):
         ...
 
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
-        """Elastic energy density ``(n,)`` after an update to ``stress`` and ``state``, per undeformed volume."""
+        """Elastic energy density ``(n,)`` after an update to ``stress`` and ``state``, per
+        undeformed volume."""
         return self.energy(stress)
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
@@ -58,7 +63,8 @@ class Material(Protocol):
         return stress
 
     def elastic(self) -> Material:
-        """A material with the same states that answers from each as if it could not yield (further)."""
+        """A material with the same states that answers from each as if it could not yield
+        (further)."""
         return self
 
     def state(self, n: int) -> State:
@@ -75,7 +81,8 @@ class Material(Protocol):
 
 
 class Points:
-    """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the last strain seen.
+    """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the
+    last strain seen.
 
     ``yields`` tells whether they can. What answers `update` is ``acting``: the material, or for the
     time being one with the same states, such as its `elastic` one. A contact law is a material too,
@@ -89,7 +96,8 @@ class Points:
         self.yields = bool(getattr(material, "yields", False))
 
     def update(self, *strain: Array) -> tuple[Array, Array]:
-        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed state."""
+        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the
+        committed state."""
         stress, tangent, self.trial = self.acting.update(*strain, self.state)
         return stress, tangent
 

@@ -8,7 +8,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-_PSI = 6.894757293168361e-3  # one pound-force (4.4482216152605 N) on a square inch (25.4 mm), in MPa
+_PSI = (
+    6.894757293168361e-3  # one pound-force (4.4482216152605 N) on a square inch (25.4 mm), in MPa
+)
 _PER_MPA = {
     "MPa": 1.0,
     "N/mm2": 1.0,
@@ -31,7 +33,9 @@ def metal(name: str, unit: str) -> dict[str, Any]:
     0.2 % proof) and ``tensile``, and ``hardening``, points (PEEQ, true stress) from first yield on.
     Raises ValueError for a name or a unit that is not known."""
     if name not in metals():
-        hint = "".join(f"did you mean {near}? " for near in difflib.get_close_matches(name, metals(), 1))
+        hint = "".join(
+            f"did you mean {near}? " for near in difflib.get_close_matches(name, metals(), 1)
+        )
         raise ValueError(f"is not a known material; {hint}Materials are {', '.join(metals())}")
     if unit not in _PER_MPA:
         raise ValueError(f"needs a units.stress that is one of {', '.join(_PER_MPA)}, not {unit}")

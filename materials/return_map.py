@@ -1,10 +1,12 @@
-"""The return map of J2 plasticity with isotropic hardening, for plane strain and plane stress, on arrays of points.
+"""The return map of J2 plasticity with isotropic hardening, for plane strain and plane stress, on
+arrays of points.
 
-Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity, 1998, Boxes 3.2 and
-3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P`` takes a stress to its deviator (as a
-strain), so that the von Mises stress is ``q^2 = 1.5 sigma . P sigma``. The plastic strain grows by ``zeta P sigma``,
-``zeta = 1.5 d_peeq / q``, and the stress is ``(C^-1 + zeta P)^-1`` times the elastic trial strain. ``C`` and ``P``
-share their eigenvectors: each eigencomponent of the trial stress shrinks alone, by ``1 + zeta C_k P_k``, and one scalar
+Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity,
+1998, Boxes 3.2 and 3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P``
+takes a stress to its deviator (as a strain), so that the von Mises stress is ``q^2 = 1.5 sigma . P
+sigma``. The plastic strain grows by ``zeta P sigma``, ``zeta = 1.5 d_peeq / q``, and the stress is
+``(C^-1 + zeta P)^-1`` times the elastic trial strain. ``C`` and ``P`` share their eigenvectors:
+each eigencomponent of the trial stress shrinks alone, by ``1 + zeta C_k P_k``, and one scalar
 equation a point is left for ``zeta``.
 
 With linear hardening in plane strain it has a closed form, `radial_return`, computed in C.
@@ -25,7 +27,9 @@ from archord.materials.hardening import Hardening
 from archord.materials.material import Array
 
 _ITERATIONS = 60
-STEEP = 1e3  # slope over what elasticity makes of it, from which it says nothing of where the zero is
+STEEP = (
+    1e3  # slope over what elasticity makes of it, from which it says nothing of where the zero is
+)
 _NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
 _STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
 # components of (n, 4) stresses and of strains that a plane has; eigenvectors and eigenvalues of P
@@ -37,7 +41,8 @@ _PLANES = {
     ),
     "strain": (
         [0, 1, 2, 3],
-        np.array([[1, 1, 1, 0], [-1, 1, 0, 0], [1, 1, -2, 0], [0, 0, 0, 1]]) / np.sqrt([[3], [2], [6], [1]]),
+        np.array([[1, 1, 1, 0], [-1, 1, 0, 0], [1, 1, -2, 0], [0, 0, 0, 1]])
+        / np.sqrt([[3], [2], [6], [1]]),
         np.array([0.0, 1.0, 1.0, 2.0]),
     ),
 }
@@ -45,15 +50,18 @@ _PLANES = {
 
 @dataclass(frozen=True)
 class PlasticState:
-    """History of ``n`` points: plastic strain ``(n, 4)``, ``[xx, yy, zz, xy]`` (tensor shear), and PEEQ ``(n,)``."""
+    """History of ``n`` points: plastic strain ``(n, 4)``, ``[xx, yy, zz, xy]`` (tensor shear), and
+    PEEQ ``(n,)``."""
 
     plastic_strain: Array
     peeq: Array
 
 
-def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardening) -> tuple[Array, Array, PlasticState]:
-    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the ``old`` state,
-    with the elasticity of ``m``."""
+def return_map(
+    strain: Array, old: PlasticState, m: Elastic, hardening: Hardening
+) -> tuple[Array, Array, PlasticState]:
+    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the
+    ``old`` state, with the elasticity of ``m``."""
     parts, Q, deviator = _PLANES[m.plane]
     lam, mu = m.lame
     first = 3 * lam + 2 * mu if m.plane == "strain" else m.E / (1 - m.nu)
@@ -77,7 +85,9 @@ def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardenin
     plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
     peeq[p] += 2 / 3 * zeta * q
     flow = sigma @ P
-    grown = np.stack([flow[:, 0], flow[:, 1], -flow[:, 0] - flow[:, 1], flow[:, -1]], axis=1) / shear
+    grown = (
+        np.stack([flow[:, 0], flow[:, 1], -flow[:, 0] - flow[:, 1], flow[:, -1]], axis=1) / shear
+    )
     plastic_strain[p] += zeta[:, None] * grown
 
     softened = np.einsum("ki,nk,kj->nij", Q, moduli / shrink, Q)  # (C^-1 + zeta P)^-1
@@ -92,22 +102,25 @@ def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardenin
 
 
 def beyond(stress: Array, hardening: Hardening, peeq: Array) -> npt.NDArray[np.integer]:
-    """Numbers of the points whose von Mises ``stress`` ``(n,)`` exceeds the yield stress. Raises ValueError where the
-    law gives none."""
+    """Numbers of the points whose von Mises ``stress`` ``(n,)`` exceeds the yield stress. Raises
+    ValueError where the law gives none."""
     strength = hardening.stress(peeq)
     lost = np.isnan(strength) & np.isfinite(stress)
     if lost.any():
         at = np.broadcast_to(peeq, lost.shape)[lost][0]
-        raise ValueError(f"the hardening law gives a yield stress that is not a number, at PEEQ = {at:g}")
+        raise ValueError(
+            f"the hardening law gives a yield stress that is not a number, at PEEQ = {at:g}"
+        )
     return np.flatnonzero(stress > strength)
 
 
 def plastic_multiplier(
     a: Array, weights: Array, compliance: Array, hardening: Hardening, peeq: Array
 ) -> tuple[Array, Array]:
-    """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield: the zero of ``1/q - 1/stress(PEEQ)``,
-    which increases. ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2`` with components ``a`` ``(n, k)`` of the
-    trial stress, and ``d_peeq = 2/3 zeta q`` from the old ``peeq``."""
+    """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield: the zero of ``1/q -
+    1/stress(PEEQ)``, which increases. ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2``
+    with components ``a`` ``(n, k)`` of the trial stress, and ``d_peeq = 2/3 zeta q`` from the old
+    ``peeq``."""
 
     def off(zeta: Array) -> tuple[Array, Array, Array]:
         shrink = 1 + zeta[:, None] * compliance
@@ -116,12 +129,20 @@ def plastic_multiplier(
         now = peeq + 2 / 3 * zeta * q
         strength = hardening.stress(now)
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
-        return 1 / q - 1 / strength, fall / q**2 + rise / strength**2, 1e-10 * (zeta + 1 / compliance.max())
+        return (
+            1 / q - 1 / strength,
+            fall / q**2 + rise / strength**2,
+            1e-10 * (zeta + 1 / compliance.max()),
+        )
 
     start, q = np.zeros(len(a)), np.sqrt(a**2 @ weights)
     steep = STEEP * compliance.max() / q
-    zeta, (value, slope, close) = bracketed_newton(off, start, start, np.full(len(a), np.inf), steep)
-    last = np.clip(value / slope, -close, close)  # so short a step of Newton's leaves nothing but round-off
+    zeta, (value, slope, close) = bracketed_newton(
+        off, start, start, np.full(len(a), np.inf), steep
+    )
+    last = np.clip(
+        value / slope, -close, close
+    )  # so short a step of Newton's leaves nothing but round-off
     zeta = np.maximum(zeta - last, 0.0)
     return zeta, np.sqrt((a / (1 + zeta[:, None] * compliance)) ** 2 @ weights)
 
@@ -129,10 +150,11 @@ def plastic_multiplier(
 def bracketed_newton(
     f: Callable[[Array], tuple], x: Array, low: Array, high: Array, steep: Array | float = np.inf
 ) -> tuple[Array, tuple]:
-    """Zeros ``(n,)`` of functions that increase, from ``x``, and what ``f`` gives there; not a number where it does not
-    converge. ``f(x)`` begins with values, slopes, and how short Newton's step from a zero is. Steps that leave what is
-    known to bracket a zero, as they can where a hardening law is not concave, are halved intervals instead. So are
-    steps by slopes that are not below ``steep``, as of a law that begins vertically: they are short far from a zero."""
+    """Zeros ``(n,)`` of functions that increase, from ``x``, and what ``f`` gives there; not a
+    number where it does not converge. ``f(x)`` begins with values, slopes, and how short Newton's
+    step from a zero is. Steps that leave what is known to bracket a zero, as they can where a
+    hardening law is not concave, are halved intervals instead. So are steps by slopes that are not
+    below ``steep``, as of a law that begins vertically: they are short far from a zero."""
     for _ in range(_ITERATIONS):
         found = off, slope, close, *_ = f(x)
         low, high = np.where(off < 0, x, low), np.where(off > 0, x, high)
@@ -150,12 +172,15 @@ def bracketed_newton(
 def radial_return(
     strain: Array, old: PlasticState, m: Elastic, yield_stress: float, modulus: float
 ) -> tuple[Array, Array, PlasticState]:
-    """`return_map` with linear hardening in plane strain: ``d_peeq = (q_trial - stress(PEEQ)) / (3 mu + H)``."""
+    """`return_map` with linear hardening in plane strain: ``d_peeq = (q_trial - stress(PEEQ)) / (3
+    mu + H)``."""
     n, strain = len(strain), np.ascontiguousarray(strain, dtype=float)
     stress, tangent = np.empty((n, 4)), np.empty((n, 3, 3))
     new = PlasticState(np.empty((n, 4)), np.empty(n))
     inputs = map(pointer, (strain, old.plastic_strain, old.peeq))
     outputs = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
     kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
-    yielding = kernel(n, *inputs, *m.lame, yield_stress, modulus, pointer(m.elastic_tangent), *outputs)
+    yielding = kernel(
+        n, *inputs, *m.lame, yield_stress, modulus, pointer(m.elastic_tangent), *outputs
+    )
     return stress, tangent, new if yielding else old

@@ -1,8 +1,10 @@
-"""checkpoint.h5: what a run needs to go on, on any number of ranks: displacement, increment, history, step control.
+"""checkpoint.h5: what a run needs to go on, on any number of ranks: displacement, increment,
+history, step control.
 
-The file is an HDF5 file behind a line of text that holds its format and a checksum over the rest, so that a damaged one
-is refused before it is read. Nodes, cells and points are in the order of the mesh generator; of the points with history
-only those that yielded are stored. Each step replaces the file in one move.
+The file is an HDF5 file behind a line of text that holds its format and a checksum over the rest,
+so that a damaged one is refused before it is read. Nodes, cells and points are in the order of the
+mesh generator; of the points with history only those that yielded are stored. Each step replaces
+the file in one move.
 """
 
 from __future__ import annotations
@@ -36,8 +38,9 @@ _HEADER = 512  # HDF5 looks for its own beginning at powers of two from here
 class Checkpoint:
     """What the file holds of a run after ``step`` output steps.
 
-    ``arrays`` are in the mesh generator's order: "fields/displacement" and "fields/increment" ``(n, 2)``, and what
-    `MeshOrder.collect_history` returns. ``scalars`` is whatever JSON can hold, ``scene`` the resolved scene as TOML.
+    ``arrays`` are in the mesh generator's order: "fields/displacement" and "fields/increment" ``(n,
+    2)``, and what `MeshOrder.collect_history` returns. ``scalars`` is whatever JSON can hold,
+    ``scene`` the resolved scene as TOML.
     """
 
     step: int
@@ -47,9 +50,11 @@ class Checkpoint:
     arrays: Arrays
 
 
-def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, work: Work) -> Checkpoint:
-    """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step`` says, from which
-    `resume` goes on. Collective."""
+def halt(
+    order: MeshOrder, scene: str, m: Any, step: Step, position: Position, work: Work
+) -> Checkpoint:
+    """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step``
+    says, from which `resume` goes on. Collective."""
     system, increment = order.system, position.increment
     u, levels = np.split(system.equilibrium.state(), [2 * system.equilibrium.n_local])
     scalars = {
@@ -70,9 +75,12 @@ def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, w
     return Checkpoint(m.step, scene, mesh, scalars, arrays)
 
 
-def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[dict[str, Any], Step, Position, Work]:
-    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``); returns what `halt` was
-    given, the record of the step as a dictionary. Raises `InputError` if it is of another mesh. Collective."""
+def resume(
+    order: MeshOrder, path: Path, checkpoint: Checkpoint | None
+) -> tuple[dict[str, Any], Step, Position, Work]:
+    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``);
+    returns what `halt` was given, the record of the step as a dictionary. Raises `InputError` if it
+    is of another mesh. Collective."""
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
     if not same_mesh:
@@ -81,7 +89,9 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple
     order.spread_history(checkpoint.arrays if checkpoint else None)
 
     def state(name: str, level: str) -> Array:
-        return np.append(order.spread(checkpoint.arrays[name] if checkpoint else None), scalars[level])
+        return np.append(
+            order.spread(checkpoint.arrays[name] if checkpoint else None), scalars[level]
+        )
 
     position = Position(**scalars["position"])
     if "level_increment" in scalars:
@@ -89,7 +99,9 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple
     if springs := order.system.equilibrium.springs:
         springs.energy = scalars["stabilisation_energy"]
     order.system.solver.continues_gamma = scalars["gamma_by_and_by"]
-    order.system.equilibrium.resume(position.load, state("fields/displacement", "level"), scalars["largest_reaction"])
+    order.system.equilibrium.resume(
+        position.load, state("fields/displacement", "level"), scalars["largest_reaction"]
+    )
     step = Step(**scalars["step"])
     step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
     return scalars["measures"], step, position, Work(**scalars["work"])
@@ -97,12 +109,22 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple
 
 def _newton(attempt: dict[str, Any]) -> Newton:
     """A solve as a checkpoint holds it; version 0.1 called active-set changes flips."""
-    return Newton(**{"active_set_changes" if name == "flips" else name: value for name, value in attempt.items()})
+    return Newton(
+        **{
+            "active_set_changes" if name == "flips" else name: value
+            for name, value in attempt.items()
+        }
+    )
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
     """Replace ``path`` by ``checkpoint``. Raises `OSError`."""
-    facts = {"archord": VERSION, "step": checkpoint.step, "scene": checkpoint.scene, "scalars": checkpoint.scalars}
+    facts = {
+        "archord": VERSION,
+        "step": checkpoint.step,
+        "scene": checkpoint.scene,
+        "scalars": checkpoint.scalars,
+    }
     with hdf5_in_memory() as file:
         file.attrs["mesh"] = checkpoint.mesh
         file["facts"] = json.dumps(facts)
@@ -119,14 +141,19 @@ def _header(body: bytes) -> bytes:
 
 
 def read(path: Path) -> Checkpoint:
-    """Read ``path``, of this version or 0.1. Raises `InputError` if it is missing, damaged, or of a newer archord."""
+    """Read ``path``, of this version or 0.1. Raises `InputError` if it is missing, damaged, or of a
+    newer archord."""
     try:
         content = require_file(path).read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: cannot be read, so that the run cannot be continued: {error.strerror}.") from None
+        raise InputError(
+            f"{path}: cannot be read, so that the run cannot be continued: {error.strerror}."
+        ) from None
     body = content[_HEADER:]
     if content[:_HEADER] != _header(body):
-        raise InputError(f"{path}: is damaged or of a newer archord, so that the run cannot be continued.")
+        raise InputError(
+            f"{path}: is damaged or of a newer archord, so that the run cannot be continued."
+        )
     with h5py.File(io.BytesIO(body), "r") as file:
         mesh, arrays = file.attrs["mesh"], dict(all_arrays(file))
     facts = json.loads(bytes(arrays.pop("facts")))

@@ -1,4 +1,5 @@
-"""Whether a run that says that it is done is a finished run of a scene: whether its files agree with run.json."""
+"""Whether a run that says that it is done is a finished run of a scene: whether its files agree
+with run.json."""
 
 from __future__ import annotations
 
@@ -11,8 +12,8 @@ from archord.scene.file import AnyScene, load_scene, resolved
 
 
 def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
-    """Why the run in ``folder`` with the run.json ``report`` is no finished run of ``scene``, in words; nothing where
-    its files agree. Of large files only the size is read."""
+    """Why the run in ``folder`` with the run.json ``report`` is no finished run of ``scene``, in
+    words; nothing where its files agree. Of large files only the size is read."""
     if not _is_of(folder, scene):
         return "scene.toml is that of another scene"
     faults = faults_of(folder, report.get("files", {}), quick=True)
@@ -23,7 +24,8 @@ def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
 
 
 def history_fault(folder: Path, report: dict[str, Any]) -> str:
-    """What is wrong with the history.csv in ``folder``, in words; nothing where it agrees with the ``report``."""
+    """What is wrong with the history.csv in ``folder``, in words; nothing where it agrees with the
+    ``report``."""
     path = folder / "history.csv"
     try:
         if not path.read_bytes().endswith(b"\n"):
@@ -36,7 +38,8 @@ def history_fault(folder: Path, report: dict[str, Any]) -> str:
 
 
 def _is_of(folder: Path, scene: AnyScene) -> bool:
-    """Whether scene.toml holds ``scene``; of one that leaves the mesh to an accuracy it holds another mesh."""
+    """Whether scene.toml holds ``scene``; of one that leaves the mesh to an accuracy it holds
+    another mesh."""
     if scene.analysis.accuracy is not None:
         return True
     wanted = resolved(scene)

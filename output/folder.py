@@ -13,7 +13,15 @@ from archord.output.files.disk import new_name
 from archord.output.files.seal import read_report
 from archord.scene.errors import InputError
 
-FILES = ("scene.toml", "history.csv", "fields.vtkhdf", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+FILES = (
+    "scene.toml",
+    "history.csv",
+    "fields.vtkhdf",
+    "fields.xdmf",
+    "fields.h5",
+    "contact.h5",
+    "run.json",
+)
 MESH = "mesh.npz"  # of a run whose mesh was given from Python
 APART = "fields"  # the folder of the files that fields.h5 has links to
 CHECKPOINT = "checkpoint.h5"
@@ -26,8 +34,8 @@ _UNFINISHED = {
 
 
 def clear(folder: Path, kept: str = "") -> None:
-    """Remove an old run's files but the one that is ``kept``, and what a kill left half done of them. Raises
-    `OSError`."""
+    """Remove an old run's files but the one that is ``kept``, and what a kill left half done of
+    them. Raises `OSError`."""
     for name in {CHECKPOINT, *FILES, MESH, PICTURE} - {kept}:
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
@@ -39,8 +47,8 @@ def clear(folder: Path, kept: str = "") -> None:
 
 @contextmanager
 def occupied(folder: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other processes from writing to ``folder``; a kill ends that, too. If one does already, ``wait`` until it
-    has ended, or raise `InputError`."""
+    """Keep other processes from writing to ``folder``; a kill ends that, too. If one does already,
+    ``wait`` until it has ended, or raise `InputError`."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with suppress(OSError):  # a file system without locks
@@ -54,10 +62,14 @@ def occupied(folder: Path, wait: bool = False) -> Iterator[None]:
 
 
 def claim_folder(folder: Path, force: bool) -> None:
-    """Make ``folder`` ready for results. Raises `InputError` if it cannot be, or holds something, without ``force``."""
+    """Make ``folder`` ready for results. Raises `InputError` if it cannot be, or holds something,
+    without ``force``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        empty, fault = not any(folder.iterdir()), "" if os.access(folder, os.W_OK) else "Permission denied"
+        empty, fault = (
+            not any(folder.iterdir()),
+            "" if os.access(folder, os.W_OK) else "Permission denied",
+        )
     except OSError as error:
         empty, fault = True, error.strerror or str(error)
     if fault:
@@ -70,14 +82,17 @@ def claim_folder(folder: Path, force: bool) -> None:
 
 
 def refuse_folder(scene: Path) -> None:
-    """Raise `InputError` if ``scene`` is a folder, with what can be done with it instead of solving it."""
+    """Raise `InputError` if ``scene`` is a folder, with what can be done with it instead of solving
+    it."""
     if not scene.is_dir():
         return
     said = "is no scene but a folder, and no run is in it"
     if is_sweep(scene):
         said = f"is a sweep; archord sweep {scene} solves what it lacks"
     elif (scene / "scene.toml").is_file():
-        said = f"is a run; --restart or --extend continues it, and its scene is {scene / 'scene.toml'}"
+        said = (
+            f"is a run; --restart or --extend continues it, and its scene is {scene / 'scene.toml'}"
+        )
     raise InputError(f"{scene}: {said}.")
 
 

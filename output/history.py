@@ -1,4 +1,5 @@
-"""history.csv: one row per accepted output step, in the scene's units with the dimensionless forms beside them."""
+"""history.csv: one row per accepted output step, in the scene's units with the dimensionless forms
+beside them."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ _NOTHING = 1e-290
 
 
 def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -> None:
-    """Replace ``path`` by the table of ``steps`` in one move; whole numbers stay whole. Raises `OSError`."""
+    """Replace ``path`` by the table of ``steps`` in one move; whole numbers stay whole. Raises
+    `OSError`."""
     text = io.StringIO(newline="")
     table = csv.writer(text)
     table.writerow([heading for heading, _ in columns])
@@ -30,9 +32,9 @@ def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:
-    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ... A last row
-    that does not end in a line break (a copy cut short) is ignored. Raises `OSError`, and `ValueError` for what is
-    no table of numbers."""
+    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E*
+    R)"]``, ... A last row that does not end in a line break (a copy cut short) is ignored. Raises
+    `OSError`, and `ValueError` for what is no table of numbers."""
     text = Path(path).read_bytes().decode()
     heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
     names = [h.split(" [")[0] for h in heading]
@@ -42,8 +44,8 @@ def read_history(path: str | Path) -> dict[str, list[float]]:
 
 
 def fault_of_history(columns: Mapping[str, Sequence[float]], report: Mapping[str, Any]) -> str:
-    """Where the ``columns`` of a history.csv contradict the steps of the run.json ``report``, in words; nothing where
-    they agree. A run that goes on or was killed may have one row more."""
+    """Where the ``columns`` of a history.csv contradict the steps of the run.json ``report``, in
+    words; nothing where they agree. A run that goes on or was killed may have one row more."""
     steps = report["steps"]
     rows = len(columns["step"])
     if rows < len(steps):
@@ -59,6 +61,8 @@ def fault_of_history(columns: Mapping[str, Sequence[float]], report: Mapping[str
             return f"has no column {lost[0]!r}, which run.json has"
         for name in values.keys() & columns.keys():
             told, here = values[name], columns[name][k]
-            if isinstance(told, int | float) and not math.isclose(told, here, rel_tol=_SAME, abs_tol=_NOTHING):
+            if isinstance(told, int | float) and not math.isclose(
+                told, here, rel_tol=_SAME, abs_tol=_NOTHING
+            ):
                 return f"has {name} = {here:g} at step {k + 1}, run.json {told:g}: one of the two was changed"
     return ""

@@ -1,4 +1,5 @@
-"""The mesh of a run that was given from Python: the run folder keeps it, and the run's scene.toml names it there."""
+"""The mesh of a run that was given from Python: the run folder keeps it, and the run's scene.toml
+names it there."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ def is_given(scene: AnyScene) -> bool:
 
 
 def scene_text(scene: AnyScene, folder: Path) -> str:
-    """The TOML of ``scene`` in a run's ``folder``: a mesh that lies there is named without it, so that it may move."""
+    """The TOML of ``scene`` in a run's ``folder``: a mesh that lies there is named without it, so
+    that it may move."""
     own = folder.absolute() / MESH
     if is_given(scene):
         mesh = scene.mesh.model_copy(update={"file": str(own)})  # type: ignore[union-attr]

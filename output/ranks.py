@@ -18,8 +18,8 @@ _PAUSE = 0.01  # seconds between two looks
 def agreed(comm: MPI.Comm, function: Callable[[], Result]) -> Result:
     """Call ``function`` on rank 0 alone; its result is that of all ranks. Collective.
 
-    Raises on every rank the `InputError` that it raises, and `WriteError` for an `OSError`. ``function`` must not call
-    or import anything collective; importing petsc4py is.
+    Raises on every rank the `InputError` that it raises, and `WriteError` for an `OSError`.
+    ``function`` must not call or import anything collective; importing petsc4py is.
     """
     result: Any = None
     fault: Exception | None = None
@@ -37,7 +37,8 @@ def agreed(comm: MPI.Comm, function: Callable[[], Result]) -> Result:
 
 
 def arrived_before(comm: MPI.Comm, seconds: float = float("inf")) -> bool:
-    """Wait, asleep, for all ranks to come here; False if they have not after so many ``seconds``. Collective."""
+    """Wait, asleep, for all ranks to come here; False if they have not after so many ``seconds``.
+    Collective."""
     request = comm.Ibarrier()
     while not request.Test():
         if seconds <= 0:

@@ -1,4 +1,5 @@
-"""What a run can be continued from, and with which scene: planned by rank 0, from the files in the run's folder."""
+"""What a run can be continued from, and with which scene: planned by rank 0, from the files in the
+run's folder."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ _SAME = 1e-9  # relative difference up to which two targets are one
 
 @dataclass
 class Start:
-    """A run to go on from: its checkpoint, its run.json, and the steps ``done`` before the checkpoint's."""
+    """A run to go on from: its checkpoint, its run.json, and the steps ``done`` before the
+    checkpoint's."""
 
     checkpoint: Checkpoint
     report: dict[str, Any]
@@ -37,8 +39,8 @@ class Start:
 
 @dataclass
 class Plan:
-    """The scene to solve and from where; no ``start`` means from the beginning, ``finished`` that nothing is to do.
-    ``said`` is a sentence for the user."""
+    """The scene to solve and from where; no ``start`` means from the beginning, ``finished`` that
+    nothing is to do. ``said`` is a sentence for the user."""
 
     scene: AnyScene
     start: Start | None
@@ -47,10 +49,11 @@ class Plan:
 
 
 def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = False) -> Plan:
-    """How to continue the run in ``folder`` with ``scene``, by default the run's own; to ``extend`` it, that must go
-    further than the run did.
+    """How to continue the run in ``folder`` with ``scene``, by default the run's own; to ``extend``
+    it, that must go further than the run did.
 
-    Raises `InputError` if the accepted steps are not the first ones of the scene, or the run's files do not allow it.
+    Raises `InputError` if the accepted steps are not the first ones of the scene, or the run's
+    files do not allow it.
     """
     scene = load_scene(folder / "scene.toml") if scene is None else scene
     if not extend and not (folder / CHECKPOINT).exists():
@@ -60,11 +63,15 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
     start = _start(folder, scene)
     step, total = start.checkpoint.step, len(scene.targets)
     if extend and step == total:
-        raise InputError(f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further.")
+        raise InputError(
+            f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further."
+        )
     if step == total and start.report["status"] == "done":
         lost = _lost_tables(folder, scene, start.report)
         if lost:
-            return Plan(scene, start, f"the run in {folder} is finished: writing {' and '.join(lost)} again")
+            return Plan(
+                scene, start, f"the run in {folder} is finished: writing {' and '.join(lost)} again"
+            )
         return Plan(scene, None, f"the run in {folder} is finished: nothing to do", finished=True)
     said = f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}"
     changed = [name for name in TABLES if fault_of(folder, name, start.report.get("files", {}))]
@@ -72,7 +79,8 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
 
 
 def _lost_tables(folder: Path, scene: AnyScene, report: dict[str, Any]) -> list[str]:
-    """Those of the files that a run makes from the others which are missing, changed, or lack a step."""
+    """Those of the files that a run makes from the others which are missing, changed, or lack a
+    step."""
     seals = report.get("files", {})
     lost = [name for name in TABLES if fault_of(folder, name, seals)]
     if "history.csv" not in lost and history_fault(folder, report):
@@ -100,17 +108,24 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     reached, wanted = np.array(before.travelled[:n]), np.array(scene.travelled[:n])
     if len(wanted) < n or (np.abs(wanted - reached).max(0) > _SAME * np.abs(reached).max(0)).any():
         said = f"{scene.loading} and its steps must begin as those of the run"
-        raise InputError(f"{path}: its {n} steps are not the first ones of the scene's path; {said}.")
+        raise InputError(
+            f"{path}: its {n} steps are not the first ones of the scene's path; {said}."
+        )
     path = folder / "run.json"
     try:
         report = read_report(path)
         record = record_type(scene)
         names = [field.name for field in fields(record)]
-        done = [record(**{name: step[name] for name in names if name in step}) for step in report["steps"][: n - 1]]
+        done = [
+            record(**{name: step[name] for name in names if name in step})
+            for step in report["steps"][: n - 1]
+        ]
         if len(done) < n - 1 or not {"status", "started", "command", "warnings"} <= report.keys():
             raise KeyError("steps")
     except (OSError, ValueError, KeyError, TypeError):
-        said = f"is missing, was changed, or lacks some of the {n - 1} steps before the checkpoint's"
+        said = (
+            f"is missing, was changed, or lacks some of the {n - 1} steps before the checkpoint's"
+        )
         raise InputError(f"{path}: {said}.") from None
     seals = report.get("files", {})
     require_intact(folder, [name for name in seals if name not in TABLES])
@@ -118,9 +133,12 @@ def _start(folder: Path, scene: AnyScene) -> Start:
 
 
 def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None:
-    """Raise `InputError` naming a key that differs between the run's ``own`` scene and ``scene``, unless it may."""
+    """Raise `InputError` naming a key that differs between the run's ``own`` scene and ``scene``,
+    unless it may."""
     if own.loading != scene.loading:
-        raise InputError(f"{folder}: was loaded by {own.loading}; {scene.loading} cannot continue it.")
+        raise InputError(
+            f"{folder}: was loaded by {own.loading}; {scene.loading} cannot continue it."
+        )
     a, b = scene_keys(own), scene_keys(scene)
     for key in sorted({*a, *b}):
         if a.get(key) != b.get(key) and key != "load" and not key.startswith(_MAY_DIFFER):

@@ -1,4 +1,5 @@
-"""A scene solved into a run folder: scene, history, fields for ParaView, contact, checkpoint, run.json."""
+"""A scene solved into a run folder: scene, history, fields for ParaView, contact, checkpoint,
+run.json."""
 
 from __future__ import annotations
 
@@ -42,10 +43,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Outcome:
-    """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and its steps.
+    """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and
+    its steps.
 
-    ``signal`` interrupted it. ``warnings`` are known on rank 0 only, ``accuracy`` of a run that was asked for it
-    (`studies.accuracy.Accuracy`).
+    ``signal`` interrupted it. ``warnings`` are known on rank 0 only, ``accuracy`` of a run that was
+    asked for it (`studies.accuracy.Accuracy`).
     """
 
     folder: Path
@@ -70,15 +72,17 @@ def solve_scene(
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
     on_iteration: Callable[[float, Newton], None] = lambda load, result: None,
 ) -> Outcome:
-    """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`). Collective.
+    """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`).
+    Collective.
 
-    ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
-    ``on_attempt(load, Newton iterations)`` report progress on every rank, and ``on_iteration(load, result)`` what the
-    present solve did so far. ``timer`` has the seconds spent before. A step that cannot be solved, or a file that
-    cannot be written, ends the run with status "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was
-    accepted before stays. ``interrupt``, if given, is one that the caller
-    heeds, too. Raises `InputError` if another process solves into ``folder``, what is there cannot be continued, or the
-    scene leaves the mesh to `studies.accuracy.solve_to_accuracy`.
+    ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``,
+    ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank, and
+    ``on_iteration(load, result)`` what the present solve did so far. ``timer`` has the seconds
+    spent before. A step that cannot be solved, or a file that cannot be written, ends the run with
+    status "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays.
+    ``interrupt``, if given, is one that the caller heeds, too. Raises `InputError` if another
+    process solves into ``folder``, what is there cannot be continued, or the scene leaves the mesh
+    to `studies.accuracy.solve_to_accuracy`.
     """
     timer = timer or Timer()
     begun = perf_counter() - sum(timer.seconds.values())
@@ -92,7 +96,9 @@ def solve_scene(
         status, message, received = "done", "", 0
         failed: dict[str, Any] = {}
         try:
-            with nullcontext(interrupt) if interrupt else Interrupt() as system.equilibrium.interrupt:
+            with (
+                nullcontext(interrupt) if interrupt else Interrupt() as system.equilibrium.interrupt
+            ):
                 position, work = output.begin()
                 # what a coarse mesh went through before a halt is not kept
                 coarse = coarse_start(system) if position is None else None
@@ -111,7 +117,11 @@ def solve_scene(
                     attempted=on_attempt,
                 )
         except StepFailure as failure:
-            status, message, failed = "stopped", str(failure), {"failed_step": asdict(failure.attempt)}
+            status, message, failed = (
+                "stopped",
+                str(failure),
+                {"failed_step": asdict(failure.attempt)},
+            )
         except WriteError as error:
             status, message = "stopped", str(error)
         except Interrupted as interrupted:
@@ -125,14 +135,20 @@ def solve_scene(
         try:
             warnings = output.finish(told, status=status, message=message, **failed)
         except WriteError as error:
-            status, message, warnings = "stopped", message if status == "stopped" else str(error), []
+            status, message, warnings = (
+                "stopped",
+                message if status == "stopped" else str(error),
+                [],
+            )
         return Outcome(folder, status, message, output.steps, warnings, received)
 
 
 class _Output:
-    """Everything that a run writes; rank 0 writes, all ranks take part. Raises `WriteError` on all of them.
+    """Everything that a run writes; rank 0 writes, all ranks take part. Raises `WriteError` on all
+    of them.
 
-    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes what they lack.
+    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes
+    what they lack.
     """
 
     def __init__(self, folder: Path, account: Account, begun: float, start: Start | None) -> None:
@@ -148,14 +164,20 @@ class _Output:
             if asked.fields:
                 from archord.output import fields as of_fields
 
-                self._of_fields, self._mesh = of_fields, of_fields.collect_mesh(self._order, self._at_points)
+                self._of_fields, self._mesh = (
+                    of_fields,
+                    of_fields.collect_mesh(self._order, self._at_points),
+                )
         self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
         if comm.rank == 0:
-            self._report = Report(folder / "run.json", account, begun, self.steps, start.report if start else {})
+            self._report = Report(
+                folder / "run.json", account, begun, self.steps, start.report if start else {}
+            )
 
     def begin(self) -> tuple[Position | None, Work]:
-        """Make the files, or write the step that the run goes on from, and give its state to the joint. Collective."""
+        """Make the files, or write the step that the run goes on from, and give its state to the
+        joint. Collective."""
         system = self.system
         if not system.comm.bcast(self._start is not None):
             mesh = given_mesh(self.account.scene, system.comm)
@@ -204,10 +226,14 @@ class _Output:
                     if not self._fields:
                         where, total = (self.folder, self._order, self._mesh), len(scene.targets)
                         points = scene.output.fields == "points"
-                        self._fields = self._of_fields.FieldWriter(*where, total, after, points=points)
+                        self._fields = self._of_fields.FieldWriter(
+                            *where, total, after, points=points
+                        )
                     self._fields.write(m.at, fields)
                 if not self._contact:
-                    self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, account.fixed), after)
+                    self._contact = StepFile(
+                        self.folder / "contact.h5", _arrays(profiles, account.fixed), after
+                    )
                 self._contact.write(m.at, _arrays(profiles, account.per_step))
                 write_history(self.folder / "history.csv", account.columns(), self.steps)
                 self._report.add(step, warnings)
@@ -216,7 +242,8 @@ class _Output:
             self._on_root(write)
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
-        """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank 0. Collective."""
+        """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank
+        0. Collective."""
         ending["peak_memory"] = self.system.comm.gather(peak_memory())
         if self._fields:
             self._fields.end()
@@ -226,4 +253,8 @@ class _Output:
 
 def _arrays(profiles: Mapping[str, EdgeProfile], names: tuple[str, ...]) -> dict[str, Any]:
     """The arrays of all ``profiles`` that have these ``names``, as contact.h5 names them."""
-    return {f"{side}/{name}": getattr(profile, name) for side, profile in profiles.items() for name in names}
+    return {
+        f"{side}/{name}": getattr(profile, name)
+        for side, profile in profiles.items()
+        for name in names
+    }

@@ -26,18 +26,33 @@ from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
 from archord.solver.stepping import Step
 
-_INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
+_INSIDE_SOLVE = (
+    "return mapping",
+    "assemble force",
+    "contact",
+    "assemble bulk",
+    "assemble contact",
+    "assemble border",
+)
 
 
 class Report:
     """run.json of an ``account``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
-    ``steps`` are those of the run, also of the run that it goes on from, with the run.json ``before``; whoever appends
-    one to them calls `add`.
+    ``steps`` are those of the run, also of the run that it goes on from, with the run.json
+    ``before``; whoever appends one to them calls `add`.
     """
 
-    def __init__(self, path: Path, account: Account, begun: float, steps: list[Any], before: dict[str, Any]) -> None:
-        self.path, self.account, self.begun, self.steps, self._before = path, account, begun, steps, before
+    def __init__(
+        self, path: Path, account: Account, begun: float, steps: list[Any], before: dict[str, Any]
+    ) -> None:
+        self.path, self.account, self.begun, self.steps, self._before = (
+            path,
+            account,
+            begun,
+            steps,
+            before,
+        )
         self.system = account.system
         now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(steps), self.system.comm
         restart = {"when": now, "after_step": n + 1, "ranks": comm.size, "command": sys.argv}
@@ -48,7 +63,9 @@ class Report:
         warnings = [said for said in warnings if said not in map(str, told)]
         # the step after those done is noted once more
         self._told = {kind(one.said): one for one in told if one.first <= n}
-        self._others = [w for w in warnings if not w.startswith((f"step {n + 1}:", APART, WORK_OFF))]
+        self._others = [
+            w for w in warnings if not w.startswith((f"step {n + 1}:", APART, WORK_OFF))
+        ]
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
@@ -73,7 +90,8 @@ class Report:
         }
 
     def add(self, step: Step, warnings: Sequence[str]) -> None:
-        """Note how the last of the steps was reached, and what to warn of at it. Raises `OSError`."""
+        """Note how the last of the steps was reached, and what to warn of at it. Raises
+        `OSError`."""
         m = self.steps[-1]
         tell(self._told, m.step, warnings)
         cost = {
@@ -87,8 +105,8 @@ class Report:
         self.write()
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
-        """Note how the run ended, what else to warn of, and what its files are by then; returns all warnings. Raises
-        `OSError`."""
+        """Note how the run ended, what else to warn of, and what its files are by then; returns all
+        warnings. Raises `OSError`."""
         self.content |= _finite(ending)
         self._others += warnings
         self.content["files"] = seals_of(self.path.parent)
@@ -100,7 +118,8 @@ class Report:
         self.content["warnings"] = [*self._others, *map(str, self._told.values())]
         content = self.content | {
             "told": [asdict(one) for one in self._told.values()],
-            "linear_solver": self.system.equilibrium.choice.words(),  # a matrix may decide otherwise later
+            # a matrix may decide otherwise later
+            "linear_solver": self.system.equilibrium.choice.words(),
             "totals": self._totals(),
             "seconds": self._seconds(),
             "error_estimates": self._errors(),
@@ -108,7 +127,8 @@ class Report:
         replace_file(self.path, report_text(content))
 
     def unseal(self) -> None:
-        """Let run.json, as it was before, say nothing of files that are going to be written. Raises `OSError`."""
+        """Let run.json, as it was before, say nothing of files that are going to be written. Raises
+        `OSError`."""
         if "files" in self._before:
             before = {name: value for name, value in self._before.items() if name != "files"}
             replace_file(self.path, report_text(before))
@@ -118,8 +138,10 @@ class Report:
         return {
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
-            "factorisations": self.system.equilibrium.tangent.factorisations + before.get("factorisations", 0),
-            "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
+            "factorisations": self.system.equilibrium.tangent.factorisations
+            + before.get("factorisations", 0),
+            "residual_evaluations": counts.get("return mapping", 0)
+            + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.steps),
         }
 
@@ -149,15 +171,21 @@ class Report:
 def peak_memory() -> int:
     """The largest resident set of this process so far, in bytes.
 
-    Linux hands ``ru_maxrss`` down to the programs that a process starts; its own file of the process starts at zero.
+    Linux hands ``ru_maxrss`` down to the programs that a process starts; its own file of the
+    process starts at zero.
     """
     try:
-        _, _, after = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").partition("VmHWM:")
+        _, _, after = (
+            Path("/proc/self/status")
+            .read_text(encoding="ascii", errors="replace")
+            .partition("VmHWM:")
+        )
         return 1024 * int(after.split()[0])
     except (OSError, IndexError, ValueError):
         return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _finite(value: dict[str, Any]) -> dict[str, Any]:
-    """``value`` with null for numbers that are none, which JSON does not know (residuals of a solve that failed)."""
+    """``value`` with null for numbers that are none, which JSON does not know (residuals of a solve
+    that failed)."""
     return json.loads(json.dumps(value), parse_constant=lambda name: None)

@@ -1,4 +1,5 @@
-"""Files that a user names for results: checked before the work, and one sentence if they cannot be written."""
+"""Files that a user names for results: checked before the work, and one sentence if they cannot be
+written."""
 
 from __future__ import annotations
 
@@ -13,8 +14,9 @@ from archord.scene.errors import InputError
 
 
 def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True) -> None:
-    """Raise `InputError` if ``path`` cannot become a file: no folder for it, a folder itself, no permission, a file
-    that a run folder is made of, or one of the ``inputs`` of the command; without ``force`` also if it is there."""
+    """Raise `InputError` if ``path`` cannot become a file: no folder for it, a folder itself, no
+    permission, a file that a run folder is made of, or one of the ``inputs`` of the command;
+    without ``force`` also if it is there."""
     fault = None
     if not path.parent.is_dir():
         fault = f"{path.parent} is not a folder"
@@ -29,13 +31,16 @@ def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True)
     if fault:
         raise InputError(f"{path}: cannot be written: {fault}.")
     if path.is_file() and not force and not is_device(path):
-        raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
+        raise InputError(
+            f"{path}: is there already; choose another file, or overwrite it with --force."
+        )
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """A path to write to, which takes the place of ``path`` when all has gone well (`replacing`); else ``path`` is what
-    it was. Raises `InputError` as `check_target`, and for what the system refuses all the same."""
+    """A path to write to, which takes the place of ``path`` when all has gone well (`replacing`);
+    else ``path`` is what it was. Raises `InputError` as `check_target`, and for what the system
+    refuses all the same."""
     check_target(path)
     try:
         with replacing(path) as new:

@@ -1,5 +1,5 @@
-"""The bodies as fields.vtkhdf has them: Lagrange cells of the degree of the displacements, lines for the facets of
-contact surfaces, and on request a vertex for each integration point."""
+"""The bodies as fields.vtkhdf has them: Lagrange cells of the degree of the displacements, lines
+for the facets of contact surfaces, and on request a vertex for each integration point."""
 
 from __future__ import annotations
 
@@ -13,20 +13,28 @@ from archord.solver.mesh_order import Arrays, MeshOrder
 
 
 class BodyGrid:
-    """The ``grid`` of the mesh that `collect_mesh` returned as ``mesh``. ``second`` ``(m, 6 or 9)`` are the nodes of
-    second-order cells in its place, in basix' order. With ``points`` there is a vertex at every integration point."""
+    """The ``grid`` of the mesh that `collect_mesh` returned as ``mesh``. ``second`` ``(m, 6 or 9)``
+    are the nodes of second-order cells in its place, in basix' order. With ``points`` there is a
+    vertex at every integration point."""
 
     def __init__(self, order: MeshOrder, mesh: Arrays, second: np.ndarray, points: bool) -> None:
         self._nodes, self._second, self._points = order.nodes_of_cell, second, points
         m, n = self._nodes.shape
         kind, degree = cell_kind(n)
-        self._cell_of_facet, *trace = mesh["facets/nodes"].reshape(-1, degree + 2).astype(np.int64).T
-        self._facets = np.take_along_axis(self._nodes[self._cell_of_facet], np.transpose(trace), axis=1)
+        self._cell_of_facet, *trace = (
+            mesh["facets/nodes"].reshape(-1, degree + 2).astype(np.int64).T
+        )
+        self._facets = np.take_along_axis(
+            self._nodes[self._cell_of_facet], np.transpose(trace), axis=1
+        )
         self._from_second = tabulate(kind, 2, lagrange_element(kind, degree).points)[0]
         self._at_points = tabulate(kind, degree, bulk_quadrature(kind, degree)[0])[0]
         inner = np.arange(1, degree)
         x, corners = order.coordinates, len(lagrange_element(kind, 1).points)
-        cells = [(LAGRANGE[corners], in_vtk_order(self._nodes)), (LAGRANGE[2], self._facets[:, [0, -1, *inner]])]
+        cells = [
+            (LAGRANGE[corners], in_vtk_order(self._nodes)),
+            (LAGRANGE[2], self._facets[:, [0, -1, *inner]]),
+        ]
         owner = [np.arange(m), self._cell_of_facet]
         if points:
             places = mesh["points/coordinates"]
@@ -36,40 +44,67 @@ class BodyGrid:
         self.grid = Grid(x, cells, {"CellData/body": mesh["mesh/body"][np.concatenate(owner)]})
 
     def values(self, fields: Arrays, nodal: Arrays) -> Arrays:
-        """What `collect_fields` returned as VTKHDF names it, with ``nodal`` values of the second-order cells: "stress"
-        and "plastic_strain" ``(k, 4)``, "peeq" ``(k,)``.
+        """What `collect_fields` returned as VTKHDF names it, with ``nodal`` values of the
+        second-order cells: "stress" and "plastic_strain" ``(k, 4)``, "peeq" ``(k,)``.
 
         Tensors have VTK's components: xx, yy, zz, xy, yz, xz.
         """
-        at_nodes = {"displacement": _in_space(fields["displacement"]), "contact_pressure": self._pressure(fields)}
+        at_nodes = {
+            "displacement": _in_space(fields["displacement"]),
+            "contact_pressure": self._pressure(fields),
+        }
         at_nodes |= {name: self._on_nodes(values) for name, values in nodal.items()}
-        at_cells = {name: v for name, v in fields.items() if "/" not in name and name != "displacement"}
-        at_cells |= {name.removeprefix("cells/"): _symmetric(v) for name, v in fields.items() if "cells/" in name}
+        at_cells = {
+            name: v for name, v in fields.items() if "/" not in name and name != "displacement"
+        }
+        at_cells |= {
+            name.removeprefix("cells/"): _symmetric(v)
+            for name, v in fields.items()
+            if "cells/" in name
+        }
         force, length = np.moveaxis(self._forces(fields).sum(axis=1), -1, 0)
         at_facets = {name: values[self._cell_of_facet] for name, values in at_cells.items()}
         at_facets["contact_pressure"] = force / length
-        at_cells = {name: np.concatenate([values, at_facets[name]]) for name, values in at_cells.items()}
+        at_cells = {
+            name: np.concatenate([values, at_facets[name]]) for name, values in at_cells.items()
+        }
         if self._points:
             points = self._of_points(fields, list(nodal))
-            at_nodes = {name: np.concatenate([values, points[name]]) for name, values in at_nodes.items()}
-            at_cells = {name: np.concatenate([values, points[name]]) for name, values in at_cells.items()}
+            at_nodes = {
+                name: np.concatenate([values, points[name]]) for name, values in at_nodes.items()
+            }
+            at_cells = {
+                name: np.concatenate([values, points[name]]) for name, values in at_cells.items()
+            }
         found = {f"PointData/{name}": values for name, values in at_nodes.items()}
         return found | {f"CellData/{name}": values for name, values in at_cells.items()}
 
     def _of_points(self, fields: Arrays, names: list[str]) -> Arrays:
-        """The values ``(m q, ...)`` of the integration points, of which those called ``names`` are known."""
+        """The values ``(m q, ...)`` of the integration points, of which those called ``names`` are
+        known."""
         found = {name: fields[f"points/{name}"] for name in names}
-        found = {name: v.reshape(-1) if v.ndim == 2 else _symmetric(v.reshape(-1, 4)) for name, v in found.items()}
-        u = np.einsum("qa,mak->mqk", self._at_points, fields["displacement"][self._nodes]).reshape(-1, 2)
+        found = {
+            name: v.reshape(-1) if v.ndim == 2 else _symmetric(v.reshape(-1, 4))
+            for name, v in found.items()
+        }
+        u = np.einsum("qa,mak->mqk", self._at_points, fields["displacement"][self._nodes]).reshape(
+            -1, 2
+        )
         stress, nothing = fields["points/stress"].reshape(-1, 4), np.zeros(len(u))
-        found |= {"von_mises": von_mises(stress), "mean_stress": mean_stress(stress), "displacement": _in_space(u)}
+        found |= {
+            "von_mises": von_mises(stress),
+            "mean_stress": mean_stress(stress),
+            "displacement": _in_space(u),
+        }
         return found | {"contact_pressure": nothing, "contact_state": nothing}
 
     def _pressure(self, fields: Arrays) -> Array:
-        """Contact pressure ``(n,)`` of the nodes: their force over their share of the length, which is exact where the
-        pressure is linear; 0 off the contact surfaces."""
+        """Contact pressure ``(n,)`` of the nodes: their force over their share of the length, which
+        is exact where the pressure is linear; 0 off the contact surfaces."""
         force, length = np.zeros((2, self._nodes.max() + 1))
-        for whole, parts in zip((force, length), np.moveaxis(self._forces(fields), -1, 0), strict=True):
+        for whole, parts in zip(
+            (force, length), np.moveaxis(self._forces(fields), -1, 0), strict=True
+        ):
             np.add.at(whole, self._facets, parts)
         return np.divide(force, length, out=np.zeros_like(force), where=length > 0)
 

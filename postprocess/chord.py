@@ -1,9 +1,12 @@
-"""The contact pressure projected from the arc onto the chord from the deepest point to the edge of the contact.
+"""The contact pressure projected from the arc onto the chord from the deepest point to the edge of
+the contact.
 
-Hu et al., "A new model for elasto-plastic conformal contact between cylinders", eq. 15. A point at the angle ``phi``
-from the contact axis is projected along its radius onto the chord of length ``l = 2 R sin(eps/2)``, at
+Hu et al., "A new model for elasto-plastic conformal contact between cylinders", eq. 15. A point at
+the angle ``phi`` from the contact axis is projected along its radius onto the chord of length ``l =
+2 R sin(eps/2)``, at
 
-    x = R cos(eps/2) [ tan(phi - eps/2) + tan(eps/2) ],    dx = R dphi cos(eps/2)/cos^2(phi - eps/2),
+    x = R cos(eps/2) [ tan(phi - eps/2) + tan(eps/2) ],    dx = R dphi cos(eps/2)/cos^2(phi -
+    eps/2),
 
 and the pressure there carries the arc's vertical force, ``py dx = p cos(phi) R dphi``.
 """
@@ -24,10 +27,11 @@ from archord.scene.errors import InputError
 
 @dataclass(frozen=True)
 class ChordPressure:
-    """Vertical pressure on the chord of one half of the joint, at ``n`` points ordered from the contact axis.
+    """Vertical pressure on the chord of one half of the joint, at ``n`` points ordered from the
+    contact axis.
 
-    ``x`` runs from 0 at the deepest point to the ``length`` at the edge ``eps`` of the contact, and beyond where points
-    carry pressure there.
+    ``x`` runs from 0 at the deepest point to the ``length`` at the edge ``eps`` of the contact, and
+    beyond where points carry pressure there.
     """
 
     x: Array  # (n,)
@@ -53,47 +57,60 @@ class ChordPressure:
 
 
 def chord_coordinate(phi: ArrayLike, eps: float, R: float) -> Array:
-    """Chord coordinate ``x`` of the angle ``phi`` [rad], any shape; ``x(0) = 0`` and ``x(eps) = l``."""
+    """Chord coordinate ``x`` of the angle ``phi`` [rad], any shape; ``x(0) = 0`` and ``x(eps) =
+    l``."""
     return R * np.cos(eps / 2) * (np.tan(np.asarray(phi) - eps / 2) + np.tan(eps / 2))
 
 
 def arc_angle(x: ArrayLike, eps: float, R: float) -> Array:
-    """Angle ``phi`` [rad] that is projected to ``x``, any shape; the inverse of `chord_coordinate`."""
+    """Angle ``phi`` [rad] that is projected to ``x``, any shape; the inverse of
+    `chord_coordinate`."""
     return eps / 2 + np.arctan(np.asarray(x) / (R * np.cos(eps / 2)) - np.tan(eps / 2))
 
 
 def chord_projection(
     phi: ArrayLike, pressure: ArrayLike, eps: float, R: float, weight: ArrayLike | None = None
 ) -> ChordPressure:
-    """Project ``pressure`` at the rising angles ``phi`` [rad] from the contact axis onto the chord of ``eps`` (eq. 15).
+    """Project ``pressure`` at the rising angles ``phi`` [rad] from the contact axis onto the chord
+    of ``eps`` (eq. 15).
 
-    Arrays of one shape; ``weight`` is each point's share of arc length, by default that of the trapezoidal rule. The
-    resultant is that of the arc, whatever ``eps`` is: points beyond it stay as long as they carry pressure. Raises
-    ValueError for arrays that are no such arc, and for pressure beyond pi/2.
+    Arrays of one shape; ``weight`` is each point's share of arc length, by default that of the
+    trapezoidal rule. The resultant is that of the arc, whatever ``eps`` is: points beyond it stay
+    as long as they carry pressure. Raises ValueError for arrays that are no such arc, and for
+    pressure beyond pi/2.
     """
     angle, p = (np.ravel(np.asarray(values, float)) for values in (phi, pressure))
     gap = np.diff(angle) * R
     trapezoidal = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
     measure = trapezoidal if weight is None else np.ravel(np.asarray(weight, float))
     if not (0 < eps < np.pi and 0 < R < np.inf):
-        raise ValueError(f"the contact semi-angle {eps:g} must be between 0 and pi, the radius {R:g} positive.")
+        raise ValueError(
+            f"the contact semi-angle {eps:g} must be between 0 and pi, the radius {R:g} positive."
+        )
     if not 1 < len(angle) == len(p) == len(measure):
         raise ValueError("phi, pressure and weight must have the same length, two or more.")
     if not (angle[0] >= 0 and (gap >= 0).all() and np.isfinite(p).all()):
-        raise ValueError("phi must rise from the contact axis, from 0 or more, and the pressure must be finite.")
+        raise ValueError(
+            "phi must rise from the contact axis, from 0 or more, and the pressure must be finite."
+        )
     kept = (angle <= eps) | (p != 0)
     angle, p, measure = angle[kept], p[kept], measure[kept]
     if len(angle) and angle[-1] > np.pi / 2 * (1 + 1e-12):
         raise ValueError("the contact must end within pi/2 of the axis.")
     stretch = np.cos(eps / 2) / np.cos(angle - eps / 2) ** 2
-    return ChordPressure(chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, eps, R)
+    return ChordPressure(
+        chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, eps, R
+    )
 
 
-def read_chord_pressure(folder: str | Path, step: int | None = None, side: str | None = None) -> ChordPressure:
-    """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step`` of a run (the last).
+def read_chord_pressure(
+    folder: str | Path, step: int | None = None, side: str | None = None
+) -> ChordPressure:
+    """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step``
+    of a run (the last).
 
-    ``R`` is the side's own radius and ``eps`` the step's in history.csv. Raises `InputError` where there is no such
-    run, step or side, no contact angle, or one beyond pi/2 (a ring).
+    ``R`` is the side's own radius and ``eps`` the step's in history.csv. Raises `InputError` where
+    there is no such run, step or side, no contact angle, or one beyond pi/2 (a ring).
     """
     run = Run(folder)
     number, arc = run.number(step), run.arc(step, side)

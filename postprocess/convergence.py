@@ -1,7 +1,9 @@
-"""Orders of convergence and errors of discretisation, from results on several meshes or in steps of several lengths.
+"""Orders of convergence and errors of discretisation, from results on several meshes or in steps of
+several lengths.
 
-All assume ``f(h) = f(0) + C h^p`` (Richardson 1911). `Refined` extrapolates the curves of runs, with the order p of
-three meshes; `mesh_error` and `step_error` bound the error of a curve, for a solver that refines until it is small.
+All assume ``f(h) = f(0) + C h^p`` (Richardson 1911). `Refined` extrapolates the curves of runs,
+with the order p of three meshes; `mesh_error` and `step_error` bound the error of a curve, for a
+solver that refines until it is small.
 """
 
 from __future__ import annotations
@@ -22,20 +24,25 @@ from archord.scene.scene import Scene
 Curve = Sequence[float] | np.ndarray
 
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
-_LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
+_LOWEST, _HIGHEST = (
+    0.5,
+    2.0,
+)  # below, extrapolation multiplies noise; above, the error would be told too small
 _SHOWN = 0.05, 12.0  # orders that three meshes can show
 _SLOWEST = 1.5  # order that `mesh_error` takes at least
 _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
 
 
 def richardson(difference: Any, ratio: float, order: float) -> Any:
-    """Error of the finer of two results that differ by ``difference``, the element size by the factor ``ratio``."""
+    """Error of the finer of two results that differ by ``difference``, the element size by the
+    factor ``ratio``."""
     return difference / (ratio**order - 1)
 
 
 def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> float:
-    """Order p of three results of the rising ``sizes`` h, the two ``finer`` and the two ``coarser`` so far apart:
-    ``(h3^p - h2^p)/(h2^p - h1^p) = coarser/finer`` (Roache 1998, section 5.10); -inf below 0.05 and inf above 12."""
+    """Order p of three results of the rising ``sizes`` h, the two ``finer`` and the two ``coarser``
+    so far apart: ``(h3^p - h2^p)/(h2^p - h1^p) = coarser/finer`` (Roache 1998, section 5.10); -inf
+    below 0.05 and inf above 12."""
     from scipy.optimize import brentq
 
     h2, h3 = sizes[1] / sizes[0], sizes[2] / sizes[0]
@@ -66,24 +73,27 @@ class Refined:
         return (self.run, *self.coarser)
 
     def order(self, curves: Sequence[Array]) -> Order:
-        """Order of convergence of a curve, given on all meshes, finest first, each ``(n,)``: `observed_order` of the
-        three finest, from norms over their common steps, bounded to 0.5 .. 2. The first order is assumed with two
-        meshes, and where the differences have no common sign or do not shrink."""
+        """Order of convergence of a curve, given on all meshes, finest first, each ``(n,)``:
+        `observed_order` of the three finest, from norms over their common steps, bounded to 0.5 ..
+        2. The first order is assumed with two meshes, and where the differences have no common sign
+        or do not shrink."""
         found = math.inf
         if len(curves) > 2:
             n = min(map(len, curves[:3]))
             finer, coarser = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
             if finer @ coarser > 0:
                 sizes = [run.scene.joint.h for run in self.runs[:3]]
-                found = observed_order(sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser)))
+                found = observed_order(
+                    sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser))
+                )
         if not math.isfinite(found):
             return Order(_ASSUMED, f"{_ASSUMED:g} (assumed)")
         value = min(max(found, _LOWEST), _HIGHEST)
         return Order(value, f"{value:.2g} (from three meshes)")
 
     def shift(self, curves: Sequence[Array]) -> Array:
-        """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the next coarser run;
-        steps that run does not have get the relative shift of its last one."""
+        """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the
+        next coarser run; steps that run does not have get the relative shift of its last one."""
         fine, coarse = curves[:2]
         ratio = self.coarser[0].scene.joint.h / self.run.scene.joint.h
         n = min(len(fine), len(coarse))
@@ -93,8 +103,8 @@ class Refined:
 
 
 def group(runs: list[RunCurve]) -> list[Refined]:
-    """Runs of one scene that differ only in element size, together; in the order of the first of each. Raises
-    `InputError` for two runs of the same scene on the same mesh."""
+    """Runs of one scene that differ only in element size, together; in the order of the first of
+    each. Raises `InputError` for two runs of the same scene on the same mesh."""
     scenes: dict[tuple, list[RunCurve]] = {}
     for run in runs:
         scenes.setdefault(_without_mesh(run.scene), []).append(run)
@@ -102,7 +112,9 @@ def group(runs: list[RunCurve]) -> list[Refined]:
         same.sort(key=lambda run: run.scene.joint.h)
         for a, b in pairwise(same):
             if math.isclose(a.scene.joint.h, b.scene.joint.h, rel_tol=1e-9):
-                raise InputError(f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them.")
+                raise InputError(
+                    f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them."
+                )
     return [Refined(same[0], tuple(same[1:])) for same in scenes.values()]
 
 
@@ -111,23 +123,39 @@ def _without_mesh(scene: Scene) -> tuple:
     g, analysis = scene.joint, scene.analysis
     sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1])
     bodies = scene.pin.model_dump_json(), scene.block.model_dump_json()
-    how = analysis.plane, analysis.strain, analysis.kinematics, analysis.integration, f"{analysis.friction:.9g}"
-    return *(f"{size:.9g}" for size in sizes), *scene.load.stage_steps, "to", *scene.load.stages, *bodies, *how
+    how = (
+        analysis.plane,
+        analysis.strain,
+        analysis.kinematics,
+        analysis.integration,
+        f"{analysis.friction:.9g}",
+    )
+    return (
+        *(f"{size:.9g}" for size in sizes),
+        *scene.load.stage_steps,
+        "to",
+        *scene.load.stages,
+        *bodies,
+        *how,
+    )
 
 
 def difference(one: Curve, other: Curve, largest: float) -> float:
-    """The largest difference of two curves over ``largest``; where that is nothing, 0 if they agree and 1 if not."""
+    """The largest difference of two curves over ``largest``; where that is nothing, 0 if they agree
+    and 1 if not."""
     apart = float(np.abs(np.subtract(one, other)).max())
     return apart / largest if largest else float(apart > 0)
 
 
 def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST) -> float | None:
-    """Relative error of the last of ``curves``, from coarse to fine, the element size falling by ``ratio`` each time.
+    """Relative error of the last of ``curves``, from coarse to fine, the element size falling by
+    ``ratio`` each time.
 
-    A curve is one number for each output step. The order of joints is 3 in the mean, but differences scatter by a
-    factor of two or three, as the contact ends anywhere in an element. So `richardson` takes the order of the last two
-    within 1.5 and ``highest``, which it is with one difference; and where the last one is small by luck, the one
-    before, at order 3, says what the error is at least. None with one curve.
+    A curve is one number for each output step. The order of joints is 3 in the mean, but
+    differences scatter by a factor of two or three, as the contact ends anywhere in an element. So
+    `richardson` takes the order of the last two within 1.5 and ``highest``, which it is with one
+    difference; and where the last one is small by luck, the one before, at order 3, says what the
+    error is at least. None with one curve.
     """
     if len(curves) < 2:
         return None
@@ -141,6 +169,6 @@ def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST)
 
 
 def step_error(coarse: Curve, fine: Curve) -> float:
-    """Relative error of ``fine``, whose steps are half as long as those of ``coarse``: their difference, as backward
-    Euler is of first order."""
+    """Relative error of ``fine``, whose steps are half as long as those of ``coarse``: their
+    difference, as backward Euler is of first order."""
     return difference(coarse, fine, float(np.abs(fine).max()))

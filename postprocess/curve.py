@@ -16,7 +16,8 @@ _SAME = 1e-6  # relative difference of two forces that are the same but for what
 
 @dataclass(frozen=True)
 class RunCurve:
-    """Accepted steps of a run, in the scene's units: arrays ``(n,)`` over the steps. Forces are per unit thickness."""
+    """Accepted steps of a run, in the scene's units: arrays ``(n,)`` over the steps. Forces are per
+    unit thickness."""
 
     name: str
     scene: Scene
@@ -45,7 +46,10 @@ class RunCurve:
     @property
     def sigY(self) -> float | None:
         """Yield stress of the weaker body; None if neither yields."""
-        return min((s.yield_stress for s in self.scene.solids.values() if s.yield_stress is not None), default=None)
+        return min(
+            (s.yield_stress for s in self.scene.solids.values() if s.yield_stress is not None),
+            default=None,
+        )
 
     @property
     def plane(self) -> str:
@@ -53,10 +57,12 @@ class RunCurve:
         return self.scene.analysis.plane
 
     def loading(self) -> RunCurve:
-        """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out.
+        """The steps at which the pin is deeper in the hole than ever before; unloading and what it
+        repeats left out.
 
-        A joint that yields comes back from unloading a little deeper and softer, to the first loading's curve only
-        beyond: the first step that counts again is one whose P is larger than ever before, too.
+        A joint that yields comes back from unloading a little deeper and softer, to the first
+        loading's curve only beyond: the first step that counts again is one whose P is larger than
+        ever before, too.
         """
         first = on_first_loading(self.delta, self.P)
         return replace(self, **{name: getattr(self, name)[first] for name in CURVES})
@@ -66,7 +72,9 @@ def on_first_loading(delta: Array, P: Array) -> np.ndarray:
     """Whether each of the steps ``(n,)`` is one of `RunCurve.loading`."""
     deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (delta, P))
     first, going_on = [], True
-    for deeper, stronger in zip(delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < P, strict=True):
+    for deeper, stronger in zip(
+        delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < P, strict=True
+    ):
         going_on = bool(deeper and (going_on or stronger))
         first.append(going_on)
     return np.array(first, dtype=bool)
@@ -79,5 +87,6 @@ def first_loading(load: Array) -> slice:
 
 
 def gap_name(dR: float, symbol: str = "dR") -> str:
-    """A clearance as it stands in names of quantities: of its size alone, where it is an interference."""
+    """A clearance as it stands in names of quantities: of its size alone, where it is an
+    interference."""
     return symbol if dR > 0 else f"|{symbol}|"

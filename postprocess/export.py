@@ -1,8 +1,9 @@
-"""A run as files for other programs: CSV tables for anything, and .vtkhdf files for VTK's readers (ParaView, pyvista).
+"""A run as files for other programs: CSV tables for anything, and .vtkhdf files for VTK's readers
+(ParaView, pyvista).
 
-In VTK the bodies keep their curved second-order cells, as fields.h5 has them. The contact is a line through the
-integration points of each facet, undeformed like the mesh, with the displacement of the points, so that the same
-filters deform both.
+In VTK the bodies keep their curved second-order cells, as fields.h5 has them. The contact is a line
+through the integration points of each facet, undeformed like the mesh, with the displacement of the
+points, so that the same filters deform both.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
 def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
-    """Write history.csv and contact.csv (`Run.pressure` of all steps), headed ``name [unit]``, into ``folder``; returns
-    the files. Raises `InputError` if the run has no accepted step, a file of it is damaged, or one that would be
-    written is there already and ``force`` is not given."""
+    """Write history.csv and contact.csv (`Run.pressure` of all steps), headed ``name [unit]``, into
+    ``folder``; returns the files. Raises `InputError` if the run has no accepted step, a file of it
+    is damaged, or one that would be written is there already and ``force`` is not given."""
     import pandas as pd
 
     from archord.postprocess.frames import with_headings
@@ -35,7 +36,9 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
         names = ["step", "delta" if run.is_joint else "load_factor"]
         steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
         contact = pd.concat(steps, names=names).reset_index(level=[0, 1])
-        contact.attrs["units"] = run.pressure().attrs["units"] | {n: run.units[n] for n in names if n in run.units}
+        contact.attrs["units"] = run.pressure().attrs["units"] | {
+            n: run.units[n] for n in names if n in run.units
+        }
         tables[folder / "contact.csv"] = contact
     _check_new(tables, folder, force)
     for file, table in tables.items():
@@ -44,12 +47,16 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
     return list(tables)
 
 
-def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
-    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the bodies' first. Time is
-    delta, or the load factor; the number of the step, where that does not only grow. Raises `InputError` as
-    `export_csv`, and if the run wrote no fields."""
+def export_vtk(
+    run: Run, folder: Path, step: int | None = None, *, force: bool = False
+) -> list[Path]:
+    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the
+    bodies' first. Time is delta, or the load factor; the number of the step, where that does not
+    only grow. Raises `InputError` as `export_csv`, and if the run wrote no fields."""
     steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)
-    parts = {"bodies": _bodies(run, steps[-1])} | ({"contact": _contact(run, steps[-1])} if run.has_contact else {})
+    parts = {"bodies": _bodies(run, steps[-1])} | (
+        {"contact": _contact(run, steps[-1])} if run.has_contact else {}
+    )
     files = {folder / f"{name}.vtkhdf": part for name, part in parts.items()}
     _check_new(files, folder, force)
     at = [times(run.path)[n - 1] for n in steps]
@@ -65,7 +72,9 @@ def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     """All bodies, and their data at a step."""
     mesh = run.fields(step)
     grid = Grid(
-        _in_space(mesh.coordinates), [(SECOND_ORDER[mesh.cells.shape[1]], mesh.cells)], {"CellData/body": mesh.body}
+        _in_space(mesh.coordinates),
+        [(SECOND_ORDER[mesh.cells.shape[1]], mesh.cells)],
+        {"CellData/body": mesh.body},
     )
 
     def values(step: int) -> Arrays:
@@ -78,8 +87,8 @@ def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
 
 
 def _contact(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
-    """The integration points of the arcs, joined by lines within each facet, and their data at a step; ``side`` is 1 on
-    the pin and 2 on the hole, or counts the surfaces."""
+    """The integration points of the arcs, joined by lines within each facet, and their data at a
+    step; ``side`` is 1 on the pin and 2 on the hole, or counts the surfaces."""
     table = run.pressure(step)
     sides = ["pin", "hole"] if run.is_joint else list(table["side"].unique())
     facet, side = table["facet"].to_numpy(), table["side"].map(sides.index).to_numpy(np.int8) + 1

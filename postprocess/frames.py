@@ -26,15 +26,20 @@ def frame_of(columns: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataFra
 
 def with_headings(frame: pd.DataFrame) -> pd.DataFrame:
     """A copy of ``frame`` whose columns are headed ``name [unit]``, as archord's CSV files are."""
-    return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in frame.attrs["units"].items()})
+    return frame.rename(
+        columns={name: f"{name} [{unit}]" for name, unit in frame.attrs["units"].items()}
+    )
 
 
 def read_frame(path: Path) -> pd.DataFrame:
-    """The table in a CSV file whose columns are headed ``name [unit]``, by names; a last row that does not end in a
-    line break (a copy cut short) is ignored. Raises `OSError`, and `ValueError` if it is no table."""
+    """The table in a CSV file whose columns are headed ``name [unit]``, by names; a last row that
+    does not end in a line break (a copy cut short) is ignored. Raises `OSError`, and `ValueError`
+    if it is no table."""
     text = require_file(path).read_bytes().decode()
     whole = io.StringIO(text[: text.rfind("\n") + 1])
-    table = pd.read_csv(whole, dtype=_TEXT, keep_default_na=False, na_values=[""], float_precision="round_trip")
+    table = pd.read_csv(
+        whole, dtype=_TEXT, keep_default_na=False, na_values=[""], float_precision="round_trip"
+    )
     if not isinstance(table.index, pd.RangeIndex):
         raise ValueError("rows are longer than the headings")
     if "message" in table:
@@ -45,10 +50,11 @@ def read_frame(path: Path) -> pd.DataFrame:
 
 
 def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
-    """The points of the arcs by side and, of joints, by angle from the contact axis; x and y are undeformed.
+    """The points of the arcs by side and, of joints, by angle from the contact axis; x and y are
+    undeformed.
 
-    ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both positive in compression;
-    ``weight`` is arc length; ``gap`` is positive when open.
+    ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both
+    positive in compression; ``weight`` is arc length; ``gap`` is positive when open.
     """
     units = dict.fromkeys(("s", "weight", "gap", "x", "y", "ux", "uy"), scene.units.length)
     units |= {"angle": "rad"} | dict.fromkeys(("pressure", "raw_pressure"), scene.units.stress)
@@ -59,5 +65,9 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
         columns = {"facet": np.broadcast_to(np.arange(1, len(x) + 1)[:, None], x.shape)}
         columns |= {name: getattr(arc, name) for name in _OF_POINTS if hasattr(arc, name)}
         columns |= {"x": x, "y": y, "ux": ux, "uy": uy}
-        parts.append(pd.DataFrame({"side": side} | {name: values.ravel() for name, values in columns.items()}))
+        parts.append(
+            pd.DataFrame(
+                {"side": side} | {name: values.ravel() for name, values in columns.items()}
+            )
+        )
     return frame_of(pd.concat(parts, ignore_index=True), units)

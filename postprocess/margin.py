@@ -4,17 +4,19 @@ Margins are ``MS = allowable / applied - 1``. Forces are those of the whole lug,
 per unit thickness where the scene has none. The applied force is ``load`` for the yield margins and
 ``load * factor`` for the ultimate ones.
 
-By hand, of a plate of width ``W``, edge distance ``e``, thickness ``t``, with a hole of diameter ``D`` and a pin of
-diameter ``d``, or a bushing pressed in (``d = D``), and the proof strength or the tensile strength for ``f``:
+By hand, of a plate of width ``W``, edge distance ``e``, thickness ``t``, with a hole of diameter
+``D`` and a pin of diameter ``d``, or a bushing pressed in (``d = D``), and the proof strength or
+the tensile strength for ``f``:
 
     net section   f (W - D) t
     bearing       1.5 f d t                               EN 1993-1-8, table 3.10
     shear-out     2 (e - D/2 cos 40 deg) t f / sqrt(3)    Bruhn 1973, chapter D1
 
-By finite elements the allowable is the largest force that the run had reached when the PEEQ of the lug passed a limit.
+By finite elements the allowable is the largest force that the run had reached when the PEEQ of the
+lug passed a limit.
 
-Each plate of a clevis is such a lug. Its forces are those of the whole clevis there: ``t`` is the thickness of the
-inner plate, and of both outer plates together.
+Each plate of a clevis is such a lug. Its forces are those of the whole clevis there: ``t`` is the
+thickness of the inner plate, and of both outer plates together.
 """
 
 from __future__ import annotations
@@ -42,8 +44,9 @@ _BEARING = 1.5
 
 @dataclass(frozen=True)
 class Check:
-    """One allowable: ``kind`` is "yield" or "ultimate", ``by`` is "hand" or "FE", ``bound`` tells that the run did not
-    reach it, so that the ``allowable`` is the largest force that was solved."""
+    """One allowable: ``kind`` is "yield" or "ultimate", ``by`` is "hand" or "FE", ``bound`` tells
+    that the run did not reach it, so that the ``allowable`` is the largest force that was
+    solved."""
 
     kind: str
     by: str
@@ -54,7 +57,8 @@ class Check:
 
     @property
     def margin(self) -> float | None:
-        """``allowable / applied - 1``, at least that much of a bound; None where the run tells nothing of it."""
+        """``allowable / applied - 1``, at least that much of a bound; None where the run tells
+        nothing of it."""
         if self.bound and self.allowable < self.applied:
             return None
         return self.allowable / self.applied - 1
@@ -62,8 +66,9 @@ class Check:
 
 @dataclass(frozen=True)
 class Margins:
-    """The ``checks`` of a lug under a ``load``, the ``strengths`` that the hand formulas used, with a word on each, and
-    ``notes``: what is assumed, and what the run cannot tell. ``plate`` is the plate of a clevis, "" for a lug."""
+    """The ``checks`` of a lug under a ``load``, the ``strengths`` that the hand formulas used, with
+    a word on each, and ``notes``: what is assumed, and what the run cannot tell. ``plate`` is the
+    plate of a clevis, "" for a lug."""
 
     load: float
     factor: float
@@ -82,8 +87,9 @@ class Margins:
 
 @dataclass(frozen=True)
 class _Lug:
-    """One lug of a run: its ``shape``, its ``body``, the load that pulls it, the ``thickness`` of all plates of its
-    kind, and what its column of forces is multiplied by for the force on the whole, in the ``unit``."""
+    """One lug of a run: its ``shape``, its ``body``, the load that pulls it, the ``thickness`` of
+    all plates of its kind, and what its column of forces is multiplied by for the force on the
+    whole, in the ``unit``."""
 
     shape: LugShape
     body: Any
@@ -94,7 +100,8 @@ class _Lug:
 
 
 def plates_of(run: Run) -> list[str]:
-    """What `margins` takes for ``plate``: the plates of a clevis, "" alone for a lug. Raises `InputError`."""
+    """What `margins` takes for ``plate``: the plates of a clevis, "" alone for a lug. Raises
+    `InputError`."""
     return list(_lugs_of(run))
 
 
@@ -116,7 +123,8 @@ def margins(
     run : Run
         a run of a [lug] or a [clevis], or of a general scene on the shape of one
     load : float
-        force on the whole lug, positive, in the unit of history.csv; on a whole clevis in its unit of force
+        force on the whole lug, positive, in the unit of history.csv; on a whole clevis in its unit
+        of force
     plate : str
         "inner" or "outer" of a clevis
     factor : float
@@ -124,10 +132,11 @@ def margins(
     proof, tensile : float, optional
         strengths of the hand formulas; those of the run's hardening curve if absent
     yield_peeq, ultimate_peeq : float
-        largest PEEQ of the lug at the yield load and at the ultimate load; the latter is the end of the hardening
-        curve if absent
+        largest PEEQ of the lug at the yield load and at the ultimate load; the latter is the end of
+        the hardening curve if absent
 
-    Raises `InputError` for other runs, for numbers that are not positive, and for an elastic lug without strengths.
+    Raises `InputError` for other runs, for numbers that are not positive, and for an elastic lug
+    without strengths.
     """
     given = {"--load": load, "--factor": factor, "--proof": proof, "--tensile": tensile}
     given |= {"--yield-peeq": yield_peeq, "--ultimate-peeq": ultimate_peeq}
@@ -136,7 +145,11 @@ def margins(
             raise InputError(f"{name} {value:g}: must be a positive number.")
     lugs = _lugs_of(run)
     if plate not in lugs:
-        fault = "is for a clevis, and this run is one of a lug" if "" in lugs else "must be inner or outer"
+        fault = (
+            "is for a clevis, and this run is one of a lug"
+            if "" in lugs
+            else "must be inner or outer"
+        )
         raise InputError(f"--plate {plate!r}: {fault}.")
     lug = lugs[plate]
     strengths = _strengths(run, lug.body, proof, tensile)
@@ -149,7 +162,9 @@ def margins(
     bears = "hole" if lug.shape.wall else "pin"
     notes = [f"bearing by hand is {_BEARING:g} times the strength on the diameter of the {bears}"]
     if lug.body.yield_stress is None:
-        notes.append("the lug of this run is elastic: it has no yield, and no margins by finite elements")
+        notes.append(
+            "the lug of this run is elastic: it has no yield, and no margins by finite elements"
+        )
     else:
         last = _end_of_curve(lug.body) if ultimate_peeq is None else ultimate_peeq
         force = np.asarray(run.columns[f"{lug.pull} force"]) * lug.factor
@@ -163,14 +178,16 @@ def margins(
 def _by_elements(
     force: Array, peeq: Array, applied: dict[str, float], yields: float, breaks: float | None
 ) -> tuple[list[Check], list[str]]:
-    """The checks of the steps' forces ``(n,)`` and largest PEEQ ``(n,)`` against the PEEQ at which the lug ``yields``
-    and ``breaks``, and notes on them."""
+    """The checks of the steps' forces ``(n,)`` and largest PEEQ ``(n,)`` against the PEEQ at which
+    the lug ``yields`` and ``breaks``, and notes on them."""
     limits = [("yield", "first yield", 0.0), ("yield", f"PEEQ of {yields:.3g}", yields)]
     notes = ["first yield is local, at the hole, and no failure"]
     if peeq[0] > 0:
         notes.append("the lug yields within the first step: shorter steps tell at what force")
     if breaks is None:
-        notes.append("no PEEQ is known at which the lug breaks, as its curve has no end: give --ultimate-peeq")
+        notes.append(
+            "no PEEQ is known at which the lug breaks, as its curve has no end: give --ultimate-peeq"
+        )
     else:
         limits.append(("ultimate", f"PEEQ of {breaks:.3g}", breaks))
     checks = []
@@ -186,7 +203,8 @@ def _by_elements(
 
 
 def by_hand(lug: LugShape, strength: float, thickness: float) -> dict[str, float]:
-    """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin or the bushing."""
+    """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin
+    or the bushing."""
     edge, bore = lug.arguments()["edge_distance"], lug.hole
     bearing = bore if lug.wall else lug.radius
     planes = 2 * (edge - bore * math.cos(_SPREAD))
@@ -198,9 +216,10 @@ def by_hand(lug: LugShape, strength: float, thickness: float) -> dict[str, float
 
 
 def load_at(force: Array, peeq: Array, limit: float) -> tuple[float, bool]:
-    """The largest of the forces ``(n,)``, step by step, until the PEEQ ``(n,)`` passes the ``limit``, and whether it
-    does. Of the step in which it does the force is interpolated if it rises to a new largest one; at the limit 0 the
-    step before counts, as there is no telling where within a step yielding begins."""
+    """The largest of the forces ``(n,)``, step by step, until the PEEQ ``(n,)`` passes the
+    ``limit``, and whether it does. Of the step in which it does the force is interpolated if it
+    rises to a new largest one; at the limit 0 the step before counts, as there is no telling where
+    within a step yielding begins."""
     passed = np.flatnonzero(peeq > limit)
     if not len(passed):
         return float(force.max()), False
@@ -215,7 +234,8 @@ def load_at(force: Array, peeq: Array, limit: float) -> tuple[float, bool]:
 
 
 def proof_strength(solid: Solid) -> float:
-    """The engineering stress at a plastic strain of 0.2 %, or first yield where that is higher, as with a plateau."""
+    """The engineering stress at a plastic strain of 0.2 %, or first yield where that is higher, as
+    with a plateau."""
     law, first = solid.law, float(solid.yield_stress or 0.0)
     true = float(law.stress(np.array([PROOF]))[0])
     return max(first, true * math.exp(-PROOF - true / solid.E))
@@ -228,8 +248,11 @@ def tensile_strength(solid: Solid) -> float:
     return max(proof_strength(solid), float((true * np.exp(-peeq - true / solid.E)).max()))
 
 
-def _strengths(run: Run, plate: Solid, proof: float | None, tensile: float | None) -> dict[str, tuple[float, str]]:
-    """The strengths of the hand formulas by kind of margin, and where they are from. Raises `InputError`."""
+def _strengths(
+    run: Run, plate: Solid, proof: float | None, tensile: float | None
+) -> dict[str, tuple[float, str]]:
+    """The strengths of the hand formulas by kind of margin, and where they are from. Raises
+    `InputError`."""
     if plate.yield_stress is None:
         if proof is None and tensile is None:
             raise InputError(
@@ -244,7 +267,9 @@ def _strengths(run: Run, plate: Solid, proof: float | None, tensile: float | Non
             "--tensile."
         )
     found = {"yield": (proof, "given")} if proof else {}
-    found = found or {"yield": (proof_strength(plate), "at 0.2 % plastic strain of the run's curve")}
+    found = found or {
+        "yield": (proof_strength(plate), "at 0.2 % plastic strain of the run's curve")
+    }
     highest = "the largest engineering stress of the run's curve"
     if plate.perfectly_plastic:
         highest = "the yield stress, as the run is perfectly plastic; --tensile gives another"
@@ -262,14 +287,20 @@ def _end_of_curve(plate: Solid) -> float | None:
 
 
 def _lugs_of(run: Run) -> dict[str, _Lug]:
-    """The lugs of a run: the inner and the outer plate of a clevis, or "". Raises `InputError` for other runs, and
-    where no load pulls."""
+    """The lugs of a run: the inner and the outer plate of a clevis, or "". Raises `InputError` for
+    other runs, and where no load pulls."""
     shape = getattr(getattr(run.scene, "mesh", None), "shape", None)
     kind = getattr(shape, "kind", "")
     if kind not in ("lug", "clevis"):
-        raise InputError(f"{run.folder}: is no run of a [lug] or a [clevis], whose sections the hand formulas know.")
+        raise InputError(
+            f"{run.folder}: is no run of a [lug] or a [clevis], whose sections the hand formulas know."
+        )
     run.number(None)
-    lugs = {"": _lug_of(run)} if kind == "lug" else {name: _plate_of(run, name) for name in ("inner", "outer")}
+    lugs = (
+        {"": _lug_of(run)}
+        if kind == "lug"
+        else {name: _plate_of(run, name) for name in ("inner", "outer")}
+    )
     for lug in lugs.values():
         if max(run.columns[f"{lug.pull} force"]) <= 0:
             raise InputError(
@@ -283,20 +314,28 @@ def _lug_of(run: Run) -> _Lug:
     pulls = [load.name for load in run.scene.load if load.direction == "x"]
     if len(pulls) != 1 or len(run.scene.load) != 1:
         names = ", ".join(load.name for load in run.scene.load)
-        raise InputError(f"{run.folder}: is loaded by {names}; the hand formulas are for one load along the lug, in x.")
+        raise InputError(
+            f"{run.folder}: is loaded by {names}; the hand formulas are for one load along the lug, in x."
+        )
     unit = run.units[f"{pulls[0]} force"]
-    return _Lug(run.scene.mesh.shape, _body_of(run, "lug"), pulls[0], run.scene.thickness, 1.0, unit)
+    return _Lug(
+        run.scene.mesh.shape, _body_of(run, "lug"), pulls[0], run.scene.thickness, 1.0, unit
+    )
 
 
 def _plate_of(run: Run, name: str) -> _Lug:
-    """The inner or the outer plate of a run of a [clevis]; its columns of forces are per unit of its thickness. Raises
-    `InputError`."""
+    """The inner or the outer plate of a run of a [clevis]; its columns of forces are per unit of
+    its thickness. Raises `InputError`."""
     pull, shape = f"{name} pull", run.scene.mesh.shape
     drawn = getattr(shape, name)
     if {load.name for load in run.scene.load} != {"inner pull", "outer pull"}:
-        raise InputError(f"{run.folder}: margins of a clevis are for its loads 'inner pull' and 'outer pull' alone.")
+        raise InputError(
+            f"{run.folder}: margins of a clevis are for its loads 'inner pull' and 'outer pull' alone."
+        )
     if drawn.thickness is None:
-        raise InputError(f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it again.")
+        raise InputError(
+            f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it again."
+        )
     number = {"inner": 1, "outer": 2}[name]
     together = number * drawn.thickness
     lug = LugShape(radius=shape.radius, clearance=shape.clearance, **drawn.outline(shape))
@@ -309,7 +348,9 @@ def _body_of(run: Run, cells: str) -> Any:
 
 def margin_text(found: Margins) -> str:
     """The margins as tables, with the assumptions."""
-    ultimate = f", ultimate load {found.load * found.factor:g} {found.unit}" if found.factor != 1 else ""
+    ultimate = (
+        f", ultimate load {found.load * found.factor:g} {found.unit}" if found.factor != 1 else ""
+    )
     title = f"{found.plate} plate: " if found.plate else ""
     lines = [f"{title}load {found.load:g} {found.unit}{ultimate}; MS = allowable / applied - 1"]
     for kind, (strength, source) in found.strengths.items():
@@ -332,5 +373,8 @@ def margin_text(found: Margins) -> str:
 
 
 def _compared(found: Margins, kind: str) -> Check | None:
-    """The criterion of finite elements beside a hand formula: the last, as first yield is none of a section."""
-    return next((check for check in reversed(found.checks) if (check.kind, check.by) == (kind, "FE")), None)
+    """The criterion of finite elements beside a hand formula: the last, as first yield is none of a
+    section."""
+    return next(
+        (check for check in reversed(found.checks) if (check.kind, check.by) == (kind, "FE")), None
+    )

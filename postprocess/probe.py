@@ -1,5 +1,5 @@
-"""A quantity along a named edge or a line of a run: its largest and smallest value, and where, and its factor over a
-section."""
+"""A quantity along a named edge or a line of a run: its largest and smallest value, and where, and
+its factor over a section."""
 
 from __future__ import annotations
 
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 
     from archord.postprocess.run import Run
 
-_CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap", "contact_shear": "shear"}
+_CONTACT = {
+    "pressure": "pressure",
+    "facet_pressure": "pressure",
+    "gap": "gap",
+    "contact_shear": "shear",
+}
 _UNITLESS = ("peeq", "plastic")  # beginnings of names
 _GAP = 0.3  # degrees: the least gap in a circle
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
@@ -30,8 +35,9 @@ _SAMPLES = 201  # on a line
 
 @dataclass(frozen=True)
 class Probe:
-    """A ``quantity`` at ``n`` points of the edge or line ``place`` at a ``step``, in the scene's units; ``force`` is
-    the largest of those that drive the run then, per unit thickness, that of the load ``by``."""
+    """A ``quantity`` at ``n`` points of the edge or line ``place`` at a ``step``, in the scene's
+    units; ``force`` is the largest of those that drive the run then, per unit thickness, that of
+    the load ``by``."""
 
     place: str
     quantity: str
@@ -40,10 +46,13 @@ class Probe:
     force: float
     by: str
     x: Array  # (n, 2) undeformed
-    s: Array  # (n,) along each piece of the edge, the body on its left; of arcs the radius times the angle
+    # (n,) along each piece of the edge, the body on its left; of arcs the radius times the angle
+    s: Array
     values: Array  # (n,)
     length: str = ""  # the unit of x and s
-    angle: Array | None = None  # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
+    angle: Array | None = (
+        None  # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
+    )
 
     @property
     def largest(self) -> int:
@@ -56,7 +65,8 @@ class Probe:
         return int(np.argmin(self.values))
 
     def where(self, k: int) -> str:
-        """The place of point ``k`` in words: its angle, or how far along the edge or line it is; and x and y."""
+        """The place of point ``k`` in words: its angle, or how far along the edge or line it is;
+        and x and y."""
         along = f"s = {self.s[k]:.6g}" if self.angle is None else f"{self.angle[k]:.4g}°"
         return f"at {along}, x = {self.x[k, 0]:.6g}, y = {self.x[k, 1]:.6g}"
 
@@ -70,27 +80,41 @@ class Probe:
         raise InputError(f"{self.place}: has no point at {angle:g} degrees.")
 
     def over(self, length: float) -> Probe:
-        """This over P / ``length``, the mean stress that the force makes in a section. Raises `InputError`."""
+        """This over P / ``length``, the mean stress that the force makes in a section. Raises
+        `InputError`."""
         if not (self.force and length > 0):
             section = f"a section of {length:g} under a force of {self.force:g}"
             raise InputError(f"{self.place}: has no factor over {section}.")
-        return replace(self, quantity=f"{self.quantity}/(P/L)", unit="", values=self.values / (self.force / length))
+        return replace(
+            self,
+            quantity=f"{self.quantity}/(P/L)",
+            unit="",
+            values=self.values / (self.force / length),
+        )
 
     def frame(self) -> pd.DataFrame:
         """As a table."""
         from archord.postprocess.frames import frame_of
 
-        columns = {"s": self.s, "angle": self.angle, "x": self.x[:, 0], "y": self.x[:, 1], self.quantity: self.values}
+        columns = {
+            "s": self.s,
+            "angle": self.angle,
+            "x": self.x[:, 0],
+            "y": self.x[:, 1],
+            self.quantity: self.values,
+        }
         known = {name: values for name, values in columns.items() if values is not None}
         return frame_of(known, {"angle": "°", self.quantity: self.unit})
 
 
 def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) -> Probe:
-    """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises `InputError`.
+    """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises
+    `InputError`.
 
-    At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field; at the integration
-    points of a surface "pressure", "gap" or, with friction, "contact_shear", or "facet_pressure", the mean of each
-    facet, which scatters less where bodies yield. On a line a nodal field (von Mises stress), linear between nodes.
+    At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field;
+    at the integration points of a surface "pressure", "gap" or, with friction, "contact_shear", or
+    "facet_pressure", the mean of each facet, which scatters less where bodies yield. On a line a
+    nodal field (von Mises stress), linear between nodes.
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
@@ -98,15 +122,31 @@ def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) 
     along = _contact if quantity in _CONTACT else _stress
     points = _inside(run, line, quantity, step) if line else along(run, edge, quantity, step)
     unit = run.scene.units.length if quantity in ("ux", "uy", "gap") else run.scene.units.stress
-    unit = "rad" if quantity == "principal_angle" else "" if quantity.startswith(_UNITLESS) else unit
+    unit = (
+        "rad" if quantity == "principal_angle" else "" if quantity.startswith(_UNITLESS) else unit
+    )
     x, s, values, *angle = points
     of_arc = angle[0] if angle else None
     force, by = _driving(run, step)
-    return Probe(edge or "line", quantity, unit, step, force, by, x, s, values, run.scene.units.length, of_arc)
+    return Probe(
+        edge or "line",
+        quantity,
+        unit,
+        step,
+        force,
+        by,
+        x,
+        s,
+        values,
+        run.scene.units.length,
+        of_arc,
+    )
 
 
 def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
-    from archord.geometry.curve import circle_through  # with bases, which most readers of runs do without
+    from archord.geometry.curve import (
+        circle_through,
+    )  # with bases, which most readers of runs do without
 
     arc = run.arc(step, edge)
     values = getattr(arc, _CONTACT[quantity])
@@ -131,7 +171,9 @@ def _stress(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
     fields = run.fields(step)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:
-        raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {', '.join(edges) or 'none'}.")
+        raise InputError(
+            f"{run.folder}: has no edge {edge!r}; its edges are {', '.join(edges) or 'none'}."
+        )
     rows, s, radius = _along(fields, edge)
     tangent, joined = _tangents(fields.coordinates[rows], rows)
     stresses = {}
@@ -139,7 +181,11 @@ def _stress(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
         xx, yy, _, xy = np.moveaxis(fields.stress[rows], -1, 0)
         c, d = np.moveaxis(tangent, -1, 0)
         hoop = xx * c**2 + yy * d**2 + 2 * xy * c * d
-        stresses = {"hoop": hoop, "normal": xx + yy - hoop, "shear": (yy - xx) * c * d + xy * (c**2 - d**2)}
+        stresses = {
+            "hoop": hoop,
+            "normal": xx + yy - hoop,
+            "shear": (yy - xx) * c * d + xy * (c**2 - d**2),
+        }
     shown = np.ones(rows.shape, dtype=bool)
     shown[:, 2] = ~joined
     values = _nodal(run, fields, quantity, rows, **stresses)
@@ -156,7 +202,9 @@ def _inside(run: Run, line: Sequence[float], quantity: str, step: int) -> tuple[
     values = _nodal(run, fields, quantity)
     found: Array = np.full(_SAMPLES, np.nan)
     for body in fields.bodies.values():
-        triangles = Triangulation(*fields.coordinates.T, fields.triangles[fields.body == body].reshape(-1, 3))
+        triangles = Triangulation(
+            *fields.coordinates.T, fields.triangles[fields.body == body].reshape(-1, 3)
+        )
         here = np.ma.filled(LinearTriInterpolator(triangles, values)(*x.T), np.nan)
         found = np.where(np.isnan(found), here, found)
     inside = ~np.isnan(found)
@@ -167,19 +215,31 @@ def _inside(run: Run, line: Sequence[float], quantity: str, step: int) -> tuple[
 
 def _nodal(run: Run, fields: Fields, quantity: str, nodes: Any = ..., **more: Array) -> Array:
     """The quantity at ``nodes``, any shape: a nodal field, or one ``more`` that is known there."""
-    known = fields.nodal_fields() | {"ux": fields.displacement[:, 0], "uy": fields.displacement[:, 1]}
+    known = fields.nodal_fields() | {
+        "ux": fields.displacement[:, 0],
+        "uy": fields.displacement[:, 1],
+    }
     known = {name: values[nodes] for name, values in known.items()} | more
     if quantity not in known:
-        why = "" if fields.stress is not None else ' (the run was solved with output.fields = "cells")'
+        why = (
+            ""
+            if fields.stress is not None
+            else ' (the run was solved with output.fields = "cells")'
+        )
         raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
     return known[quantity]
 
 
 def _driving(run: Run, step: int) -> tuple[float, str]:
-    """The largest force of the loads at ``step``, per unit thickness, 0 if that is round-off; and its load's name."""
+    """The largest force of the loads at ``step``, per unit thickness, 0 if that is round-off; and
+    its load's name."""
     names = {"P": "P"}
     if not run.is_joint:
-        pulls = [load.name for load in run.scene.load if load.pressure is None and load.direction != "rotation"]
+        pulls = [
+            load.name
+            for load in run.scene.load
+            if load.pressure is None and load.direction != "rotation"
+        ]
         names = {name: f"{name} force" for name in pulls}
     forces = {by: run.columns[name] for by, name in names.items()}
     by = max(forces, key=lambda name: abs(forces[name][step - 1]), default="")
@@ -193,8 +253,9 @@ def _angle(x: Array, centre: Array) -> Array:
 
 
 def _rising(angle: Array, begin: Array, end: Array) -> Array:
-    """Angles in degrees, risen so far that none is before the arcs of facets from ``begin`` to ``end`` ``(k,)``, which
-    start behind the largest gap between the facets, and at 0 on a whole circle."""
+    """Angles in degrees, risen so far that none is before the arcs of facets from ``begin`` to
+    ``end`` ``(k,)``, which start behind the largest gap between the facets, and at 0 on a whole
+    circle."""
     order = np.argsort(begin % 360)
     gap = (begin[order] - np.roll(end[order], 1) + _GAP) % 360 - _GAP
     start = begin[order[gap.argmax()]] if gap.max() > _GAP else 0.0
@@ -203,8 +264,9 @@ def _rising(angle: Array, begin: Array, end: Array) -> Array:
 
 
 def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
-    """Nodes ``(k, 3)`` along the facets of an ``edge``, piece by piece, with the body on the left, but on arcs
-    counterclockwise; ``s`` ``(k, 3)`` of a `Probe` there, and the radius of an arc (else 0)."""
+    """Nodes ``(k, 3)`` along the facets of an ``edge``, piece by piece, with the body on the left,
+    but on arcs counterclockwise; ``s`` ``(k, 3)`` of a `Probe` there, and the radius of an arc
+    (else 0)."""
     from archord.geometry.curve import Curve, circle_through, in_pieces
 
     rows = fields.facets()
@@ -219,7 +281,9 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
             rows, begin, end = rows[:, ::-1], end, begin
         height = _rising(begin, begin, end)
     if len(np.unique(rows[:, 0])) < len(rows):
-        raise InputError(f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it.")
+        raise InputError(
+            f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it."
+        )
     order = in_pieces(rows[:, 0], rows[:, 2], height)
     s = Curve(x, 2, rows[order]).arc_length(np.array([0.0, 0.5, 1.0]))
     if radius:
@@ -228,8 +292,8 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
 
 
 def _tangents(x: Array, rows: np.ndarray) -> tuple[Array, np.ndarray]:
-    """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet without a corner their
-    mean; and which facets ``(k,)`` are so followed by the next."""
+    """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet
+    without a corner their mean; and which facets ``(k,)`` are so followed by the next."""
     tangent = np.einsum("qa,fai->fqi", [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]], x)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     here, after = np.nonzero(rows[:, 2:] == rows[:, 0])

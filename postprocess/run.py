@@ -1,4 +1,5 @@
-"""A run folder as an object: scene, status, history, contact pressure and fields. It reads, and never solves.
+"""A run folder as an object: scene, status, history, contact pressure and fields. It reads, and
+never solves.
 
 Arrays and tables are read when they are asked for, and pandas is imported only for tables.
 """
@@ -51,11 +52,13 @@ class _Report(BaseModel):
 
 
 class Run:
-    """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again to see more.
+    """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again
+    to see more.
 
-    ``status`` says how it ended: "done", "stopped" (``message`` says why) or "interrupted"; "running", if it has not or
-    was killed. ``steps`` is the number of accepted steps, which are counted from 1; ``columns`` are those of
-    history.csv by name, as plain lists, and ``units`` their units; ``summary`` is run.json, ``warnings`` those in it.
+    ``status`` says how it ended: "done", "stopped" (``message`` says why) or "interrupted";
+    "running", if it has not or was killed. ``steps`` is the number of accepted steps, which are
+    counted from 1; ``columns`` are those of history.csv by name, as plain lists, and ``units``
+    their units; ``summary`` is run.json, ``warnings`` those in it.
 
     Raises `InputError` if it is no run folder, or its scene, report or history cannot be read.
     """
@@ -69,55 +72,70 @@ class Run:
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
                 raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
-        self.summary: dict[str, Any] = self._read_report()  # before the history, which a run writes first
+        self.summary: dict[str, Any] = (
+            self._read_report()
+        )  # before the history, which a run writes first
         require_intact(self.folder, ["scene.toml"])
         self.scene: Any = load_scene(self.folder / "scene.toml")
         self.is_joint = isinstance(self.scene, Scene)
         self.columns, self.units = self._read_history()
-        self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
+        self.status, self.message, self.warnings = (
+            self.summary[key] for key in ("status", "message", "warnings")
+        )
         self.steps = len(self.columns["step"])
 
     @cached_property
     def history(self) -> pd.DataFrame:
-        """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
+        """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of
+        every column."""
         from archord.postprocess.frames import frame_of
 
         return frame_of(self.columns, self.units).astype(dict.fromkeys(_WHOLE, int))
 
     @cached_property
     def curve(self) -> RunCurve:
-        """P (per unit thickness), p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an
-        accepted step, and of a run that is not of a joint."""
+        """P (per unit thickness), p0 and eps over delta as arrays, for laws and fits. Raises
+        `InputError` without an accepted step, and of a run that is not of a joint."""
         if not self.is_joint:
-            raise InputError(f"{self.folder}: is the run of a general scene; this is for those of a [joint].")
+            raise InputError(
+                f"{self.folder}: is the run of a general scene; this is for those of a [joint]."
+            )
         self.number(None)
         columns = {name: np.array(self.columns[name]) for name in CURVES}
         columns["P"] /= self.scene.thickness
         return RunCurve(str(self.folder), self.scene, **columns, folder=self.folder)
 
     def contact(self, step: int | None = None) -> dict[str, Any]:
-        """The contact along the integrated surfaces at ``step`` (the last), arrays by name: of a joint "pin" and
-        "hole". Raises `InputError` without such a step, and where nothing may touch."""
+        """The contact along the integrated surfaces at ``step`` (the last), arrays by name: of a
+        joint "pin" and "hole". Raises `InputError` without such a step, and where nothing may
+        touch."""
         step = self.number(step)
         if not self.has_contact:
             raise InputError(f"{self.folder}: has no contact: its scene has no interaction.")
         return read_contact(self.folder, self.scene, step)
 
     def arc(self, step: int | None = None, side: str | None = None) -> Any:
-        """One ``side`` of `contact` (the last one: the hole). Raises `InputError` without such a step or side."""
+        """One ``side`` of `contact` (the last one: the hole). Raises `InputError` without such a
+        step or side."""
         arcs = self.contact(step)
         if side is not None and side not in arcs:
-            raise InputError(f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}.")
+            raise InputError(
+                f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}."
+            )
         return arcs[side or list(arcs)[-1]]
 
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
-        """`contact` as a table with a row for each point; of one ``side`` if given. Raises `InputError`."""
+        """`contact` as a table with a row for each point; of one ``side`` if given. Raises
+        `InputError`."""
         from archord.postprocess.frames import contact_frame
 
-        return contact_frame({side: self.arc(step, side)} if side else self.contact(step), self.scene)
+        return contact_frame(
+            {side: self.arc(step, side)} if side else self.contact(step), self.scene
+        )
 
     def fields(self, step: int | None = None) -> Fields:
-        """Mesh, displacement, stress and plastic strain at ``step`` (the last). Raises `InputError`."""
+        """Mesh, displacement, stress and plastic strain at ``step`` (the last). Raises
+        `InputError`."""
         return read_fields(self.folder, self.scene, self.number(step), self.bodies)
 
     @property
@@ -143,19 +161,28 @@ class Run:
         """The integration points at ``step`` (the last): see `read_points`. Raises `InputError`."""
         return read_points(self.folder, self.scene, self.number(step))
 
-    def probe(self, edge: str = "", quantity: str = "", step: int | None = None, line: Sequence[float] = ()) -> Probe:
-        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von Mises'): see
-        `archord.postprocess.probe.probe`. Raises `InputError`."""
+    def probe(
+        self,
+        edge: str = "",
+        quantity: str = "",
+        step: int | None = None,
+        line: Sequence[float] = (),
+    ) -> Probe:
+        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von
+        Mises'): see `archord.postprocess.probe.probe`. Raises `InputError`."""
         return probe(self, edge, quantity, self.number(step), line)
 
     def number(self, step: int | None) -> int:
-        """``step``, or that of the last accepted one. Raises `InputError` if the run has none such."""
+        """``step``, or that of the last accepted one. Raises `InputError` if the run has none
+        such."""
         if not self.steps:
             raise InputError(f"{self.folder}: holds no accepted step.")
         if step is None:
             return self.steps
         if not 1 <= step <= self.steps:
-            raise InputError(f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}.")
+            raise InputError(
+                f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}."
+            )
         return int(step)
 
     def _read_history(self) -> tuple[dict[str, list[float]], dict[str, str]]:
@@ -163,7 +190,9 @@ class Run:
         try:
             columns = read_history(path)
             headings = next(csv.reader([path.read_text(encoding="utf-8").partition("\n")[0]]))
-            if not np.isfinite([columns[name] for name in (_OF_A_JOINT if self.is_joint else _NEEDED)]).all():
+            if not np.isfinite(
+                [columns[name] for name in (_OF_A_JOINT if self.is_joint else _NEEDED)]
+            ).all():
                 raise ValueError("numbers that are not finite")
         except (ValueError, IndexError, KeyError, OSError):
             raise InputError(f"{path}: cannot be read as the history of a run.") from None

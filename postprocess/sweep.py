@@ -17,19 +17,25 @@ _FIRST = ["case", "run", "status"]  # columns before the varied keys
 
 
 class Sweep:
-    """The sweep in ``folder``. ``cases`` is cases.csv as it was when this was made, a row for each case with the values
-    of its last step; ``keys`` are the varied keys.
+    """The sweep in ``folder``. ``cases`` is cases.csv as it was when this was made, a row for each
+    case with the values of its last step; ``keys`` are the varied keys.
 
-    Cases are numbered from 1; cases whose scenes are the same share a run. Raises `InputError` if the folder is not
-    that of a sweep or its table of cases cannot be read.
+    Cases are numbered from 1; cases whose scenes are the same share a run. Raises `InputError` if
+    the folder is not that of a sweep or its table of cases cannot be read.
     """
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
         for name in ("sweep.toml", "cases.csv"):
             if not (self.folder / name).is_file():
-                cure = f"; archord sweep {self.folder} --gather writes it" if is_sweep(self.folder) else ""
-                raise InputError(f"{self.folder}: is not the folder of a sweep: {name} is missing{cure}.")
+                cure = (
+                    f"; archord sweep {self.folder} --gather writes it"
+                    if is_sweep(self.folder)
+                    else ""
+                )
+                raise InputError(
+                    f"{self.folder}: is not the folder of a sweep: {name} is missing{cure}."
+                )
         self.cases = self._read("cases.csv", _FIRST)
         names = list(self.cases)
         self.keys: list[str] = names[len(_FIRST) : names.index("message")]
@@ -41,7 +47,9 @@ class Sweep:
     @property
     def states(self) -> str:
         """Number of cases by status, in words."""
-        return ", ".join(f"{n} {state}" for state, n in self.cases["status"].value_counts(sort=False).items())
+        return ", ".join(
+            f"{n} {state}" for state, n in self.cases["status"].value_counts(sort=False).items()
+        )
 
     @property
     def moving(self) -> list[str]:
@@ -61,11 +69,14 @@ class Sweep:
             if list(table)[: len(first)] != first or (first and "message" not in table):
                 raise ValueError("columns")
         except (OSError, ValueError):
-            raise InputError(f"{self.folder / name}: cannot be read as a table of a sweep.") from None
+            raise InputError(
+                f"{self.folder / name}: cannot be read as a table of a sweep."
+            ) from None
         return table
 
     def run(self, case: int | str) -> Run:
-        """The run of a case, by the case's number or the run's name. Raises `InputError` if there is none (yet)."""
+        """The run of a case, by the case's number or the run's name. Raises `InputError` if there
+        is none (yet)."""
         found = self.cases["run"][(self.cases["case"] == case) | (self.cases["run"] == case)]
         if found.empty:
             raise InputError(f"{self.folder}: has no case {case}; its cases are 1 to {len(self)}.")
@@ -73,7 +84,8 @@ class Sweep:
 
     @cached_property
     def runs(self) -> dict[int, Run]:
-        """The runs by case that have an accepted step and can be read; cases that share a run by the first of them."""
+        """The runs by case that have an accepted step and can be read; cases that share a run by
+        the first of them."""
         return {case: run for case, run in self._found[0].items() if run.steps}
 
     @property
@@ -82,7 +94,8 @@ class Sweep:
         return self._found[1]
 
     def label(self, case: int) -> str:
-        """What is varied and how in a ``case``, for legends: ``clearance = 0.05 mm, E = 210000 MPa``."""
+        """What is varied and how in a ``case``, for legends: ``clearance = 0.05 mm, E = 210000
+        MPa``."""
         row = self.cases[self.cases["case"] == case].iloc[0]
         units = self.cases.attrs["units"]
         short = {key: key.rpartition(".")[2] for key in self.moving}
@@ -90,7 +103,13 @@ class Sweep:
         said = []
         for key, name in short.items():
             value = row[key]
-            shown = "none" if value != value else f"{value:.6g}" if isinstance(value, float) else str(value)
+            shown = (
+                "none"
+                if value != value
+                else f"{value:.6g}"
+                if isinstance(value, float)
+                else str(value)
+            )
             named = name if names.count(name) == 1 else key
             said.append(f"{named} = {shown} {units.get(key, '')}".rstrip())
         return ", ".join(said) or f"case {case}"

@@ -1,4 +1,5 @@
-"""What is told of a scene's solution: an account of every step, of the joint or of a general problem."""
+"""What is told of a scene's solution: an account of every step, of the joint or of a general
+problem."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ Column = tuple[str, Callable[[Any], float | int]]  # heading, and its value of a
 
 
 def account_of(scene: AnyScene, comm: MPI.Comm, timer: Timer | None = None) -> Account:
-    """The problem of ``scene``, ready to be solved, and its account. Collective over ``comm``; raises `InputError`."""
+    """The problem of ``scene``, ready to be solved, and its account. Collective over ``comm``;
+    raises `InputError`."""
     if isinstance(scene, Scene):
         return JointAccount(Joint(scene, comm, timer=timer))
     from archord.presets.general_account import GeneralAccount

@@ -25,7 +25,8 @@ _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
 class ArcProfile(EdgeProfile):
     """One side's contact state on an arc of ``radius``, its facets ordered from the contact axis.
 
-    Of a joint cut in half. In the facet at the edge of the contact the line of `pressure` may dip below zero.
+    Of a joint cut in half. In the facet at the edge of the contact the line of `pressure` may dip
+    below zero.
     """
 
     radius: float
@@ -36,8 +37,11 @@ class ArcProfile(EdgeProfile):
         return np.divide(self.s, self.radius)
 
     def facet_means(self) -> tuple[Array, Array]:
-        """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter where it yields."""
-        angle, pressure = ((self.weight * v).sum(axis=1) / self.width for v in (self.angle, self.pressure))
+        """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter
+        where it yields."""
+        angle, pressure = (
+            (self.weight * v).sum(axis=1) / self.width for v in (self.angle, self.pressure)
+        )
         return angle, pressure
 
 
@@ -48,7 +52,9 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
     for name, edge in surface_profiles(joint).items():
         s = joint.sides[name].arc_position(np.array([0.0, -radius["hole"]]))
         order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
-        given = {key: value for key, value in (vars(edge) | {"s": s}).items() if key not in ("X", "slip")}
+        given = {
+            key: value for key, value in (vars(edge) | {"s": s}).items() if key not in ("X", "slip")
+        }
         arrays = {key: value[order, along] for key, value in given.items() if value is not None}
         if along.step < 0 and edge.shear is not None:  # s runs the other way
             arrays["shear"] = 0.0 - arrays["shear"]
@@ -59,8 +65,9 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
 def semi_angle(profile: ArcProfile) -> float:
     """Contact semi-angle ``eps`` in radians.
 
-    Near its edge an elastic contact pressure is ``C sqrt(eps - phi)``, so the force beyond an angle, to the power 2/3,
-    is linear in the angle; it is extrapolated to zero from the last facets in contact.
+    Near its edge an elastic contact pressure is ``C sqrt(eps - phi)``, so the force beyond an
+    angle, to the power 2/3, is linear in the angle; it is extrapolated to zero from the last facets
+    in contact.
     """
     force = profile.facet_force
     last = int(np.flatnonzero(force > 0).max(initial=-1))
@@ -77,7 +84,8 @@ def semi_angle(profile: ArcProfile) -> float:
 
 
 def peak_pressure(profiles: list[ArcProfile], eps: float) -> float:
-    """Pressure ``p0`` on the contact axis: an even parabola through the facet means of all sides near it."""
+    """Pressure ``p0`` on the contact axis: an even parabola through the facet means of all sides
+    near it."""
     near = []
     for p in profiles:
         chosen = np.cumsum(p.width) <= max(_PEAK_FRACTION * eps * p.radius, 3.001 * p.width[0])

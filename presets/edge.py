@@ -1,7 +1,8 @@
-"""The contact along the surfaces of a problem: points, pressure and gap, with the pressure projected facet by facet.
+"""The contact along the surfaces of a problem: points, pressure and gap, with the pressure
+projected facet by facet.
 
-The raw pressure at quadrature points scatters inside plastic facets, its integrals over facets do not: what is reported
-is built from them.
+The raw pressure at quadrature points scatters inside plastic facets, its integrals over facets do
+not: what is reported is built from them.
 """
 
 from __future__ import annotations
@@ -28,11 +29,16 @@ class EdgeProfile:
     s: Array  # (n, q) arc length along the curve
     weight: Array  # (n, q) measure
     coordinates: Array  # (n, q, 2) deformed
-    pressure: Array  # (n, q) positive in compression; projected: linear on each facet, with the facet's force
+    # (n, q) positive in compression; projected: linear on each facet, with the facet's force
+    pressure: Array
     raw_pressure: Array  # (n, q) as integrated by the solver
     gap: Array  # (n, q) positive when open
-    shear: Array | None = field(default=None, kw_only=True)  # (n, q) with friction: on the surface, positive along s
-    sticks: Array | None = field(default=None, kw_only=True)  # (n, q) with friction: 1 where points touch and stick
+    shear: Array | None = field(
+        default=None, kw_only=True
+    )  # (n, q) with friction: on the surface, positive along s
+    sticks: Array | None = field(
+        default=None, kw_only=True
+    )  # (n, q) with friction: 1 where points touch and stick
 
     @property
     def width(self) -> Array:
@@ -52,7 +58,8 @@ class EdgeProfile:
 
 @dataclass(frozen=True)
 class SurfaceProfile(EdgeProfile):
-    """As `EdgeProfile`, with the undeformed points and how far they slid along the opposite surface (`Pair.slip`)."""
+    """As `EdgeProfile`, with the undeformed points and how far they slid along the opposite surface
+    (`Pair.slip`)."""
 
     X: Array  # (n, q, 2)
     slip: Array  # (n, q)
@@ -70,14 +77,18 @@ class SurfaceProfile(EdgeProfile):
     @property
     def largest(self) -> tuple[float, Array]:
         """Largest projected pressure, and the undeformed place ``(2,)`` where it is."""
-        at = np.unravel_index(np.argmax(np.where(self.raw_pressure > 0, self.pressure, 0.0)), self.pressure.shape)
+        at = np.unravel_index(
+            np.argmax(np.where(self.raw_pressure > 0, self.pressure, 0.0)), self.pressure.shape
+        )
         return max(float(self.pressure[at]), 0.0), self.X[at]
 
     @property
     def n_arcs(self) -> int:
         """Number of separate stretches under pressure."""
         closed = self.in_contact > 0
-        apart = np.linalg.norm(self.X[1:, 0] - self.X[:-1, -1], axis=1) > self.width.max()  # between pieces
+        apart = (
+            np.linalg.norm(self.X[1:, 0] - self.X[:-1, -1], axis=1) > self.width.max()
+        )  # between pieces
         begins = np.append(closed[:1], closed[1:] & (~closed[:-1] | apart)).sum()
         whole = np.linalg.norm(self.X[0, 0] - self.X[-1, -1]) < self.width.max()
         return int(max(begins - (whole and closed[0] and closed[-1]), 0)) or int(closed.any())
@@ -97,23 +108,33 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
             continue
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
         local = np.zeros((side.n_facets, side.weight.shape[1], 10))
-        # the frame's tangent runs along the opposite surface, which this one meets the other way round
+        # the frame's tangent runs along the opposite surface, which this one meets the other way
+        # round
         shear = 0.0 - pair.shear
         sticks = np.abs(shear) < (1 - _ON_CONE) * getattr(pair.law, "friction", 0.0) * pair.pressure
-        values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1)
+        values = np.stack(
+            [side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1
+        )
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)
         weight, raw, gap, slip, *of_friction = np.moveaxis(whole[..., :6], -1, 0)
         coordinates, X, s = whole[..., 6:8], whole[..., 8:], side.curve.arc_length(side.curve_xi)
-        more = dict(zip(OF_FRICTION, of_friction, strict=True)) if system.contact.has_friction else {}
-        found[name] = SurfaceProfile(s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip, **more)
+        more = (
+            dict(zip(OF_FRICTION, of_friction, strict=True)) if system.contact.has_friction else {}
+        )
+        found[name] = SurfaceProfile(
+            s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip, **more
+        )
     return found
 
 
 def project(pressure: Array, s: Array, weight: Array) -> Array:
-    """L2 projection ``(n, q)`` of ``pressure`` onto one linear function a facet; facet integrals are kept exactly."""
+    """L2 projection ``(n, q)`` of ``pressure`` onto one linear function a facet; facet integrals
+    are kept exactly."""
     total = weight.sum(axis=1, keepdims=True)
     mean = (weight * pressure).sum(axis=1, keepdims=True) / total
     lever = s - (weight * s).sum(axis=1, keepdims=True) / total
-    slope = (weight * lever * pressure).sum(axis=1, keepdims=True) / (weight * lever**2).sum(axis=1, keepdims=True)
+    slope = (weight * lever * pressure).sum(axis=1, keepdims=True) / (weight * lever**2).sum(
+        axis=1, keepdims=True
+    )
     return mean + slope * lever

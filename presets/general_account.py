@@ -45,7 +45,9 @@ _ALONE = 0.1  # of the same at the end, where no force pushes the bodies that sp
 _LOST = "nothing holds what the loads move"
 _CHECK = "let more of the loads press it against others, or look whether its E has the unit of the others"
 NEVER = "no surfaces ever touched: no load presses any of them together"
-PARTED = "no surfaces touch from step {} on, though the loads displace farther: look which way they move"
+PARTED = (
+    "no surfaces touch from step {} on, though the loads displace farther: look which way they move"
+)
 
 
 class GeneralAccount:
@@ -61,7 +63,9 @@ class GeneralAccount:
         self.scene, self._warnings = scene, scene.doubts
         with as_input_error(scene):
             if scene.mesh.shape is None:
-                from archord.presets.held import check  # with scipy, which solves of presets do without
+                from archord.presets.held import (
+                    check,
+                )  # with scipy, which solves of presets do without
 
                 with timer("mesh"):
                     self._warnings += check(scene, problem)
@@ -82,14 +86,20 @@ class GeneralAccount:
         self._units = part_columns(scene)
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
-        """Headings of history.csv and their values: loads, supports, interactions, bodies, energies, what the step
-        cost."""
+        """Headings of history.csv and their values: loads, supports, interactions, bodies,
+        energies, what the step cost."""
         energies = ENERGIES if self.system.contact.has_friction else ENERGIES[:2]
-        last = dict.fromkeys((*energies, "work"), self.scene.units.energy_of(self.scene.analysis.thickness))
+        last = dict.fromkeys(
+            (*energies, "work"), self.scene.units.energy_of(self.scene.analysis.thickness)
+        )
         last |= {"force_balance": "", "iterations": "", "cutbacks": "", "seconds": "s"}
         first = ("step", attrgetter("step")), ("load_factor", attrgetter("at"))
         values = [(headed(name, unit), itemgetter(name)) for name, unit in self._units.items()]
-        return [*first, *values, *((headed(name, unit), attrgetter(name)) for name, unit in last.items())]
+        return [
+            *first,
+            *values,
+            *((headed(name, unit), attrgetter(name)) for name, unit in last.items()),
+        ]
 
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces of all loads. Collective."""
@@ -102,7 +112,12 @@ class GeneralAccount:
         return surface_profiles(self.system)
 
     def step(
-        self, before: Sequence[Record], step: Step, profiles: Mapping[str, Any], work: float, seconds: float
+        self,
+        before: Sequence[Record],
+        step: Step,
+        profiles: Mapping[str, Any],
+        work: float,
+        seconds: float,
     ) -> Record:
         """The record of the last accepted state. Collective."""
         system, values = self.system, list[float]()
@@ -116,7 +131,14 @@ class GeneralAccount:
             pressure, at = max((p.largest for p in met), key=lambda found: found[0])
             lengths = [p.contact_length for p in met]
             slip = max(p.largest_slip for p in met)
-            values += [*system.contact_force(part.name), pressure, *at, float(np.mean(lengths)), slip, met[-1].n_arcs]
+            values += [
+                *system.contact_force(part.name),
+                pressure,
+                *at,
+                float(np.mean(lengths)),
+                slip,
+                met[-1].n_arcs,
+            ]
             if part.friction:
                 shear = max(float(np.abs(p.shear).max()) for p in met if p.shear is not None)
                 values += [system.contact_moment(part.name, (0.0, 0.0)), shear]
@@ -138,9 +160,19 @@ class GeneralAccount:
         source = {"file": mesh.file} if mesh.file else {}
         if mesh.file and mesh.file not in LIVE:
             source["sha256"] = sha256(Path(mesh.file).read_bytes()).hexdigest()
-        shares = {i.interaction.name: [pair.share for pair in i.pairs] for i in self.system.contact.interfaces}
-        bodies = {body.name: list(problem.mesh.cell_sets[body.cells or body.name]) for body in problem.bodies}
-        found = {"mesh": sizes(self.system) | source, "model": {"contact_shares": shares}, "bodies": bodies}
+        shares = {
+            i.interaction.name: [pair.share for pair in i.pairs]
+            for i in self.system.contact.interfaces
+        }
+        bodies = {
+            body.name: list(problem.mesh.cell_sets[body.cells or body.name])
+            for body in problem.bodies
+        }
+        found = {
+            "mesh": sizes(self.system) | source,
+            "model": {"contact_shares": shares},
+            "bodies": bodies,
+        }
         return found | {"materials": self.scene.materials}
 
     def warnings(self) -> list[str]:
@@ -152,7 +184,9 @@ class GeneralAccount:
     ) -> list[str]:
         """What to warn of after the step ``m``, which follows the steps ``before``. Collective."""
         said, system = list[str](), self.system
-        tied = {name for part in self.scene.interaction if part.law == "tied" for name in part.surfaces}
+        tied = {
+            name for part in self.scene.interaction if part.law == "tied" for name in part.surfaces
+        }
         for name, profile in profiles.items():
             if name in tied:
                 continue
@@ -172,14 +206,21 @@ class GeneralAccount:
         largest = max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)
         small = self.scene.analysis.strain == "small"
         if largest > LARGE_STRAIN and small:
-            said.append(Doubt(f"PEEQ reaches {largest:.2g}, too much for small-strain theory; {LARGE}", largest))
+            said.append(
+                Doubt(
+                    f"PEEQ reaches {largest:.2g}, too much for small-strain theory; {LARGE}",
+                    largest,
+                )
+            )
         said += distortion_doubts(system, largest, small=small)
         angle = np.abs(system.driven()[0][self._turning]).max(initial=0.0)
         if angle > _FAR_TURN:
             far = f"a coupling turns by {angle:.2g} rad; it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
             said.append(Doubt(far, angle))
         if residual > max(1e-8, self.scene.analysis.tolerance) and m.force_balance:
-            said.append(Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual))
+            said.append(
+                Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual)
+            )
         if m.force_balance > 1e-8:
             left = f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left"
             said.append(Doubt(left, m.force_balance))
@@ -190,8 +231,9 @@ class GeneralAccount:
         return said
 
     def refusal(self, steps: Sequence[Record]) -> str:
-        """Why the run must not go on after the last of the ``steps``: springs carry what something else should. Where
-        no force is prescribed, they may carry alone: bodies may be pushed until they touch. Collective."""
+        """Why the run must not go on after the last of the ``steps``: springs carry what something
+        else should. Where no force is prescribed, they may carry alone: bodies may be pushed until
+        they touch. Collective."""
         system = self.system
         by_springs = system.stabilisation_energy
         stored, total = _largest_work(steps)
@@ -206,7 +248,10 @@ class GeneralAccount:
         """A warning where nothing ever touched; that springs alone hold a body is no end."""
         touching = [part for part in self.scene.interaction if part.law != "tied"]
         if self.system.stabilisation_energy > _ALONE * _largest_work(steps)[1]:
-            return f"{_LOST}: no contact carries {self.system.hardest_held!r}; hold it by a support, {_CHECK}", []
+            return (
+                f"{_LOST}: no contact carries {self.system.hardest_held!r}; hold it by a support, {_CHECK}",
+                [],
+            )
         if not touching:
             return "", []
         met = [m.step for m in steps if m.contact_area]
@@ -217,7 +262,9 @@ class GeneralAccount:
 
     def _farther(self, steps: Sequence[Record], last: int) -> bool:
         """Whether a load displaces farther after the step number ``last`` than up to it."""
-        names = [f"{load.name} displacement" for load in self.scene.load if load.displacement is not None]
+        names = [
+            f"{load.name} displacement" for load in self.scene.load if load.displacement is not None
+        ]
         for name in names:
             before = max(abs(m[name]) for m in steps if m.step <= last)
             after = max(abs(m[name]) for m in steps if m.step > last)
@@ -236,8 +283,11 @@ class GeneralAccount:
         contact = bool(self.scene.interaction)
         return work_doubts(steps, fit, contact=contact, round_off=self.system.energy_noise())
 
-    def _pressures(self, surface: str, m: Record, before: Sequence[Record]) -> tuple[float, list[float]]:
-        """The largest pressure of the interaction of this ``surface`` in the step ``m``, and ``before``."""
+    def _pressures(
+        self, surface: str, m: Record, before: Sequence[Record]
+    ) -> tuple[float, list[float]]:
+        """The largest pressure of the interaction of this ``surface`` in the step ``m``, and
+        ``before``."""
         part = next(part for part in self.scene.interaction if surface in part.surfaces)
         column = f"{part.name} largest pressure"
         return m[column], [earlier[column] for earlier in before]
@@ -245,11 +295,14 @@ class GeneralAccount:
     def _largest_force(self, steps: Sequence[Record]) -> float:
         """The largest force of a support or an interaction in these ``steps``."""
         pairs = [(f"{name} x", f"{name} y") for name in self._supports]
-        pairs += [(f"{part.name} force x", f"{part.name} force y") for part in self.scene.interaction]
+        pairs += [
+            (f"{part.name} force x", f"{part.name} force y") for part in self.scene.interaction
+        ]
         return max((float(np.hypot(m[x], m[y])) for m in steps for x, y in pairs), default=0.0)
 
 
 def _largest_work(steps: Sequence[Record]) -> tuple[float, float]:
-    """The largest energy stored and dissipated in one of the ``steps``, and the largest of it and the work."""
+    """The largest energy stored and dissipated in one of the ``steps``, and the largest of it and
+    the work."""
     stored = max((m.elastic_energy + dissipated(m) for m in steps), default=0.0)
     return stored, max([stored, *(abs(m.work) for m in steps)])

@@ -1,4 +1,5 @@
-"""Checks of a general scene on its mesh: what the mesh lacks, and whether something holds every body."""
+"""Checks of a general scene on its mesh: what the mesh lacks, and whether something holds every
+body."""
 
 from __future__ import annotations
 
@@ -26,8 +27,8 @@ _ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
 def check(scene: ProblemScene, problem: Problem) -> list[str]:
-    """Warnings about the mesh of ``scene`` and ``problem``. Collective; raises ValueError on all ranks for a mesh that
-    is at fault and a body that nothing holds."""
+    """Warnings about the mesh of ``scene`` and ``problem``. Collective; raises ValueError on all
+    ranks for a mesh that is at fault and a body that nothing holds."""
     mesh = problem.mesh
     cells = {body.name: body.cells for body in problem.bodies}
     overlap = max((part.overlap + part.interference for part in scene.interaction), default=0.0)
@@ -39,13 +40,21 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     pairs += [[*part.surfaces, *([part.rigid.radius] if part.rigid else [])] for part in smooth]
     warnings = check_mesh(mesh, cells, pairs, overlap, in_mm)
     whole = gathered(mesh)
-    owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
+    owner = {
+        name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces
+    }
     failure = ""
     doubts = list[str]()
     if whole is not None:
-        faults = chain(_shared(scene, whole), _half_loaded(scene, whole), _loose(scene, whole, cells, owner))
+        faults = chain(
+            _shared(scene, whole), _half_loaded(scene, whole), _loose(scene, whole, cells, owner)
+        )
         failure = next(faults, "")
-        doubts = [*_half_held(scene, whole), *_moved_in_contact(scene, whole), *_stiffened(scene, whole)]
+        doubts = [
+            *_half_held(scene, whole),
+            *_moved_in_contact(scene, whole),
+            *_stiffened(scene, whole),
+        ]
         for name in sorted({*owner, *_moved(scene), *_spread(scene)}):
             doubts += gaps(whole, name)
     failure, doubts = mesh.mesh.comm.bcast((failure, doubts))
@@ -55,7 +64,8 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
 
 
 def _spread(scene: ProblemScene) -> set[str]:
-    """The facet sets along which something is spread: a pressure, or the force of a distributing coupling."""
+    """The facet sets along which something is spread: a pressure, or the force of a distributing
+    coupling."""
     found = {load.on for load in scene.load if load.kind == "pressure"}
     return found | {c.facets for c in scene.coupling if c.kind == "distributing"}
 
@@ -82,8 +92,8 @@ def _half_held(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
 
 
 def _stiffened(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
-    """Warnings of forces on edges that are not straight: an edge under a force moves by one displacement, which keeps
-    its shape along the force."""
+    """Warnings of forces on edges that are not straight: an edge under a force moves by one
+    displacement, which keeps its shape along the force."""
     for load in scene.load:
         if load.kind != "force" or load.on not in whole.facet_sets:
             continue
@@ -98,7 +108,8 @@ def _stiffened(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
 
 
 def _moved_in_contact(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
-    """Warnings of sets with a prescribed motion that have some facets of a surface in contact, and others."""
+    """Warnings of sets with a prescribed motion that have some facets of a surface in contact, and
+    others."""
     smooth = [part for part in scene.interaction if part.law != "tied"]
     surfaces = [(part.name, name) for part in smooth for name in part.surfaces]
     for (on, by), (part, surface) in product(_moved(scene).items(), surfaces):
@@ -114,7 +125,8 @@ def _moved_in_contact(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
 
 
 def _shared(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
-    """What is said of facets that two interactions have: what is between them would be counted twice."""
+    """What is said of facets that two interactions have: what is between them would be counted
+    twice."""
     surfaces = [(part.name, name) for part in scene.interaction for name in part.surfaces]
     for (first, one), (second, other) in combinations(surfaces, 2):
         tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
@@ -128,13 +140,20 @@ def _shared(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
             )
 
 
-def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]) -> Iterator[str]:
-    """What is said of bodies that neither supports nor contact hold; a turning one in contact is no fault."""
+def _loose(
+    scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]
+) -> Iterator[str]:
+    """What is said of bodies that neither supports nor contact hold; a turning one in contact is no
+    fault."""
     facets = {c.name: c.facets for c in scene.coupling}
     held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
     given: list[tuple[str, str]] = [(s.on, freedom) for s in scene.support for freedom in s.fixed]
-    given += [(load.on, load.direction or "") for load in scene.load if load.displacement is not None]
-    hinges = {c.name: np.array([c.point]) for c in scene.coupling if (c.name, "rotation") not in given}
+    given += [
+        (load.on, load.direction or "") for load in scene.load if load.displacement is not None
+    ]
+    hinges = {
+        c.name: np.array([c.point]) for c in scene.coupling if (c.name, "rotation") not in given
+    }
     inside = {body: _nodes(whole, name, of_cells=True) for body, name in cells.items()}
     for on, freedom in given:
         nodes = _nodes(whole, facets.get(on, on))
@@ -145,7 +164,9 @@ def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: 
                 held[body].append((places, np.tile(_ALONG[freedom], (len(places), 1))))
     links = []
     for part in scene.interaction:
-        edges = whole.x[whole.edges[np.isin(whole.tags, whole.facet_sets[part.surfaces[-1]])][:, :2]]
+        edges = whole.x[
+            whole.edges[np.isin(whole.tags, whole.facet_sets[part.surfaces[-1]])][:, :2]
+        ]
         middle, chord = edges.mean(axis=1), edges[:, 1] - edges[:, 0]
         chord /= np.linalg.norm(chord, axis=1)[:, None]
         across = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
@@ -156,31 +177,49 @@ def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: 
                 links.append((owner[part.surfaces[0]], owner[part.surfaces[1]], middle, direction))
     moves = free_motions(held, links)
     for body, motions in moves.items():
-        if free := [motion for motion in motions if motion != "rotation" or body not in owner.values()]:
-            others = [repr(other) for other, its in moves.items() if other != body and not {*free}.isdisjoint(its)]
+        if free := [
+            motion for motion in motions if motion != "rotation" or body not in owner.values()
+        ]:
+            others = [
+                repr(other)
+                for other, its in moves.items()
+                if other != body and not {*free}.isdisjoint(its)
+            ]
             where = f" to it, or to a body that it touches: {', '.join(others)}" if others else ""
             yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]{where}"
 
 
 def require_facing(system: System) -> list[str]:
-    """Warnings of fits that are not as drawn. Collective; raises ValueError where surfaces of an interaction as drawn
-    do not face each other, a tie has nothing to tie, or a fit is drawn and given as an interference, too."""
+    """Warnings of fits that are not as drawn. Collective; raises ValueError where surfaces of an
+    interaction as drawn do not face each other, a tie has nothing to tie, or a fit is drawn and
+    given as an interference, too."""
     warnings: list[str] = []
     for interface in system.contact.interfaces:
         part = interface.interaction
         closest, apart = np.inf, ""
         for pair in interface.pairs:
             gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
-            found = np.array([gap.min(initial=np.inf), np.abs(gap).min(initial=np.inf), -np.abs(gap).max(initial=0.0)])
+            found = np.array(
+                [
+                    gap.min(initial=np.inf),
+                    np.abs(gap).min(initial=np.inf),
+                    -np.abs(gap).max(initial=0.0),
+                ]
+            )
             system.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MIN)
             lowest, nearest, farthest = found * [1.0, 1.0, -1.0]
             size = np.ptp(pair.surface.curve.X, axis=0).max()
-            allowed, said = part.overlap + _FAR * size, f"the surface {pair.surface.name!r} of {part.name!r}"
+            allowed, said = (
+                part.overlap + _FAR * size,
+                f"the surface {pair.surface.name!r} of {part.name!r}",
+            )
             if nearest <= allowed and farthest > _APART * size and not pair.law.slides:
                 drawn = f"the surfaces that {part.name!r} ties are drawn up to {farthest:.3g} apart"
                 apart = f"{drawn}: what is carried along them loses its moment about that gap"
             if lowest < -allowed:
-                raise ValueError(f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other")
+                raise ValueError(
+                    f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other"
+                )
             if nearest > allowed and not pair.law.slides:
                 raise ValueError(f"{said} is nowhere near the one that it is tied to")
             closest = min(closest, float(lowest))
@@ -192,8 +231,9 @@ def require_facing(system: System) -> list[str]:
 
 
 def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
-    """Warnings of the fit of ``part``, whose surfaces are drawn with this smallest ``gap``, negative where they lie in
-    each other. Raises ValueError for a fit that is drawn and given as an interference, too."""
+    """Warnings of the fit of ``part``, whose surfaces are drawn with this smallest ``gap``,
+    negative where they lie in each other. Raises ValueError for a fit that is drawn and given as an
+    interference, too."""
     deep = -gap
     drawn = f"drawn {abs(gap):.3g} {'apart' if gap >= 0 else 'deep in each other'}"
     said = f"the surfaces of {part.name!r} are {drawn}"
@@ -213,8 +253,8 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
 
 
 def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:
-    """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone; none of another
-    name."""
+    """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone;
+    none of another name."""
     if not of_cells and (name in whole.facet_sets or name in whole.point_sets):
         edges = whole.edges[np.isin(whole.tags, whole.facet_sets.get(name, ()))]
         return np.union1d(edges, whole.point_sets.get(name, ())).astype(np.int64)

@@ -1,7 +1,8 @@
 """The joint of a scene as a problem to solve.
 
-Half of the joint is modelled, cut at its symmetry axis. "block" is the paper's quarter joint, pressed at the pin's
-horizontal diameter; "ring" is half a whole pin in a ring, loaded by a force at the pin's core (Persson's joint).
+Half of the joint is modelled, cut at its symmetry axis. "block" is the paper's quarter joint,
+pressed at the pin's horizontal diameter; "ring" is half a whole pin in a ring, loaded by a force at
+the pin's core (Persson's joint).
 """
 
 from __future__ import annotations
@@ -36,21 +37,30 @@ _COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 
 
 def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
-    """The problem that ``scene`` states; ``partitioner`` as for `quarter_joint`. Collective over ``comm``.
+    """The problem that ``scene`` states; ``partitioner`` as for `quarter_joint`. Collective over
+    ``comm``.
 
     Raises `InputError` if the scene leaves the mesh open.
     """
     scene.require_mesh()
     g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
     ring, rigid = g.is_ring, scene.pin.rigid
-    stiffness = scene.E_star * scene.thickness if by_force else 1.0  # by which a load is about a displacement
-    supports = [Support("axis", "symmetry", 0), *(Support("block", "block held", axis) for axis in (0, 1))]
+    stiffness = (
+        scene.E_star * scene.thickness if by_force else 1.0
+    )  # by which a load is about a displacement
+    supports = [
+        Support("axis", "symmetry", 0),
+        *(Support("block", "block held", axis) for axis in (0, 1)),
+    ]
     if not rigid and not ring:
         supports.append(Support("pin", "pin top", 1, -1.0))
     travel = abs(g.dR) + max(map(abs, scene.targets)) / stiffness
     contact = Interaction(
         "contact",
-        (Rigid(RigidCircle(np.array([0.0, -g.dR]), g.radius), (0.0, -1.0)) if rigid else "pin", "hole"),
+        (
+            Rigid(RigidCircle(np.array([0.0, -g.dR]), g.radius), (0.0, -1.0)) if rigid else "pin",
+            "hole",
+        ),
         friction=analysis.friction,
         kinematics=analysis.kinematics,
         gamma_factor=analysis.gamma_factor,
@@ -62,15 +72,18 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     part = "none" if rigid else "whole" if scene.pin.whole else "half"
 
     def guess(load: float) -> Guess:
-        """The pin moved by the load, or by about what a force would press it, from where it touches on
-        that side, the block at rest."""
+        """The pin moved by the load, or by about what a force would press it, from where it touches
+        on that side, the block at rest."""
         first_touch = math.copysign(max(g.dR, 0.0), load) if ring else 0.0
         shift = load / stiffness + first_touch
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(
         joint_mesh(comm, g, part, scene.load.core_radius, analysis.degree, partitioner),
-        [Body(name, solid.constitutive(analysis.plane, analysis.strain)) for name, solid in scene.solids.items()],
+        [
+            Body(name, solid.constitutive(analysis.plane, analysis.strain))
+            for name, solid in scene.solids.items()
+        ],
         [contact],
         supports,
         [Load("pin", (0.0, -1.0), core)] if ring else [],
@@ -88,9 +101,15 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
 
 
 def joint_mesh(
-    comm: MPI.Comm, geometry: JointGeometry, pin: str, core_radius: float, degree: int, partitioner=None
+    comm: MPI.Comm,
+    geometry: JointGeometry,
+    pin: str,
+    core_radius: float,
+    degree: int,
+    partitioner=None,
 ) -> TaggedMesh:
-    """The mesh of a joint with its ``pin`` "half", "whole" or "none"; a ring's core has ``core_radius``, over R."""
+    """The mesh of a joint with its ``pin`` "half", "whole" or "none"; a ring's core has
+    ``core_radius``, over R."""
     g = geometry
     sizes = g.radius, g.dR, g.W, g.h, g.growth
     options = {"size_ratio": g.size_ratio, "degree": degree, "partitioner": partitioner}
@@ -98,7 +117,9 @@ def joint_mesh(
     if g.is_ring:
         return half_ring(comm, *sizes, core_radius * g.radius, **options)
     edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
-    return quarter_joint(comm, *sizes, edge=edge, rigid_pin=pin == "none", whole_pin=pin == "whole", **options)
+    return quarter_joint(
+        comm, *sizes, edge=edge, rigid_pin=pin == "none", whole_pin=pin == "whole", **options
+    )
 
 
 def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]:
@@ -107,9 +128,12 @@ def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]
     return lambda x: ufl.max_value(1 - ufl.dot(x - middle, x - middle) / radius**2, 0)
 
 
-def require_core(mesh: TaggedMesh, cells: str, centre: Sequence[float], radius: float, key: str) -> None:
-    """Raise ValueError, which names the ``key`` of the radius, where the circle has so few integration points of these
-    ``cells`` that the force on it is not what `core_density` says. Collective."""
+def require_core(
+    mesh: TaggedMesh, cells: str, centre: Sequence[float], radius: float, key: str
+) -> None:
+    """Raise ValueError, which names the ``key`` of the radius, where the circle has so few
+    integration points of these ``cells`` that the force on it is not what `core_density` says.
+    Collective."""
     owned = mesh.mesh.topology.index_map(2).size_local
     inside = np.unique(mesh.cells_in(cells))
     X, _ = basix.make_quadrature(mesh.mesh.basix_cell(), LOAD_DEGREE)
@@ -131,24 +155,33 @@ def _coarser(scene: Scene) -> Scene:
         "relative_element_size": None,
         "growth": max(g.growth, min(_RATIO * g.growth, _STEEPEST)),
     }
-    analysis = scene.analysis.model_copy(update={"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)})
+    analysis = scene.analysis.model_copy(
+        update={"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)}
+    )
     return scene.model_copy(update={"joint": g.model_copy(update=sizes), "analysis": analysis})
 
 
 class Joint(System):
-    """The joint of ``scene``, ready to be solved. Collective over ``comm``; raises `InputError` as `joint_problem`."""
+    """The joint of ``scene``, ready to be solved. Collective over ``comm``; raises `InputError` as
+    `joint_problem`."""
 
-    def __init__(self, scene: Scene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None) -> None:
+    def __init__(
+        self, scene: Scene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None
+    ) -> None:
         self.scene, timer = scene, timer or Timer()
         with timer("mesh"):
             problem = joint_problem(scene, comm, partitioner)
         super().__init__(problem, timer=timer)
 
     def delta(self) -> float:
-        """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""
-        return self.drive_displacement("") - (max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0)
+        """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the
+        core."""
+        return self.drive_displacement("") - (
+            max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0
+        )
 
     def forces(self) -> dict[str, float]:
-        """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""
+        """Downward force of the whole joint at pin, contact and block's support, per unit
+        thickness."""
         contact, block = -self.contact_force("contact")[1], self.reaction("block")[1]
         return {"pin": self.drive_force(""), "contact": contact, "block": block}

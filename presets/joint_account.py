@@ -1,4 +1,5 @@
-"""The account of a joint: its steps, what run.json says of its mesh and model, and what its user is warned of."""
+"""The account of a joint: its steps, what run.json says of its mesh and model, and what its user is
+warned of."""
 
 from __future__ import annotations
 
@@ -49,8 +50,8 @@ UNSEEN = (
 
 
 class JointAccount:
-    """The account of a ``system`` that is a joint: records of its steps, and of contact.h5 the arrays that are
-    ``fixed`` and those that change ``per_step``."""
+    """The account of a ``system`` that is a joint: records of its steps, and of contact.h5 the
+    arrays that are ``fixed`` and those that change ``per_step``."""
 
     record: ClassVar[type] = Measures
     fixed: ClassVar[tuple[str, ...]] = ("s", "angle", "weight")
@@ -61,8 +62,14 @@ class JointAccount:
         self._yielding = [body for body in system.problem.bodies if body.material.yields]
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
-        """Headings of history.csv and their values: every measure in the scene's units, and dimensionless beside it."""
-        scene, R, dR, E = self.scene, self.scene.joint.radius, self.scene.joint.dR, self.scene.E_star
+        """Headings of history.csv and their values: every measure in the scene's units, and
+        dimensionless beside it."""
+        scene, R, dR, E = (
+            self.scene,
+            self.scene.joint.radius,
+            self.scene.joint.dR,
+            self.scene.E_star,
+        )
         length, t, thickness = scene.units.length, scene.thickness, scene.analysis.thickness
         force, energy = scene.units.force_of(thickness), scene.units.energy_of(thickness)
         scales = {
@@ -76,7 +83,10 @@ class JointAccount:
             "seconds": ("", 1.0, "s"),
         }
         columns: list[tuple[str, Callable[[Any], float | int]]] = []
-        left_out = {"peeq", *(() if self.system.contact.has_friction else ("friction_dissipation",))}
+        left_out = {
+            "peeq",
+            *(() if self.system.contact.has_friction else ("friction_dissipation",)),
+        }
         for name in [field.name for field in fields(Measures) if field.name not in left_out]:
             scale, divisor, unit = scales.get(name, ("", 1.0, ""))
             columns.append((headed(name, unit), attrgetter(name)))
@@ -84,8 +94,14 @@ class JointAccount:
                 columns.append((f"{name}/{scale}", partial(_over, name, divisor)))
             if name == "peeq_max" and self._yielding:
                 for place in (*(body.name for body in self._yielding), "contact"):
-                    headings = f"{place} peeq_max", headed(f"{place} at x", length), headed(f"{place} at y", length)
-                    columns += [(heading, partial(_largest, place, k)) for k, heading in enumerate(headings)]
+                    headings = (
+                        f"{place} peeq_max",
+                        headed(f"{place} at x", length),
+                        headed(f"{place} at y", length),
+                    )
+                    columns += [
+                        (heading, partial(_largest, place, k)) for k, heading in enumerate(headings)
+                    ]
         return columns
 
     def driven(self) -> tuple[float, float]:
@@ -97,9 +113,15 @@ class JointAccount:
         return arc_profiles(self.system)
 
     def step(
-        self, before: Sequence[Measures], step: Step, profiles: Mapping[str, Any], work: float, seconds: float
+        self,
+        before: Sequence[Measures],
+        step: Step,
+        profiles: Mapping[str, Any],
+        work: float,
+        seconds: float,
     ) -> Measures:
-        """The measures of the last accepted state, which follows the steps ``before``. Collective."""
+        """The measures of the last accepted state, which follows the steps ``before``.
+        Collective."""
         joint, arcs = self.system, list(profiles.values())
         peeq, peeq_integral = joint.peeq()
         forces, delta = joint.forces(), joint.delta()
@@ -107,7 +129,9 @@ class JointAccount:
         area = SYMMETRY * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
         at_rest = 0.0 if area else self.scene.E_star * self.scene.thickness * abs(delta)
         scale = max(abs(P), *(abs(m.P) for m in before), at_rest)
-        nodal = joint.problem.symmetry * max(joint.equilibrium.reaction_norm, joint.equilibrium.largest_reaction)
+        nodal = joint.problem.symmetry * max(
+            joint.equilibrium.reaction_norm, joint.equilibrium.largest_reaction
+        )
         if scale <= _NOTHING * nodal:  # all that acts is a press fit, which balances by itself
             scale = nodal
         eps = float(np.mean([semi_angle(p) for p in arcs]))
@@ -125,12 +149,18 @@ class JointAccount:
         )
 
     def _peeq(self, eps: float) -> dict[str, Sequence[float]]:
-        """Largest PEEQ, x and y of every body that can yield, and near the "contact": within the angle ``eps`` from its
-        axis, no farther than R/2 from the arc. That leaves out the pressed diameter and the held corner. Collective."""
-        R, found = self.scene.joint.radius, {body.name: self.system.largest_peeq(body) for body in self._yielding}
+        """Largest PEEQ, x and y of every body that can yield, and near the "contact": within the
+        angle ``eps`` from its axis, no farther than R/2 from the arc. That leaves out the pressed
+        diameter and the held corner. Collective."""
+        R, found = (
+            self.scene.joint.radius,
+            {body.name: self.system.largest_peeq(body) for body in self._yielding},
+        )
 
         def near(x: Array) -> np.ndarray:
-            return (np.arctan2(np.abs(x[:, 0]), -x[:, 1]) <= eps) & (np.abs(np.hypot(*x.T) - R) <= R / 2)
+            return (np.arctan2(np.abs(x[:, 0]), -x[:, 1]) <= eps) & (
+                np.abs(np.hypot(*x.T) - R) <= R / 2
+            )
 
         near_contact = self.system.largest_peeq(*self._yielding, within=near)
         return {**found, "contact": near_contact} if found else {}
@@ -142,11 +172,11 @@ class JointAccount:
         return {"mesh": sizes(self.system), "model": model, "materials": self.scene.materials}
 
     def warnings(self) -> list[str]:
-        """The scene's doubts, and a warning if the parabolic facets depart too much from their circles for the
-        clearance.
+        """The scene's doubts, and a warning if the parabolic facets depart too much from their
+        circles for the clearance.
 
-        A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets
-        that face each other are off alike, which leaves the gap as it is.
+        A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos
+        a)^2/8``. Equal facets that face each other are off alike, which leaves the gap as it is.
         """
         g, friction = self.scene.joint, self.scene.analysis.friction
         doubts = [*self.scene.doubts, *friction_doubts({"analysis.friction": friction})]
@@ -162,11 +192,18 @@ class JointAccount:
         return [*doubts, *([said] if off > _ROUGH else [])]
 
     def step_warnings(
-        self, m: Measures, profiles: Mapping[str, Any], residual: float, before: Sequence[Measures] = ()
+        self,
+        m: Measures,
+        profiles: Mapping[str, Any],
+        residual: float,
+        before: Sequence[Measures] = (),
     ) -> list[str]:
-        """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
+        """What to warn of after the step ``m``, which Newton's method left with a ``residual``.
+        Collective."""
         said, squashed = list[str](), core_peeq(self.system)
-        if self.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
+        if self.scene.joint.arc_end < np.pi and any(
+            p.in_contact[-1] > 0 for p in profiles.values()
+        ):
             said.append(
                 "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load less far"
             )
@@ -197,7 +234,9 @@ class JointAccount:
             said.append(Doubt(text, abs(m.delta)))
         said += distortion_doubts(self.system, m.peeq_max, small=small and not far)
         if residual > max(1e-8, scene.analysis.tolerance) and m.contact_area:
-            said.append(Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual))
+            said.append(
+                Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual)
+            )
         if m.force_balance > 1e-8:
             text = f"forces at pin, contact and block differ by {m.force_balance:.1e} of P"
             said.append(Doubt(text, m.force_balance))
@@ -208,8 +247,8 @@ class JointAccount:
         return ""
 
     def ending(self, steps: Sequence[Measures]) -> tuple[str, list[str]]:
-        """Why a run that came to its end does not count as done, as no contact point noticed that the bodies are
-        pressed together, or nothing; and a warning where they never were."""
+        """Why a run that came to its end does not count as done, as no contact point noticed that
+        the bodies are pressed together, or nothing; and a warning where they never were."""
         if any(m.contact_area for m in steps):
             return "", []
         return (UNSEEN, []) if any(m.delta > 0 for m in steps) else ("", [APART])
@@ -220,7 +259,9 @@ class JointAccount:
 
     def work_doubts(self, steps: Sequence[Measures]) -> list[str]:
         """See `work_doubts`, with the same steps."""
-        return work_doubts(steps, fit=int(self.scene.joint.dR < 0), round_off=self.system.energy_noise())
+        return work_doubts(
+            steps, fit=int(self.scene.joint.dR < 0), round_off=self.system.energy_noise()
+        )
 
 
 def _largest(place: str, k: int, m: Measures) -> float:
@@ -239,12 +280,19 @@ def sizes(system: System) -> dict[str, Any]:
         "kind": system.cell_kind,
         "dofs": system.n_dofs,
         "contact_facets": {name: len(length) for name, length in lengths.items()},
-        "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
+        "element_size_on_arc": {
+            name: [float(length.min()), float(length.max())] for name, length in lengths.items()
+        },
     }
 
 
 def core_peeq(joint: Joint) -> float:
-    """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
+    """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a
+    block. Collective."""
     radius = joint.scene.load.core_radius * joint.scene.joint.radius
-    pin = [body for body in joint.problem.bodies if joint.problem.loads and body.name == "pin" and body.material.yields]
+    pin = [
+        body
+        for body in joint.problem.bodies
+        if joint.problem.loads and body.name == "pin" and body.material.yields
+    ]
     return joint.largest_peeq(*pin, within=lambda x: np.linalg.norm(x, axis=1) < radius)[0]

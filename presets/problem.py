@@ -22,7 +22,17 @@ from archord.presets.joint import core_density, joint_mesh, require_core
 from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
-from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
+from archord.solver.problem import (
+    Body,
+    Drive,
+    Guess,
+    Interaction,
+    Load,
+    Mean,
+    Problem,
+    Rigid,
+    Support,
+)
 from archord.solver.system import displacement_space
 
 _SHAPES: dict[str, Callable[..., TaggedMesh]] = {
@@ -36,15 +46,16 @@ _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
 def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
-    """The problem that ``scene`` states. Collective over ``comm``; raises `InputError` for a file that is no mesh, a
-    set that it does not have, a problem that contradicts itself."""
+    """The problem that ``scene`` states. Collective over ``comm``; raises `InputError` for a file
+    that is no mesh, a set that it does not have, a problem that contradicts itself."""
     with as_input_error(scene):
         return _Builder(scene, scene_mesh(scene, comm)).problem()
 
 
 @contextmanager
 def as_input_error(scene: ProblemScene) -> Iterator[None]:
-    """Raise the ValueError of a mesh or a problem as `InputError` that names the mesh of ``scene``."""
+    """Raise the ValueError of a mesh or a problem as `InputError` that names the mesh of
+    ``scene``."""
     try:
         yield
     except ValueError as error:
@@ -59,19 +70,29 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
         return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, **shape)
-    from archord.geometry.meshes.formats.read import read_mesh, tagged  # with scipy, which solves of presets do without
+    from archord.geometry.meshes.formats.read import (
+        read_mesh,
+        tagged,
+    )  # with scipy, which solves of presets do without
 
     source = LIVE.get(mesh.file or "", mesh.file)
     if source == mesh.file and mesh.file.endswith(GIVEN):
-        raise ValueError(f"{mesh.file}: is gone with the process that gave it; the run folder has it as mesh.npz")
-    circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
+        raise ValueError(
+            f"{mesh.file}: is gone with the process that gave it; the run folder has it as mesh.npz"
+        )
+    circles = [
+        Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius)
+        for circle in mesh.circle
+    ]
     given = tagged(*source) if isinstance(source, tuple) else source
-    return read_mesh(given, comm, circles=circles, scale=mesh.scale, order=mesh.order, refine=mesh.refine)
+    return read_mesh(
+        given, comm, circles=circles, scale=mesh.scale, order=mesh.order, refine=mesh.refine
+    )
 
 
 def given_mesh(scene: ProblemScene, comm: MPI.Comm) -> PlaneMesh | None:
-    """The mesh given from Python, as `scene_mesh` takes it before it scales and refines it: on rank 0, None elsewhere.
-    Collective."""
+    """The mesh given from Python, as `scene_mesh` takes it before it scales and refines it: on rank
+    0, None elsewhere. Collective."""
     from archord.geometry.meshes.formats.read import plane_mesh_of, tagged
 
     source = LIVE[scene.mesh.file or ""]
@@ -80,13 +101,16 @@ def given_mesh(scene: ProblemScene, comm: MPI.Comm) -> PlaneMesh | None:
 
 
 def require_mirrored(scene: ProblemScene, problem: Problem) -> None:
-    """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an edge that is held in
-    one direction, as a mirror line is, and could leave that line or turn. Collective."""
+    """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an
+    edge that is held in one direction, as a mirror line is, and could leave that line or turn.
+    Collective."""
     fixed: dict[str, set[str]] = {}
     for support in scene.support:
         fixed.setdefault(support.on, set()).update(support.fixed)
     held = {c.name: fixed.pop(c.name, set()) for c in scene.coupling}
-    lines = [(on, *axes) for on, axes in fixed.items() if len(axes) == 1 and scene.analysis.symmetry > 1]
+    lines = [
+        (on, *axes) for on, axes in fixed.items() if len(axes) == 1 and scene.analysis.symmetry > 1
+    ]
     rigid = [coupling for coupling in scene.coupling if coupling.kind == "rigid"]
     if not (lines and rigid):
         return
@@ -103,7 +127,8 @@ def require_mirrored(scene: ProblemScene, problem: Problem) -> None:
 
 
 class _Builder:
-    """The parts of a `Problem` from those of ``scene``, by the names of sets of ``mesh``, of couplings and of discs."""
+    """The parts of a `Problem` from those of ``scene``, by the names of sets of ``mesh``, of
+    couplings and of discs."""
 
     def __init__(self, scene: ProblemScene, mesh: TaggedMesh) -> None:
         self.scene, self.mesh = scene, mesh
@@ -111,7 +136,9 @@ class _Builder:
         self.couplings = [coupling.name for coupling in scene.coupling]
         self.discs = [part.name for part in scene.interaction if part.rigid]
         self.loaded = {(load.on, str(load.direction)): load.name for load in scene.load}
-        self.held = {(support.on, freedom) for support in scene.support for freedom in support.fixed}
+        self.held = {
+            (support.on, freedom) for support in scene.support for freedom in support.fixed
+        }
         self.drives: list[Drive] = []
         self.supports: list[Support] = []
         self.means: list[Mean] = []
@@ -127,7 +154,9 @@ class _Builder:
         self._require_near()
         for support in scene.support:
             if support.on not in self.couplings:
-                self.supports += [Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed]
+                self.supports += [
+                    Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed
+                ]
         for load in scene.load:
             self._load(load)
         for coupling in scene.coupling:
@@ -135,14 +164,24 @@ class _Builder:
         given: dict[tuple[str, int], str] = {}
         for s in self.supports:
             if (other := given.setdefault((s.facets, s.axis), s.name)) != s.name:
-                raise ValueError(f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in {'xy'[s.axis]}")
-        lengths = [abs(v) for load in scene.load if load.kind == "displacement" for v in load.stages]
-        travel = sum(lengths) + max((i.interference + i.overlap for i in scene.interaction), default=0.0)
+                raise ValueError(
+                    f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in {'xy'[s.axis]}"
+                )
+        lengths = [
+            abs(v) for load in scene.load if load.kind == "displacement" for v in load.stages
+        ]
+        travel = sum(lengths) + max(
+            (i.interference + i.overlap for i in scene.interaction), default=0.0
+        )
         by_force = any(load.kind != "displacement" for load in scene.load)
         problem = Problem(
             self.mesh,
             [
-                Body(body.name, body.constitutive(analysis.plane, analysis.strain), body.cells or body.name)
+                Body(
+                    body.name,
+                    body.constitutive(analysis.plane, analysis.strain),
+                    body.cells or body.name,
+                )
                 for body in scene.body
             ],
             [self._interaction(part, 0.0 if by_force else travel) for part in scene.interaction],
@@ -159,13 +198,17 @@ class _Builder:
             max_iterations=analysis.max_iterations,
             guess=self._guess,
         )
-        displaced = [load for load in scene.load if load.kind == "displacement" and load.on in self.mesh.facet_sets]
+        displaced = [
+            load
+            for load in scene.load
+            if load.kind == "displacement" and load.on in self.mesh.facet_sets
+        ]
         self._driven = [(load, problem.body_of(load.on).name) for load in displaced]
         return problem
 
     def _require_near(self) -> None:
-        """Raise ValueError for a displacement beyond the size of the mesh, as if in other units. Large strain is
-        stretched some times as far. Collective."""
+        """Raise ValueError for a displacement beyond the size of the mesh, as if in other units.
+        Large strain is stretched some times as far. Collective."""
         comm = self.mesh.mesh.comm
         x = self.mesh.mesh.geometry.x[:, :2]
         discs = [part.rigid.centre for part in self.scene.interaction if part.rigid]
@@ -186,11 +229,16 @@ class _Builder:
         self._require_near_turns(ends, most)
 
     def _require_near_turns(self, ends: Array, most: float) -> None:
-        """Raise ValueError for a coupling that turns about a held point so far away that all the mesh within ``ends``,
-        the largest x and y and the smallest with the other sign, moves by more than ``most``."""
+        """Raise ValueError for a coupling that turns about a held point so far away that all the
+        mesh within ``ends``, the largest x and y and the smallest with the other sign, moves by
+        more than ``most``."""
         points = {coupling.name: np.array(coupling.point) for coupling in self.scene.coupling}
         held = {(s.on, str(freedom)) for s in self.scene.support for freedom in s.fixed}
-        held |= {(load.on, str(load.direction)) for load in self.scene.load if load.kind == "displacement"}
+        held |= {
+            (load.on, str(load.direction))
+            for load in self.scene.load
+            if load.kind == "displacement"
+        }
         for load in self.scene.load:
             if load.kind != "displacement" or load.direction != "rotation":
                 continue
@@ -205,10 +253,17 @@ class _Builder:
                 )
 
     def _load(self, load: parts.Load) -> None:
-        """A pressure; a force spread over cells; or what moves a set, a reference point or a disc."""
-        on_cells = load.kind == "force" and load.on not in [*self.edges, *self.couplings, *self.discs]
+        """A pressure; a force spread over cells; or what moves a set, a reference point or a
+        disc."""
+        on_cells = load.kind == "force" and load.on not in [
+            *self.edges,
+            *self.couplings,
+            *self.discs,
+        ]
         spread = on_cells or load.core is not None
-        control: Literal["displacement", "force"] = "force" if load.kind == "force" and not spread else "displacement"
+        control: Literal["displacement", "force"] = (
+            "force" if load.kind == "force" and not spread else "displacement"
+        )
         self.drives.append(Drive(load.name, self.scene.values(load), control))
         if load.kind == "pressure":
             self.loads.append(Load(facets=load.on, pressure=1.0, drive=load.name))
@@ -221,10 +276,13 @@ class _Builder:
                 density = core_density(centre, radius)
             self.loads.append(Load(cells=load.on, force=force, density=density, drive=load.name))
         elif load.on not in [*self.couplings, *self.discs]:
-            self.supports.append(Support(load.name, load.on, _AXES[str(load.direction)], 1.0, load.name))
+            self.supports.append(
+                Support(load.name, load.on, _AXES[str(load.direction)], 1.0, load.name)
+            )
 
     def _drive(self, coupling: str, freedom: str, control: Literal["displacement", "force"]) -> str:
-        """The load of a reference point in one of its freedoms, or a drive of its own whose ``control`` is 0."""
+        """The load of a reference point in one of its freedoms, or a drive of its own whose
+        ``control`` is 0."""
         if (coupling, freedom) in self.loaded:
             return self.loaded[coupling, freedom]
         self.drives.append(Drive(f"{coupling} {freedom}", (0.0, 0.0), control))
@@ -240,14 +298,21 @@ class _Builder:
         self.supports += [Support(coupling.name, coupling.facets, axis) for axis in (0, 1)]
         for freedom in [f for f in _AXES if (coupling.name, f) not in self.held]:
             drive = self._drive(coupling.name, freedom, "force")
-            self.supports += [Support(coupling.name, coupling.facets, axis, r, drive) for axis, r in rates[freedom]]
+            self.supports += [
+                Support(coupling.name, coupling.facets, axis, r, drive)
+                for axis, r in rates[freedom]
+            ]
 
     def _mean_point(self, coupling: parts.Coupling) -> None:
-        mirrored = self.scene.analysis.symmetry > 1  # with its mirror image an edge moves along the symmetry line alone
+        mirrored = (
+            self.scene.analysis.symmetry > 1
+        )  # with its mirror image an edge moves along the symmetry line alone
         point = None if mirrored else (coupling.point[0], coupling.point[1])
         for freedom in [f for f in _AXES if (coupling.name, f) in self.held | self.loaded.keys()]:
             if mirrored and freedom == "rotation":
-                raise ValueError(f"the coupling {coupling.name!r} of a part with mirror images cannot turn")
+                raise ValueError(
+                    f"the coupling {coupling.name!r} of a part with mirror images cannot turn"
+                )
             drive = self._drive(coupling.name, freedom, "displacement")
             self.means.append(Mean(coupling.name, coupling.facets, _AXES[freedom], point, drive))
 
@@ -255,8 +320,13 @@ class _Builder:
         surfaces: tuple[str | Rigid, str] = (part.surfaces[0], part.surfaces[-1])
         if part.rigid is not None:
             loads = [load for load in self.scene.load if load.on == part.name]
-            rates = {load.name: (1.0, 0.0) if load.direction == "x" else (0.0, 1.0) for load in loads}
-            surfaces = Rigid(RigidCircle(np.array(part.rigid.centre), part.rigid.radius), rates), part.surfaces[0]
+            rates = {
+                load.name: (1.0, 0.0) if load.direction == "x" else (0.0, 1.0) for load in loads
+            }
+            surfaces = (
+                Rigid(RigidCircle(np.array(part.rigid.centre), part.rigid.radius), rates),
+                part.surfaces[0],
+            )
         return Interaction(
             part.name,
             surfaces,

@@ -1,4 +1,5 @@
-"""Warnings of a run's steps: each kind is told once, from its first step on, as it is at its worst."""
+"""Warnings of a run's steps: each kind is told once, from its first step on, as it is at its
+worst."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ class Doubt(str):
 
 
 def kind(said: str) -> str:
-    """What two warnings of a kind share: all but their step and the numbers outside of quoted names."""
+    """What two warnings of a kind share: all but their step and the numbers outside of quoted
+    names."""
     parts = _NAME.split(_STEP.sub("", said))
     parts[::2] = [_NUMBER.sub("#", part) for part in parts[::2]]
     return "".join(parts)
@@ -33,7 +35,8 @@ def kind(said: str) -> str:
 
 @dataclass
 class Told:
-    """A kind of warning: what is ``said`` of the step ``worst``, and the ``first`` step that gave it."""
+    """A kind of warning: what is ``said`` of the step ``worst``, and the ``first`` step that gave
+    it."""
 
     said: str
     size: float

@@ -19,10 +19,12 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save(figure: Figure, target: Path, dots: int = DOTS) -> Path:
-    """Write ``figure`` as ``target``, in the format of its suffix; returns it. Raises `OSError`, and `ValueError` for a
-    suffix that matplotlib does not know."""
+    """Write ``figure`` as ``target``, in the format of its suffix; returns it. Raises `OSError`,
+    and `ValueError` for a suffix that matplotlib does not know."""
     formats = figure.canvas.get_supported_filetypes()
     if target.suffix[1:].lower() not in formats:
-        raise ValueError(f"{target}: must end in one of {', '.join(f'.{name}' for name in sorted(formats))}.")
+        raise ValueError(
+            f"{target}: must end in one of {', '.join(f'.{name}' for name in sorted(formats))}."
+        )
     figure.savefig(target, dpi=dots)
     return target

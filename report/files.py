@@ -1,4 +1,5 @@
-"""Files that a user names, written beside the old ones; and what a benchmark leaves: rows as CSV, tables, a picture."""
+"""Files that a user names, written beside the old ones; and what a benchmark leaves: rows as CSV,
+tables, a picture."""
 
 from __future__ import annotations
 
@@ -17,10 +18,11 @@ _MOST_LINKS = 40  # one after the other, as Linux has it
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path of the same name to write to, which takes the place of ``path`` when all has gone well; else ``path`` is
-    what it was. A link stays and its file is replaced, with its permissions; what no file can replace, as a device, a
-    pipe, or a file in a folder that cannot be written, gets the content at the end. Raises `OSError`; a ValueError
-    about the new path names ``path``."""
+    """A path of the same name to write to, which takes the place of ``path`` when all has gone
+    well; else ``path`` is what it was. A link stays and its file is replaced, with its permissions;
+    what no file can replace, as a device, a pipe, or a file in a folder that cannot be written,
+    gets the content at the end. Raises `OSError`; a ValueError about the new path names
+    ``path``."""
     real = path.resolve()
     moves = not is_device(path) and os.access(real.parent, os.W_OK)
     with TemporaryDirectory(prefix=".archord-", dir=real.parent if moves else None) as folder:
@@ -39,7 +41,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def is_device(path: Path) -> bool:
-    """Whether ``path`` is something else than a file, or a link to what the system keeps, as /dev/stdout is."""
+    """Whether ``path`` is something else than a file, or a link to what the system keeps, as
+    /dev/stdout is."""
     if path.exists() and not path.is_file():
         return True
     place = path.absolute()
@@ -61,10 +64,14 @@ def write_rows(rows: Sequence[Row], path: Path) -> None:
 
 
 def write_report(
-    folder: Path, name: str, rows: Sequence[Row], markdown: str, draw: Callable[[Path], object] | None = None
+    folder: Path,
+    name: str,
+    rows: Sequence[Row],
+    markdown: str,
+    draw: Callable[[Path], object] | None = None,
 ) -> list[Path]:
-    """Write ``name``.csv (the rows), ``name``.md and, if there is ``draw`` for it, ``name``.png into ``folder``, which
-    is made if it is not there; returns the files."""
+    """Write ``name``.csv (the rows), ``name``.md and, if there is ``draw`` for it, ``name``.png
+    into ``folder``, which is made if it is not there; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}.csv", folder / f"{name}.md"]
     write_rows(rows, files[0])

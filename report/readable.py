@@ -1,5 +1,5 @@
-"""Files that a user names for reading: those that never end, or do not fit in memory, are refused before they are
-opened."""
+"""Files that a user names for reading: those that never end, or do not fit in memory, are refused
+before they are opened."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _WHAT = (
 
 
 def require_file(path: str | Path) -> Path:
-    """``path``, which is a file with an end. Raises `OSError`, whose ``strerror`` says what else it is; ValueError for
-    a name that no file can have."""
+    """``path``, which is a file with an end. Raises `OSError`, whose ``strerror`` says what else it
+    is; ValueError for a name that no file can have."""
     mode = os.stat(path).st_mode
     for is_such, said in _WHAT:
         if is_such(mode):
@@ -31,7 +31,8 @@ def require_file(path: str | Path) -> Path:
 
 
 def require_memory(size: float) -> None:
-    """Raise ValueError for an array of so many bytes that is larger than half of the machine's memory."""
+    """Raise ValueError for an array of so many bytes that is larger than half of the machine's
+    memory."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if size > _SHARE * memory:
         gigabytes = 1e9
@@ -41,7 +42,8 @@ def require_memory(size: float) -> None:
 
 
 def json_of(text: str) -> Any:
-    """What the JSON ``text`` holds. Raises ValueError, also where it is nested deeper than Python can read."""
+    """What the JSON ``text`` holds. Raises ValueError, also where it is nested deeper than Python
+    can read."""
     try:
         return json.loads(text)
     except RecursionError:

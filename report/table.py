@@ -6,13 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 
 
 class Table:
-    """Rows of cells under ``headings``; ``str()`` is the table in aligned columns, `markdown` that of a document.
+    """Rows of cells under ``headings``; ``str()`` is the table in aligned columns, `markdown` that
+    of a document.
 
-    The first ``left`` columns hold text, the others numbers, which are aligned on the right. Cells may be anything that
-    has a `str`.
+    The first ``left`` columns hold text, the others numbers, which are aligned on the right. Cells
+    may be anything that has a `str`.
     """
 
-    def __init__(self, *headings: str, rows: Iterable[Iterable[object]] = (), left: int = 0) -> None:
+    def __init__(
+        self, *headings: str, rows: Iterable[Iterable[object]] = (), left: int = 0
+    ) -> None:
         self.headings, self.left = headings, left
         self.rows: list[list[str]] = []
         for row in rows:
@@ -42,8 +45,8 @@ class Table:
         )
 
     def within(self, width: int, kept: int = 1) -> str:
-        """As `str`, but in blocks of columns that are no wider than ``width``, each beginning with the ``kept`` first
-        columns."""
+        """As `str`, but in blocks of columns that are no wider than ``width``, each beginning with
+        the ``kept`` first columns."""
         lines = [list(self.headings), *self.rows]
         wide = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
         room = width + 2 - sum(wide[:kept])
@@ -56,7 +59,9 @@ class Table:
         for block in blocks:
             columns = [*range(kept), *block]
             rows = ([row[k] for k in columns] for row in self.rows)
-            parts.append(str(Table(*(self.headings[k] for k in columns), rows=rows, left=self.left)))
+            parts.append(
+                str(Table(*(self.headings[k] for k in columns), rows=rows, left=self.left))
+            )
         return "\n\n".join(parts)
 
     def markdown(self) -> str:

@@ -12,7 +12,8 @@ BEFORE_SOLVING = "linear solver's setup"  # orders and factorisations that the s
 
 @dataclass
 class Timer:
-    """Seconds spent per phase, and how often; ``with timer("mesh"): ...`` books a phase, which ``entered`` hears of."""
+    """Seconds spent per phase, and how often; ``with timer("mesh"): ...`` books a phase, which
+    ``entered`` hears of."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)

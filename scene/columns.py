@@ -1,4 +1,5 @@
-"""The columns of history.csv that parts of a general scene make, and names that do not go together."""
+"""The columns of history.csv that parts of a general scene make, and names that do not go
+together."""
 
 from __future__ import annotations
 
@@ -12,11 +13,14 @@ if TYPE_CHECKING:
     from archord.scene.problem import ProblemScene
 
 _FREEDOMS = ("x", "y", "rotation")
-Column = tuple[str, str, str, str]  # section and name of the part, what its name is followed by, unit
+Column = tuple[
+    str, str, str, str
+]  # section and name of the part, what its name is followed by, unit
 
 
 def part_columns(scene: ProblemScene) -> dict[str, str]:
-    """Units of the columns of loads, supports, interactions and bodies of ``scene``, by name and in order."""
+    """Units of the columns of loads, supports, interactions and bodies of ``scene``, by name and in
+    order."""
     return {f"{part} {what}": unit for _, part, what, unit in _columns(scene)}
 
 
@@ -28,16 +32,21 @@ def supporting(scene: ProblemScene) -> list[str]:
 
 
 def require_different(scene: ProblemScene) -> None:
-    """Raise `Fault` where two parts of ``scene`` make one column, or a name is that of a coupling's motion."""
+    """Raise `Fault` where two parts of ``scene`` make one column, or a name is that of a coupling's
+    motion."""
     first: dict[str, tuple[str, str]] = {}
     for section, part, what, _ in _columns(scene):
         column = f"{part} {what}"
         other = first.setdefault(column, (section, part))
         said = f"makes the column {column!r} of history.csv, as the {other[0]} {other[1]!r} does: rename one of them"
         require(other == (section, part), (section, part, "name"), said)
-    motions = {f"{c.name} {freedom}": c.name for c in scene.coupling for freedom in _motions(scene, c)}
+    motions = {
+        f"{c.name} {freedom}": c.name for c in scene.coupling for freedom in _motions(scene, c)
+    }
     given = {coupling.name: "coupling" for coupling in scene.coupling}
-    given |= {support.name: "support" for support in scene.support if support.name in supporting(scene)}
+    given |= {
+        support.name: "support" for support in scene.support if support.name in supporting(scene)
+    }
     given |= {load.name: "load" for load in scene.load}
     for name, section in given.items():
         said = f"is what results call a motion of the coupling {motions.get(name)!r}: rename one of them"
@@ -51,7 +60,12 @@ def _motions(scene: ProblemScene, coupling: Coupling) -> list[str]:
     instead.
     """
     loaded = {load.direction for load in scene.load if load.on == coupling.name}
-    held = {freedom for support in scene.support if support.on == coupling.name for freedom in support.fixed}
+    held = {
+        freedom
+        for support in scene.support
+        if support.on == coupling.name
+        for freedom in support.fixed
+    }
     solved = held if coupling.kind == "distributing" else {*_FREEDOMS} - held
     return sorted(solved - loaded)
 

@@ -1,4 +1,5 @@
-"""One sentence for every fault that pydantic finds in a scene: file, key, value, and what is allowed."""
+"""One sentence for every fault that pydantic finds in a scene: file, key, value, and what is
+allowed."""
 
 from __future__ import annotations
 
@@ -13,9 +14,21 @@ from pydantic.fields import FieldInfo
 from archord.scene.keys import Fault, Section, toml_value
 
 _MOST_SENTENCES = 20
-_ELSEWHERE = {"lug.pin": "pin.whole", "bushing.pin": "pin.whole", "bushing.rings": "[[sleeve]] and [housing]"}
+_ELSEWHERE = {
+    "lug.pin": "pin.whole",
+    "bushing.pin": "pin.whole",
+    "bushing.rings": "[[sleeve]] and [housing]",
+}
 _ELSEWHERE |= {"load.steps": "path.steps"}
-_KINDS = {"number", "list", "law", "lug", "clevis", "bushing", "joint"}  # of values, in pydantic's places
+_KINDS = {
+    "number",
+    "list",
+    "law",
+    "lug",
+    "clevis",
+    "bushing",
+    "joint",
+}  # of values, in pydantic's places
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",
@@ -41,14 +54,21 @@ _PHRASES = {
 
 
 def in_sentences(
-    errors: list[Any], data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]
+    errors: list[Any],
+    data: dict[str, Any],
+    model: type[Section],
+    source: str,
+    origin: dict[str, str],
 ) -> str:
-    """The first ``errors`` of checking ``data`` against ``model``, a line each; ``origin`` says which keys are not from
-    ``source``, and where they are from. Of a misspelled key it is not said that it is missing, too."""
+    """The first ``errors`` of checking ``data`` against ``model``, a line each; ``origin`` says
+    which keys are not from ``source``, and where they are from. Of a misspelled key it is not said
+    that it is missing, too."""
     unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
     meant = {(*place[:-1], _known_keys(model, place)["near"]) for place in unknown}
     errors = [error for error in errors if error["type"] != "missing" or error["loc"] not in meant]
-    return "\n".join(_sentence(error, data, model, source, origin) for error in errors[:_MOST_SENTENCES])
+    return "\n".join(
+        _sentence(error, data, model, source, origin) for error in errors[:_MOST_SENTENCES]
+    )
 
 
 def keys_of(models: list[Any], section: str) -> list[str]:
@@ -73,7 +93,9 @@ def shortened(text: str, length: int = 80) -> str:
     return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"
 
 
-def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]) -> str:
+def _sentence(
+    error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]
+) -> str:
     place, context = error["loc"], dict(error.get("ctx", {}))
     fault = context.get("error")
     if isinstance(fault, Fault):
@@ -81,11 +103,18 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
     value: Any = data.get(place[0])
     label = _key_shown(place[0])
     if len(place) > 1 and isinstance(value, list):  # of tables, which are known by name or number
-        at = place[1] if isinstance(place[1], int) else [table["name"] for table in value].index(place[1])
+        at = (
+            place[1]
+            if isinstance(place[1], int)
+            else [table["name"] for table in value].index(place[1])
+        )
         value, place = value[at], place[1:]
         named = value.get("name") if isinstance(value, dict) else None
         label += f" {json.dumps(named or at + 1, default=str)}"
-    keys = [*place[1:2], *(part for part in place[2:] if isinstance(part, str) and part not in _KINDS)]
+    keys = [
+        *place[1:2],
+        *(part for part in place[2:] if isinstance(part, str) and part not in _KINDS),
+    ]
     for part in keys:
         value = value.get(part) if isinstance(value, dict) else None
     key = ".".join((label, *map(_key_shown, keys)))
@@ -97,13 +126,18 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
         said = _PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
         said = said.replace("must be False", "must be false")
     where = next((by for name, by in origin.items() if f"{name}.".startswith(f"{key}.")), source)
-    shown = "" if value is None or isinstance(value, dict) or where != source else f" = {shortened(toml_value(value))}"
+    shown = (
+        ""
+        if value is None or isinstance(value, dict) or where != source
+        else f" = {shortened(toml_value(value))}"
+    )
     entry = f": entry {place[-1] + 1}" if len(place) > 2 and isinstance(place[-1], int) else ""
     return f"{where}: {key}{shown}{entry} {said}."
 
 
 def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
-    """What may stand in the place ``loc`` of an unknown key or section, and which of it may be meant."""
+    """What may stand in the place ``loc`` of an unknown key or section, and which of it may be
+    meant."""
     of_kind: dict[str, Any] = {}
     place = [part for part in loc if isinstance(part, str)]
     for part in place[:-1]:
@@ -111,9 +145,16 @@ def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
             of_kind = _sections(model.model_fields[part].annotation)
         model = of_kind.get(part, next(iter(of_kind.values()), model))
     known = list(model.model_fields)
-    near = _ELSEWHERE.get(".".join(place)) or "".join(difflib.get_close_matches(place[-1], known, 1))
+    near = _ELSEWHERE.get(".".join(place)) or "".join(
+        difflib.get_close_matches(place[-1], known, 1)
+    )
     hint = f"did you mean {near}? " if near else ""
-    return {"known": ", ".join(known), "kind": "Sections" if len(place) == 1 else "Keys", "hint": hint, "near": near}
+    return {
+        "known": ", ".join(known),
+        "kind": "Sections" if len(place) == 1 else "Keys",
+        "hint": hint,
+        "near": near,
+    }
 
 
 def _sections(kind: Any) -> dict[str, Any]:

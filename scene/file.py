@@ -34,13 +34,18 @@ _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPES
 AnyScene = Scene | ProblemScene
 
 
-def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> Scene:
-    """The joint of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere. Raises `InputError`."""
+def parse_scene(
+    data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None
+) -> Scene:
+    """The joint of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere.
+    Raises `InputError`."""
     scene: Any = Scene
     return scene(source, origin, **data)
 
 
-def parse_any(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> AnyScene:
+def parse_any(
+    data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None
+) -> AnyScene:
     """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
     preset: Any = next((scene for name, scene in PRESETS.items() if name in data), None)
     if preset is not None:
@@ -51,12 +56,16 @@ def parse_any(data: dict[str, Any], source: str = "scene", origin: Mapping[str, 
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
-    """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on top.
+    """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on
+    top.
 
-    A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key, value, what may be.
+    A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key,
+    value, what may be.
     """
     if Path(path).is_dir():
-        raise InputError(f"{path}: is a folder, not a scene; that of a run is {Path(path) / 'scene.toml'}.")
+        raise InputError(
+            f"{path}: is a folder, not a scene; that of a run is {Path(path) / 'scene.toml'}."
+        )
     data = read_toml(path)
     if "base" in data and "joint" not in data:
         raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
@@ -68,21 +77,26 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
 
 
 def find_mesh(mesh: Any, folder: Path) -> None:
-    """Let the file of the section ``mesh`` count from ``folder``, and the scene be read from anywhere."""
+    """Let the file of the section ``mesh`` count from ``folder``, and the scene be read from
+    anywhere."""
     if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
         mesh["file"] = str((folder / mesh["file"]).absolute())
 
 
 def in_order(overrides: Iterable[str], by: str = "") -> list[str]:
-    """The last of ``overrides`` of each key: those that drop it come first, then a rigid pin and materials, so that
-    what they drop is what the file says, not another override. Raises `InputError`, which begins with ``by``, for two
-    keys that are alternatives, as two loads are."""
+    """The last of ``overrides`` of each key: those that drop it come first, then a rigid pin and
+    materials, so that what they drop is what the file says, not another override. Raises
+    `InputError`, which begins with ``by``, for two keys that are alternatives, as two loads are."""
     last = {override.partition("=")[0].strip(): override for override in overrides}
     given: dict[tuple[str, ...], str] = {}
     for key, override in last.items():
         part, _, name = key.rpartition(".")
         for names in ALTERNATIVES.get(part.partition(".")[0], []):
-            if name in names and not _drops(override) and given.setdefault((part, *names), override) != override:
+            if (
+                name in names
+                and not _drops(override)
+                and given.setdefault((part, *names), override) != override
+            ):
                 said = f"does not go with {given[part, *names]}; give one of them"
                 raise InputError(f"{by}{override}: {said}.")
     brought = sorted(last, key=lambda key: not key.endswith((".rigid", ".material")))
@@ -95,7 +109,8 @@ def _drops(override: str) -> bool:
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
-    """The files that `load_scene` and a solve read: the scene, that of its load.path, its mesh. Raises `InputError`."""
+    """The files that `load_scene` and a solve read: the scene, that of its load.path, its mesh.
+    Raises `InputError`."""
     data = read_toml(path)
     for override in overrides:
         override_key(data, override)
@@ -105,27 +120,43 @@ def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
 
 
 def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
-    """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other way round."""
+    """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other
+    way round."""
     given = {override.partition("=")[0].strip() for override in overrides if not _drops(override)}
-    dropped = CHOSEN if "analysis.accuracy" in given else ["analysis.accuracy"] if given & {*CHOSEN} else []
+    dropped = (
+        CHOSEN
+        if "analysis.accuracy" in given
+        else ["analysis.accuracy"]
+        if given & {*CHOSEN}
+        else []
+    )
     for section, name in (key.split(".") for key in dropped):
         if isinstance(data.get(section), dict):
             data[section].pop(name, None)
 
 
 def read_targets(data: dict[str, Any], scene: Path) -> None:
-    """Put the targets of the file ``load.path``, beside the file ``scene``, into ``data``; each is one step by default.
+    """Put the targets of the file ``load.path``, beside the file ``scene``, into ``data``; each is
+    one step by default.
 
     Raises `InputError`.
     """
     load = data.get("load")
-    if not isinstance(load, dict) or not isinstance(load.get("path"), str) or not load.keys().isdisjoint(LOADS):
+    if (
+        not isinstance(load, dict)
+        or not isinstance(load.get("path"), str)
+        or not load.keys().isdisjoint(LOADS)
+    ):
         return
     file = scene.parent / load.pop("path")
-    name, *values = [line.strip().strip('"') for line in read_text(file).rstrip().splitlines()] or [""]
+    name, *values = [line.strip().strip('"') for line in read_text(file).rstrip().splitlines()] or [
+        ""
+    ]
     if name not in LOADS:
         known = f"{', '.join(LOADS[:-1])} or {LOADS[-1]}"
-        raise InputError(f"{file}: must have one column, headed by {known}, not {shortened(name)!r}.")
+        raise InputError(
+            f"{file}: must have one column, headed by {known}, not {shortened(name)!r}."
+        )
     if not values:
         raise InputError(f"{file}: must have a number below the heading {name}.")
     for row, value in enumerate(values, 2):
@@ -147,7 +178,9 @@ def read_text(path: str | Path) -> str:
     except UnicodeDecodeError:
         raise InputError(f"{path}: cannot be read: it is not UTF-8 text.") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}.") from None
+        raise InputError(
+            f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}."
+        ) from None
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -155,7 +188,10 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     text = read_text(path)
     try:
         return _parsed(text)
-    except (ValueError, RecursionError) as error:  # also whole numbers of thousands of digits, dates like 0000-00-00
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # also whole numbers of thousands of digits, dates like 0000-00-00
         raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
 
 
@@ -167,8 +203,9 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def override_key(data: dict[str, Any], override: str) -> str:
-    """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in a table by its name, or number from 1 (value: TOML, a
-    number, else text; none: drop it); returns the key as faults name it. Raises `InputError`."""
+    """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in a table by its name, or number
+    from 1 (value: TOML, a number, else text; none: drop it); returns the key as faults name it.
+    Raises `InputError`."""
     key, sign, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
     if sign and not text.strip():
@@ -176,18 +213,26 @@ def override_key(data: dict[str, Any], override: str) -> str:
     value = _value(text.strip())
     tables = data.get(section)
     if not isinstance(tables, list):
-        inner = tables.get("shape") if isinstance(tables, dict) and name.startswith("shape.") else None
+        inner = (
+            tables.get("shape") if isinstance(tables, dict) and name.startswith("shape.") else None
+        )
         if isinstance(inner, dict):
             name = name.removeprefix("shape.")
         if "\n" in override or not (sign and dot and section and name and "." not in name):
-            raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
+            raise InputError(
+                f"--set {override!r}: must read section.key=value, like joint.clearance=0.01."
+            )
         if isinstance(inner, dict):
             kind = str(inner.get("kind"))
             put({kind: inner}, kind, name, value, f"--set {override}")
             return f"{section}.shape.{name}"
         put(data, section, name, value, f"--set {override}")
         return f"{section}.{name}"
-    known = {str(t.get("name", k)): t for k, t in reversed([*enumerate(tables, 1)]) if isinstance(t, dict)}
+    known = {
+        str(t.get("name", k)): t
+        for k, t in reversed([*enumerate(tables, 1)])
+        if isinstance(t, dict)
+    }
     part, _, name = name.rpartition(".")
     if not (sign and name and part in known):
         example = f"{section}.{['1', *known][-1]}.{name}={text}"
@@ -198,9 +243,11 @@ def override_key(data: dict[str, Any], override: str) -> str:
 
 
 def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
-    """Set a key of scene ``data``, or drop it if ``value`` is `ABSENT`; what it is an alternative to goes, too.
+    """Set a key of scene ``data``, or drop it if ``value`` is `ABSENT`; what it is an alternative
+    to goes, too.
 
-    Raises `InputError`, beginning with ``said``, if there can be no such section, or no such key to drop.
+    Raises `InputError`, beginning with ``said``, if there can be no such section, or no such key to
+    drop.
     """
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
@@ -218,7 +265,8 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
 
 
 def _require_known(section: str, name: str, said: str) -> None:
-    """Raise `InputError`, beginning with ``said``, unless a kind of scene has the key ``name`` in this ``section``."""
+    """Raise `InputError`, beginning with ``said``, unless a kind of scene has the key ``name`` in
+    this ``section``."""
     kinds: list[Any] = [Scene, ProblemScene, *PRESETS.values()]
     known = keys_of(kinds, section)
     if name in known:
@@ -237,9 +285,11 @@ def _value(text: str) -> Any:
 
 
 def resolved(scene: AnyScene, beside: Path | None = None) -> str:
-    """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as the same scene.
+    """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as
+    the same scene.
 
-    The mesh file ``beside`` the scene's file, if there is one, is named without its folder, which may move then."""
+    The mesh file ``beside`` the scene's file, if there is one, is named without its folder, which
+    may move then."""
     import tomli_w
 
     data = scene.model_dump(exclude_none=True)
@@ -262,5 +312,9 @@ def scene_keys(scene: AnyScene) -> dict[str, Any]:
     """Every key of the resolved scene by its dotted name."""
     found: dict[str, Any] = {}
     for section, keys in tomllib.loads(resolved(scene)).items():
-        found |= {f"{section}.{k}": v for k, v in keys.items()} if isinstance(keys, dict) else {section: keys}
+        found |= (
+            {f"{section}.{k}": v for k, v in keys.items()}
+            if isinstance(keys, dict)
+            else {section: keys}
+        )
     return found

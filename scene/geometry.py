@@ -1,4 +1,5 @@
-"""The section ``joint`` of a scene: the geometry of pin and hole, and how finely they are meshed."""
+"""The section ``joint`` of a scene: the geometry of pin and hole, and how finely they are
+meshed."""
 
 from __future__ import annotations
 
@@ -19,31 +20,70 @@ class JointGeometry(Section):
     """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
 
     model: Literal["block", "ring"] = key(
-        "block: the paper's quarter joint; ring: a ring and half a pin, loaded at its core (Persson)", default="block"
+        "block: the paper's quarter joint; ring: a ring and half a pin, loaded at its core (Persson)",
+        default="block",
     )
     radius: float = key("radius R of the pin", "length", gt=0, example=10.0)
-    clearance: float | None = key("dR = hole radius - pin radius; in a ring also negative", "length", other=0.05)
-    relative_clearance: float | None = key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
-    block_size: Positive | None = key("side of the block, outer radius of ring; 100 R if absent", "length", other=1e3)
-    element_size: Positive | None = key("edge length of the elements on the arcs, up to 0.5 R", "length", other=0.4)
-    relative_element_size: Positive | None = key("element_size/R; 0.04 if both are absent", default=None, example=0.04)
-    size_ratio: float = key("element size on the pin's arc over that on the hole's", default=1.0, ge=0.01, le=100)
-    edge_angle: Angle | None = key("block: angle [rad] of the contact's end; elements shrink toward it", other=1.0)
-    edge_ratio: float = key("element size at edge_angle over element_size", default=0.25, ge=0.01, le=1)
-    growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
+    clearance: float | None = key(
+        "dR = hole radius - pin radius; in a ring also negative", "length", other=0.05
+    )
+    relative_clearance: float | None = key(
+        "dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005
+    )
+    block_size: Positive | None = key(
+        "side of the block, outer radius of ring; 100 R if absent", "length", other=1e3
+    )
+    element_size: Positive | None = key(
+        "edge length of the elements on the arcs, up to 0.5 R", "length", other=0.4
+    )
+    relative_element_size: Positive | None = key(
+        "element_size/R; 0.04 if both are absent", default=None, example=0.04
+    )
+    size_ratio: float = key(
+        "element size on the pin's arc over that on the hole's", default=1.0, ge=0.01, le=100
+    )
+    edge_angle: Angle | None = key(
+        "block: angle [rad] of the contact's end; elements shrink toward it", other=1.0
+    )
+    edge_ratio: float = key(
+        "element size at edge_angle over element_size", default=0.25, ge=0.01, le=1
+    )
+    growth: float = key(
+        "growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2
+    )
 
     @model_validator(mode="after")
     def _geometry(self) -> JointGeometry:
         name = given(self, ("clearance", "relative_clearance"))
-        require(1e-30 <= self.radius <= 1e30, "radius", "must be between 1e-30 and 1e30; choose other units")
+        require(
+            1e-30 <= self.radius <= 1e30,
+            "radius",
+            "must be between 1e-30 and 1e30; choose other units",
+        )
         dR, h = self.dR / self.radius, self.h / self.radius
-        require(dR > 0 or self.is_ring, name, 'must be positive; an interference is for joint.model = "ring"')
-        require(1e-6 <= abs(dR) <= 0.5, name, "must be between 1e-6 and 0.5 times the radius, in a ring or minus that")
+        require(
+            dR > 0 or self.is_ring,
+            name,
+            'must be positive; an interference is for joint.model = "ring"',
+        )
+        require(
+            1e-6 <= abs(dR) <= 0.5,
+            name,
+            "must be between 1e-6 and 0.5 times the radius, in a ring or minus that",
+        )
         sizes = "element_size", "relative_element_size"
         name = sizes[0] if self.relative_element_size is None else given(self, sizes)
         require(1e-4 <= h <= 0.5, name, "must be between 1e-4 and 0.5 times the radius")
-        require(1e-4 <= self.size_ratio * h <= 0.5, "size_ratio", "must leave elements of 1e-4 to 0.5 R on the pin")
-        require(self.edge_angle is None or not self.is_ring, "edge_angle", 'is for joint.model = "block" alone')
+        require(
+            1e-4 <= self.size_ratio * h <= 0.5,
+            "size_ratio",
+            "must leave elements of 1e-4 to 0.5 R on the pin",
+        )
+        require(
+            self.edge_angle is None or not self.is_ring,
+            "edge_angle",
+            'is for joint.model = "block" alone',
+        )
         hole = self.radius + self.dR
         least = 2 * hole
         said = f"must be at least twice the radius of the hole, {least:g}"
@@ -51,7 +91,11 @@ class JointGeometry(Section):
             least = hole + _THINNEST * self.radius
             said = f"must leave a wall of at least {_THINNEST:g} times R, {least:g} or more"
         require(least <= self.W * (1 + 1e-9), "block_size", said)
-        require(self.W / self.radius <= _WIDEST, "block_size", f"must not exceed {_WIDEST:g} times the radius")
+        require(
+            self.W / self.radius <= _WIDEST,
+            "block_size",
+            f"must not exceed {_WIDEST:g} times the radius",
+        )
         cells = self.expected_cells
         made = f"makes {cells:.0e} of at most {_MOST_CELLS:.0e} triangles"
         said = f"with growth = {self.growth:g} {made}; increase either of them"
@@ -60,11 +104,14 @@ class JointGeometry(Section):
 
     @property
     def expected_cells(self) -> float:
-        """About how many triangles the mesh will have: the bodies' area over that of equilateral triangles of the size
-        ``t = h + growth |r - R|`` at radius r, integrated in closed form (lengths in R)."""
+        """About how many triangles the mesh will have: the bodies' area over that of equilateral
+        triangles of the size ``t = h + growth |r - R|`` at radius r, integrated in closed form
+        (lengths in R)."""
         h, g, width = self.h / self.radius, self.growth, self.W / self.radius
 
-        def ring(sign: int, depth: float) -> float:  # integral of r dr / t^2 from the arc outward (1) or inward (-1)
+        def ring(
+            sign: int, depth: float
+        ) -> float:  # integral of r dr / t^2 from the arc outward (1) or inward (-1)
             t = h + g * depth
             return (1 - sign * h / g) / g * (1 / h - 1 / t) + sign * math.log(t / h) / g**2
 
@@ -77,23 +124,30 @@ class JointGeometry(Section):
 
     @property
     def is_ring(self) -> bool:
-        """Whether the hole's body is a ring under opposite forces, without supports, instead of a held block."""
+        """Whether the hole's body is a ring under opposite forces, without supports, instead of a
+        held block."""
         return self.model == "ring"
 
     @property
     def arc_end(self) -> float:
-        """Angle [rad] from the contact axis to which the arcs are modelled: a quarter of a circle, in a ring half."""
+        """Angle [rad] from the contact axis to which the arcs are modelled: a quarter of a circle,
+        in a ring half."""
         return math.pi if self.is_ring else math.pi / 2
 
     @property
     def pin_depth(self) -> float:
-        """How far below the hole's centre that of the pin lies at first: they touch, in a ring they are concentric."""
+        """How far below the hole's centre that of the pin lies at first: they touch, in a ring they
+        are concentric."""
         return 0.0 if self.is_ring else self.dR
 
     @property
     def dR(self) -> float:
         """Clearance."""
-        return self.clearance if self.clearance is not None else (self.relative_clearance or 0.0) * self.radius
+        return (
+            self.clearance
+            if self.clearance is not None
+            else (self.relative_clearance or 0.0) * self.radius
+        )
 
     @property
     def W(self) -> float:
@@ -103,4 +157,8 @@ class JointGeometry(Section):
     @property
     def h(self) -> float:
         """Element size on the arcs, or on the hole's alone (see `size_ratio`)."""
-        return (self.relative_element_size or 0.04) * self.radius if self.element_size is None else self.element_size
+        return (
+            (self.relative_element_size or 0.04) * self.radius
+            if self.element_size is None
+            else self.element_size
+        )

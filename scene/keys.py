@@ -1,4 +1,5 @@
-"""What the sections of a scene are made of: documented keys with a unit, a default, limits and an example."""
+"""What the sections of a scene are made of: documented keys with a unit, a default, limits and an
+example."""
 
 from __future__ import annotations
 
@@ -7,7 +8,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
-from pydantic._internal._model_construction import ModelMetaclass  # pydantic has no public name for it
+from pydantic._internal._model_construction import (
+    ModelMetaclass,
+)  # pydantic has no public name for it
 
 from archord.scene.errors import InputError
 
@@ -17,18 +20,30 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 def key(
-    description: str, unit: str = "", *, default: Any = ..., example: Any = None, other: Any = None, **limits: Any
+    description: str,
+    unit: str = "",
+    *,
+    default: Any = ...,
+    example: Any = None,
+    other: Any = None,
+    **limits: Any,
 ) -> Any:
-    """A documented key; its ``unit`` is the scene's unit of that kind. ``--example`` shows ``example``, by default the
-    ``default``, or commented out what ``other`` scenes may say of a key that is absent (None) by default."""
+    """A documented key; its ``unit`` is the scene's unit of that kind. ``--example`` shows
+    ``example``, by default the ``default``, or commented out what ``other`` scenes may say of a key
+    that is absent (None) by default."""
     shown = example if other is None else other
     default = None if default is ... and other is not None else default
-    extra: Any = {"unit": unit, "shown": default if shown is None else shown, "hidden": other is not None}
+    extra: Any = {
+        "unit": unit,
+        "shown": default if shown is None else shown,
+        "hidden": other is not None,
+    }
     return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
 class Fault(ValueError):
-    """What is ``said`` of the key at ``place``: of its section, or below sections or the names of tables."""
+    """What is ``said`` of the key at ``place``: of its section, or below sections or the names of
+    tables."""
 
     def __init__(self, place: tuple[str, ...], said: str) -> None:
         super().__init__(said)
@@ -36,13 +51,15 @@ class Fault(ValueError):
 
 
 def require(holds: bool, place: str | tuple[str, ...], said: str) -> None:
-    """Raise `Fault` unless it ``holds`` what is ``said`` of the key at ``place``, a tuple or "section.key"."""
+    """Raise `Fault` unless it ``holds`` what is ``said`` of the key at ``place``, a tuple or
+    "section.key"."""
     if not holds:
         raise Fault(tuple(place.split(".")) if isinstance(place, str) else place, said)
 
 
 def given(section: BaseModel, names: tuple[str, ...]) -> str:
-    """The one key among ``names`` that ``section`` has. Raises `Fault` unless it has exactly one."""
+    """The one key among ``names`` that ``section`` has. Raises `Fault` unless it has exactly
+    one."""
     found = [name for name in names if getattr(section, name) is not None]
     require(len(found) > 0, names[0], f"is missing (or {', '.join(names[1:])})")
     require(len(found) == 1, found[0], f"must not be given together with {' and '.join(found[1:])}")
@@ -59,11 +76,15 @@ def toml_value(value: Any) -> str:
 def _part_name(name: str) -> str:
     require(name.isprintable(), (), "must be text on one line")
     require(name == name.strip(), (), "must not begin or end with a space")
-    require(" [" not in name, (), 'must not hold " [", which begins the unit in the headings of tables')
+    require(
+        " [" not in name, (), 'must not hold " [", which begins the unit in the headings of tables'
+    )
     return name
 
 
-PartName = Annotated[Name, AfterValidator(_part_name)]  # of a part of a scene, which heads columns of tables
+PartName = Annotated[
+    Name, AfterValidator(_part_name)
+]  # of a part of a scene, which heads columns of tables
 
 
 def plain(value: Any) -> Any:
@@ -78,8 +99,9 @@ def plain(value: Any) -> Any:
 
 
 class _InSentences(ModelMetaclass):
-    """Makes a section that Python code asks for as a scene makes it: numbers and lists may be numpy's, None means
-    absent, and bad values raise `InputError`, a sentence for each fault. Scenes check their sections without it."""
+    """Makes a section that Python code asks for as a scene makes it: numbers and lists may be
+    numpy's, None means absent, and bad values raise `InputError`, a sentence for each fault. Scenes
+    check their sections without it."""
 
     def __call__(cls, *values: Any, **keys: Any) -> Any:
         made: Any = cls
@@ -89,7 +111,9 @@ class _InSentences(ModelMetaclass):
 
         if values:
             known = ", ".join(cls.model_fields)
-            raise InputError(f"archord.{cls.__name__}: takes its keys by name, as name=value; they are {known}.")
+            raise InputError(
+                f"archord.{cls.__name__}: takes its keys by name, as name=value; they are {known}."
+            )
         given = plain(keys)
         try:
             return super().__call__(**given)
@@ -98,15 +122,19 @@ class _InSentences(ModelMetaclass):
 
 
 class Section(BaseModel, metaclass=_InSentences):
-    """A section of a scene: no unknown keys, no conversions, no numbers that are not finite, not to be changed."""
+    """A section of a scene: no unknown keys, no conversions, no numbers that are not finite, not to
+    be changed."""
 
-    # a section that no scene uses is not built: that of all takes as long as all the rest of a start
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)
+    # a section that no scene uses is not built: that of all takes as long as all the rest of a
+    # start
+    model_config = ConfigDict(
+        extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True
+    )
 
 
 def unused(section: BaseModel, name: str, key: str, needed: str) -> list[str]:
-    """A warning of the ``key`` of a ``section`` of this ``name`` that is not its default, as it goes with what is
-    ``needed`` alone."""
+    """A warning of the ``key`` of a ``section`` of this ``name`` that is not its default, as it
+    goes with what is ``needed`` alone."""
     value = getattr(section, key)
     if value == type(section).model_fields[key].default:
         return []

@@ -1,4 +1,5 @@
-"""The parts of a general scene: mesh, bodies, interactions, couplings, supports, loads, and the path of the loads."""
+"""The parts of a general scene: mesh, bodies, interactions, couplings, supports, loads, and the
+path of the loads."""
 
 from __future__ import annotations
 
@@ -34,21 +35,28 @@ class Mesh(Section):
     """Where the mesh comes from: a file, or the shape of a preset."""
 
     file: Name | None = key(
-        "gmsh (.msh), Abaqus, CalculiX (.inp), dolfinx (.xdmf), archord (.npz) file", default=None, example="a.msh"
+        "gmsh (.msh), Abaqus, CalculiX (.inp), dolfinx (.xdmf), archord (.npz) file",
+        default=None,
+        example="a.msh",
     )
     scale: Positive = key("factor on the coordinates, 1000 for a file in metres", default=1.0)
-    order: Literal[1, 2, 3] | None = key("order of the geometry, that of the file if absent; 2 for circles", other=2)
+    order: Literal[1, 2, 3] | None = key(
+        "order of the geometry, that of the file if absent; 2 for circles", other=2
+    )
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
     circle: list[Circle] = Field(default_factory=list, description="circles that facet sets lie on")
-    shape: Annotated[LugShape | ClevisShape | BushingShape | JointShape, Field(discriminator="kind")] | None = Field(
-        None, description="the shape of a preset, as `archord scene --expand` prints it"
-    )
+    shape: (
+        Annotated[LugShape | ClevisShape | BushingShape | JointShape, Field(discriminator="kind")]
+        | None
+    ) = Field(None, description="the shape of a preset, as `archord scene --expand` prints it")
 
     @model_validator(mode="after")
     def _one_source(self) -> Mesh:
         given(self, ("file", "shape"))
         for name in ("scale", "order", "refine", "circle") if self.shape is not None else ():
-            unsaid = getattr(self, name) == type(self).model_fields[name].get_default(call_default_factory=True)
+            unsaid = getattr(self, name) == type(self).model_fields[name].get_default(
+                call_default_factory=True
+            )
             require(unsaid, name, "is for a mesh file: mesh.shape has sizes of its own")
         return self
 
@@ -65,10 +73,16 @@ class Interaction(Section):
 
     name: PartName = key("name of the interaction", example="contact")
     surfaces: Surfaces = key("two facet sets, or one beside a rigid disc", example=["pin", "hole"])
-    rigid: RigidCircle | None = key("rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0})
-    law: Literal["frictionless", "tied"] = key("contact without friction, or tied surfaces", default="frictionless")
+    rigid: RigidCircle | None = key(
+        "rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0}
+    )
+    law: Literal["frictionless", "tied"] = key(
+        "contact without friction, or tied surfaces", default="frictionless"
+    )
     friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
-    integrated: Name | None = key("the one facet set whose points carry the contact; both do if absent", other="hole")
+    integrated: Name | None = key(
+        "the one facet set whose points carry the contact; both do if absent", other="hole"
+    )
     interference: NotNegative = key(
         "of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are pushed together, in a "
         "stage first; a drawn gap is taken off",
@@ -84,13 +98,19 @@ class Interaction(Section):
 
     @model_validator(mode="after")
     def _surfaces(self) -> Interaction:
-        wanted, said = (1, "one facet set beside a rigid disc") if self.rigid else (2, "two facet sets")
+        wanted, said = (
+            (1, "one facet set beside a rigid disc") if self.rigid else (2, "two facet sets")
+        )
         require(len(self.surfaces) == wanted, "surfaces", f"must name {said}")
         require(len({*self.surfaces}) == wanted, "surfaces", "must be two different facet sets")
         taken = [name for name in self.surfaces if name in _OF_CONTACT or "/" in name]
         said = f"must not name {taken}: contact.h5 has no room for such a name, rename the set in the mesh"
         require(not taken, "surfaces", said)
-        require(self.integrated in (None, *self.surfaces), "integrated", f"must be one of the surfaces {self.surfaces}")
+        require(
+            self.integrated in (None, *self.surfaces),
+            "integrated",
+            f"must be one of the surfaces {self.surfaces}",
+        )
         require(not (self.friction and self.law == "tied"), "friction", "is not for tied surfaces")
         fits = self.interference or self.overlap
         require(not (fits and self.law == "tied"), "interference", "is not for tied surfaces")
@@ -104,7 +124,8 @@ class Coupling(Section):
     facets: Name = key("facet set", example="bore")
     point: Pair = key("the reference point", "length", example=[0.0, 0.0])
     kind: Literal["rigid", "distributing"] = key(
-        "rigid: the facets move as one body; distributing: only on average, forces are spread", default="rigid"
+        "rigid: the facets move as one body; distributing: only on average, forces are spread",
+        default="rigid",
     )
 
 
@@ -112,9 +133,12 @@ class Support(Section):
     """What is held."""
 
     name: PartName = key("name of the support", example="clamp")
-    on: Name = key("coupling, or facet, point or cell set: the first that has the name", example="clamp")
+    on: Name = key(
+        "coupling, or facet, point or cell set: the first that has the name", example="clamp"
+    )
     fixed: Freedoms = key(
-        "directions held, also where a load's set shares nodes; rotation is of couplings alone", example=["x", "y"]
+        "directions held, also where a load's set shares nodes; rotation is of couplings alone",
+        example=["x", "y"],
     )
 
 
@@ -123,22 +147,39 @@ class Load(Loading):
 
     kinds = ("displacement", "force", "pressure")
     name: PartName = key("name of the load", example="press")
-    on: Name = key("disc's interaction, coupling, facet, point or cell set: the first of the name", example="flat")
-    direction: Freedom | None = key("of displacement and force; rotation: of couplings", default=None, example="x")
+    on: Name = key(
+        "disc's interaction, coupling, facet, point or cell set: the first of the name",
+        example="flat",
+    )
+    direction: Freedom | None = key(
+        "of displacement and force; rotation: of couplings", default=None, example="x"
+    )
     displacement: Targets | None = key(
-        "displacement, up to the size of the mesh (rotation: angle in rad)", "length", default=None, example=0.1
+        "displacement, up to the size of the mesh (rotation: angle in rad)",
+        "length",
+        default=None,
+        example=0.1,
     )
-    force: Targets | None = key("force on the whole or moment; a facet set with it stays straight", "force", other=1e3)
+    force: Targets | None = key(
+        "force on the whole or moment; a facet set with it stays straight", "force", other=1e3
+    )
     core: RigidCircle | None = key(
-        "circle in which a force on cells is spread, less and less outward", other={"centre": [0.0, 0.0], "radius": 1.0}
+        "circle in which a force on cells is spread, less and less outward",
+        other={"centre": [0.0, 0.0], "radius": 1.0},
     )
-    pressure: Targets | None = key("pressure on a facet set, on its undeformed area", "stress", other=10.0)
+    pressure: Targets | None = key(
+        "pressure on a facet set, on its undeformed area", "stress", other=10.0
+    )
 
     @model_validator(mode="after")
     def _directed(self) -> Load:
         require(self.core is None or self.force is not None, "core", "is for a force on cells")
         directed = (self.direction is None) == (self.pressure is not None)
-        said = "is missing" if self.pressure is None else "is not for a pressure, which acts along the normal"
+        said = (
+            "is missing"
+            if self.pressure is None
+            else "is not for a pressure, which acts along the normal"
+        )
         require(directed, "direction", said)
         turns = self.direction == "rotation" and self.displacement is not None
         said = "must be at most 1.5708, a right angle in radians: a coupling turns linearly"
@@ -147,8 +188,12 @@ class Load(Loading):
 
 
 class Path(Section):
-    """How the loads reach their values: in stages, one for every value of the longest list; a load with fewer values
-    keeps its last one."""
+    """How the loads reach their values: in stages, one for every value of the longest list; a load
+    with fewer values keeps its last one."""
 
-    steps: StepCounts = key("output steps of each stage: one number for all, or a list with one for each", default=20)
-    fit_steps: Steps = key("output steps of the stage before, in which interferences arise", default=1)
+    steps: StepCounts = key(
+        "output steps of each stage: one number for all, or a list with one for each", default=20
+    )
+    fit_steps: Steps = key(
+        "output steps of the stage before, in which interferences arise", default=1
+    )

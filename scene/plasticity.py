@@ -8,23 +8,38 @@ from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from archord.materials.hardening import Hardening, LinearHardening, SwiftHardening, TabularHardening, VoceHardening
+from archord.materials.hardening import (
+    Hardening,
+    LinearHardening,
+    SwiftHardening,
+    TabularHardening,
+    VoceHardening,
+)
 from archord.materials.named import metal, metals
 from archord.scene.keys import Fault, Pair, Positive, Section, key, require
 
 ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
-_LAWS = {"Voce": {"saturation", "rate"}, "Swift": {"offset", "exponent"}, "a tension test": {"engineering"}}
+_LAWS = {
+    "Voce": {"saturation", "rate"},
+    "Swift": {"offset", "exponent"},
+    "a tension test": {"engineering"},
+}
 
 
 class HardeningLaw(Section):
-    """Parameters of one law: ``saturation`` and ``rate`` (Voce), ``offset`` and ``exponent`` (Swift), or
-    ``engineering``, the points (strain, stress) of a tension test from first yield on."""
+    """Parameters of one law: ``saturation`` and ``rate`` (Voce), ``offset`` and ``exponent``
+    (Swift), or ``engineering``, the points (strain, stress) of a tension test from first yield
+    on."""
 
     saturation: Positive | None = key("Voce: yield stress at large PEEQ", "stress", default=None)
     rate: Positive | None = key("Voce: how fast it gets there", default=None)
     offset: Positive | None = key("Swift: PEEQ by which the power law is shifted", default=None)
-    exponent: Annotated[float, Field(gt=0, le=1)] | None = key("Swift: exponent of the power law", default=None)
-    engineering: list[Pair] | None = key("points [strain, stress] of a tension test", default=None, min_length=1)
+    exponent: Annotated[float, Field(gt=0, le=1)] | None = key(
+        "Swift: exponent of the power law", default=None
+    )
+    engineering: list[Pair] | None = key(
+        "points [strain, stress] of a tension test", default=None, min_length=1
+    )
 
     @model_validator(mode="after")
     def _one_law(self) -> HardeningLaw:
@@ -34,7 +49,13 @@ class HardeningLaw(Section):
 
 
 def _kind(value: Any) -> str:
-    return "list" if isinstance(value, list) else "law" if isinstance(value, dict | HardeningLaw) else "number"
+    return (
+        "list"
+        if isinstance(value, list)
+        else "law"
+        if isinstance(value, dict | HardeningLaw)
+        else "number"
+    )
 
 
 HardeningKey = Annotated[
@@ -55,7 +76,9 @@ def filled(data: Any, unit: str) -> Any:
         data = data | {"material": str(data["material"])}  # as --set reads 4340
     if isinstance(data.get("material"), str) and not data.get("rigid"):
         data = _brought(data, unit) | data
-    with suppress(TypeError, ValueError, LookupError, OverflowError):  # what is no table is refused later
+    with suppress(
+        TypeError, ValueError, LookupError, OverflowError
+    ):  # what is no table is refused later
         begin = first_yield(data.get("hardening"))
         said = data.get("yield_stress")
         near = [math.isclose(said, stress, rel_tol=ROUNDED) for stress in begin if said is not None]
@@ -86,7 +109,9 @@ def _brought(data: dict[str, Any], unit: str) -> dict[str, Any]:
 
 def _begins(hardening: Any) -> bool:
     """Whether this hardening says itself where it begins: a table, or a tension test."""
-    return isinstance(hardening, list) or (isinstance(hardening, dict) and "engineering" in hardening)
+    return isinstance(hardening, list) or (
+        isinstance(hardening, dict) and "engineering" in hardening
+    )
 
 
 def first_yield(hardening: Any) -> tuple[float, ...]:
@@ -101,7 +126,8 @@ def first_yield(hardening: Any) -> tuple[float, ...]:
 
 
 def hardening_law(yield_stress: float, hardening: Any, E: float) -> Hardening:
-    """The hardening of a body with this yield stress and Young's modulus. Raises ValueError for what is no such law."""
+    """The hardening of a body with this yield stress and Young's modulus. Raises ValueError for
+    what is no such law."""
     if isinstance(hardening, list):
         return TabularHardening(tuple(map(tuple, hardening)))
     if not isinstance(hardening, HardeningLaw):

@@ -16,7 +16,13 @@ from archord.scene.sections import ProblemAnalysis, ProblemOutput, Stepping, Uni
 
 FORMAT = 2
 # parts whose names must differ, as results, reactions and drives are found by them
-_APART = {"body": (), "interaction": ("body", "coupling"), "coupling": (), "support": ("coupling", "load"), "load": ()}
+_APART = {
+    "body": (),
+    "interaction": ("body", "coupling"),
+    "coupling": (),
+    "support": ("coupling", "load"),
+    "load": (),
+}
 GIVEN = " given from Python"
 LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
@@ -29,7 +35,8 @@ class MeshScene(Checked):
 
 
 class ProblemScene(Checked):
-    """Bodies on a mesh, what they touch, what holds them and what loads them; made as `Scene`. Raises `InputError`."""
+    """Bodies on a mesh, what they touch, what holds them and what loads them; made as `Scene`.
+    Raises `InputError`."""
 
     format: Literal[2] = key("version of the scene format", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
@@ -40,8 +47,12 @@ class ProblemScene(Checked):
     support: list[Support] = Field(default_factory=list, description="what is held")
     load: list[Load] = Field(description="what moves or presses", min_length=1)
     path: Path = Field(default_factory=Path, description="stages and steps of the loads")
-    analysis: ProblemAnalysis = Field(default_factory=ProblemAnalysis, description="model and solver")
-    stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
+    analysis: ProblemAnalysis = Field(
+        default_factory=ProblemAnalysis, description="model and solver"
+    )
+    stepping: Stepping = Field(
+        default_factory=Stepping, description="control of the steps between outputs"
+    )
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
     @model_validator(mode="after")
@@ -49,12 +60,16 @@ class ProblemScene(Checked):
         for section, others in _APART.items():
             for part, other in product(getattr(self, section), (section, *others)):
                 alike = [p for p in getattr(self, other) if p.name == part.name and p is not part]
-                said = f"must not be the name of {'another' if other == section else 'a'} {other}, too"
+                said = (
+                    f"must not be the name of {'another' if other == section else 'a'} {other}, too"
+                )
                 require(not alike, (section, part.name, "name"), said)
         used: dict[str, str] = {}
         for part, name in [(i, name) for i in self.interaction for name in i.surfaces]:
             place, other = ("interaction", part.name, "surfaces"), used.setdefault(name, part.name)
-            require(other == part.name, place, f"must not name {name!r}, which {other!r} has already")
+            require(
+                other == part.name, place, f"must not name {name!r}, which {other!r} has already"
+            )
         self._directions()
         require_different(self)
         require_solids({("body", name): body for name, body in self.solids.items()})
@@ -63,20 +78,30 @@ class ProblemScene(Checked):
         return self
 
     def _directions(self) -> None:
-        """Raise `Fault` where one direction of one place is held or loaded twice, or turns what cannot turn."""
-        couplings, discs = {c.name for c in self.coupling}, {i.name for i in self.interaction if i.rigid}
+        """Raise `Fault` where one direction of one place is held or loaded twice, or turns what
+        cannot turn."""
+        couplings, discs = (
+            {c.name for c in self.coupling},
+            {i.name for i in self.interaction if i.rigid},
+        )
         seen: dict[tuple[str, str], str] = {}
         parts = [("support", s.name, s.on, f) for s in self.support for f in s.fixed]
         parts += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
         for section, name, on, freedom in parts:
             at = (section, name, "fixed" if section == "support" else "direction")
             turns = freedom != "rotation" or on in couplings
-            require(turns, at, f'must be "x" or "y": {on!r} is no coupling, which alone has a rotation')
+            require(
+                turns, at, f'must be "x" or "y": {on!r} is no coupling, which alone has a rotation'
+            )
             before = seen.get((on, freedom))
             said = f"repeats {freedom!r} of {on!r}, which {before} holds or loads already"
             require(before is None or on not in couplings | discs, at, said)
             seen[on, freedom] = f"the {section} {name!r}"
-            require(section == "load" or on not in discs, (section, name, "on"), "must not be a rigid disc")
+            require(
+                section == "load" or on not in discs,
+                (section, name, "on"),
+                "must not be a rigid disc",
+            )
         for load in (load for load in self.load if load.kind == "pressure"):
             place, held = ("load", load.name, "on"), {(load.on, "x"), (load.on, "y")} <= seen.keys()
             require(load.on not in couplings | discs, place, "must be a facet set for a pressure")
@@ -86,7 +111,10 @@ class ProblemScene(Checked):
     def doubts(self) -> list[str]:
         """What to warn of before anything is solved."""
         fit = "an overlap or an interference"
-        return [*super().doubts, *([] if self.fits else unused(self.path, "path", "fit_steps", fit))]
+        return [
+            *super().doubts,
+            *([] if self.fits else unused(self.path, "path", "fit_steps", fit)),
+        ]
 
     @property
     def n_stages(self) -> int:
@@ -106,12 +134,15 @@ class ProblemScene(Checked):
     @property
     def targets(self) -> list[float]:
         """The load factor at every output step; stage k ends at k."""
-        counts = [self.path.fit_steps] * self.fits + steps_of(self.path.steps, self.n_stages, "path.steps")
+        counts = [self.path.fit_steps] * self.fits + steps_of(
+            self.path.steps, self.n_stages, "path.steps"
+        )
         return [stage + k / n for stage, n in enumerate(counts) for k in range(1, n + 1)]
 
     @property
     def travelled(self) -> list[list[float]]:
-        """Load factor and value of every load at every output step: what two scenes share as far as they agree."""
+        """Load factor and value of every load at every output step: what two scenes share as far as
+        they agree."""
         table = [np.interp(self.targets, range(len(v)), v) for v in map(self.values, self.load)]
         return [[float(v) for v in row] for row in np.column_stack([self.targets, *table])]
 
@@ -124,7 +155,9 @@ class ProblemScene(Checked):
     @property
     def loading(self) -> str:
         """What a run must be loaded by to be continued with this scene, in words."""
-        return " and ".join(f'load "{q.name}" ({q.kind} {q.direction or "normal"} on {q.on})' for q in self.load)
+        return " and ".join(
+            f'load "{q.name}" ({q.kind} {q.direction or "normal"} on {q.on})' for q in self.load
+        )
 
     @property
     def solids(self) -> dict[str, Body]:

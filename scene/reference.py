@@ -1,4 +1,5 @@
-"""What a scene file may hold, from the model of scenes: a commented example, and the reference tables."""
+"""What a scene file may hold, from the model of scenes: a commented example, and the reference
+tables."""
 
 from __future__ import annotations
 
@@ -14,13 +15,19 @@ from archord.scene.scene import FORMAT as JOINT_FORMAT
 from archord.scene.scene import Scene
 from archord.scene.shapes import PRESETS, BushingShape, ClevisShape, JointShape, LugShape
 
-_JOINT: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
-_GENERAL: dict[str, Any] = {name: info for name, info in ProblemScene.model_fields.items() if name != "format"}
+_JOINT: dict[str, Any] = {
+    name: info for name, info in Scene.model_fields.items() if name != "format"
+}
+_GENERAL: dict[str, Any] = {
+    name: info for name, info in ProblemScene.model_fields.items() if name != "format"
+}
 _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
 # sections of presets; the load is the same for all
 _LUG = {name: PRESETS["lug"].model_fields[name] for name in ("lug", "plate", "bushing")}
 _CLEVIS = {name: PRESETS["clevis"].model_fields[name] for name in ("clevis", "inner", "outer")}
-_RINGS = {name: PRESETS["bushing"].model_fields[name] for name in ("bushing", "sleeve", "housing", "load")}
+_RINGS = {
+    name: PRESETS["bushing"].model_fields[name] for name in ("bushing", "sleeve", "housing", "load")
+}
 _SHAPED = {
     "pin": '`"half"`, `"whole"` or `"none"`, for a rigid disc',
     "rings": "list of [bore, outer] from the pin outward",
@@ -50,18 +57,28 @@ _MEETING = (
     "Both at once count the fit twice: where they are alike the scene is refused.\n",
 )
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-_KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
+_KINDS = {
+    "number": "number",
+    "integer": "whole number",
+    "string": "text",
+    "boolean": "true, false",
+    "array": "list",
+}
 
 
 def example(general: bool = False) -> str:
-    """A commented scene that shows every key, of a joint or a ``general`` one; alternatives and absent defaults are
-    commented out."""
+    """A commented scene that shows every key, of a joint or a ``general`` one; alternatives and
+    absent defaults are commented out."""
     sections, version = (_GENERAL, FORMAT) if general else (_JOINT, JOINT_FORMAT)
     text = f"# An archord scene: archord solve scene.toml\n\nformat = {version}  # version of the scene format\n"
     for section, info in sections.items():
         text += f"\n{_heading(section, info)}  # {info.description}\n"
         for name, key, schema in _keys(info):
-            default = "" if schema.get("default") is None else f", default {toml_value(schema['default'])}"
+            default = (
+                ""
+                if schema.get("default") is None
+                else f", default {toml_value(schema['default'])}"
+            )
             unit = f" [{schema['unit']}]" if schema["unit"] else ""
             shown = f"{'# ' if schema['hidden'] else ''}{name} = {toml_value(schema['shown'])}"
             text += f"{shown}  # {key.description}{unit}{default}\n"
@@ -81,7 +98,9 @@ def reference() -> str:
         "## General scenes\n",
         "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The sections units, stepping "
         "and output are those of joints. Headings in double brackets may stand any number of times.\n",
-        *_tables(_GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}),
+        *_tables(
+            _GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}
+        ),
         *_shapes(),
         *_MEETING,
         "## Presets\n",
@@ -103,11 +122,15 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
         table = Table("key", "unit", "default", "allowed", "what")
         for name, key, schema in _keys(info):
             if name not in known:
-                default = "" if schema.get("default") is None else f"`{toml_value(schema['default'])}`"
+                default = (
+                    "" if schema.get("default") is None else f"`{toml_value(schema['default'])}`"
+                )
                 default = "required" if key.is_required() else default
                 table.add(f"`{name}`", schema["unit"], default, _allowed(schema), key.description)
         if table.rows:
-            said = f"{info.description[0].upper()}{info.description[1:]}{', also' if known else ''}.\n"
+            said = (
+                f"{info.description[0].upper()}{info.description[1:]}{', also' if known else ''}.\n"
+            )
             yield from (f"### {_heading(section, info)}\n", said, table.markdown())
 
 
@@ -133,10 +156,14 @@ def _heading(section: str, info: Any) -> str:
 
 def materials() -> str:
     """The metals that a scene may name, as a Markdown table; stresses in MPa."""
-    table = Table("name", "what", "E", "nu", "yield", "tensile", "hardens from", "to", "at PEEQ", "source")
+    table = Table(
+        "name", "what", "E", "nu", "yield", "tensile", "hardens from", "to", "at PEEQ", "source"
+    )
     for name, m in metals().items():
         (_, first), (peeq, last) = m["hardening"][0], m["hardening"][-1]
-        values = (f"{value:g}" for value in (m["E"], m["nu"], m["yield"], m["tensile"], first, last, peeq))
+        values = (
+            f"{value:g}" for value in (m["E"], m["nu"], m["yield"], m["tensile"], first, last, peeq)
+        )
         table.add(f"`{name}`", m["title"], *values, m["source"])
     return table.markdown()
 

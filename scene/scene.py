@@ -1,4 +1,5 @@
-"""The scene: a joint and its loading, checked, with every key's unit and default; in any consistent set of units."""
+"""The scene: a joint and its loading, checked, with every key's unit and default; in any consistent
+set of units."""
 
 from __future__ import annotations
 
@@ -16,27 +17,42 @@ from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Section, key, plain, require, unused
 from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
-FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
-STEPS = ("stepping.initial", "stepping.maximum")  # what an accuracy chooses of any scene, and of a joint
+# version of the scene format: rises when a scene gets a meaning that an older archord would get
+# wrong
+FORMAT = 1
+STEPS = (
+    "stepping.initial",
+    "stepping.maximum",
+)  # what an accuracy chooses of any scene, and of a joint
 CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", *STEPS)
 _FAR = 0.1  # displacement over R beyond which small strain may be qualitatively wrong
 _STIFFEST = 1.6  # P over E* delta of no joint in a block: 1.53 where the clearance vanishes
-_STIFFEST_STUCK = 3.5  # the same with friction: 2.2 with a coefficient of 1, 3.15 where nothing slides
+_STIFFEST_STUCK = (
+    3.5  # the same with friction: 2.2 with a coefficient of 1, 3.15 where nothing slides
+)
 _SOFTEST = 1e-8  # ratio of the moduli
 _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 
 
 class Checked(Section):
-    """A scene, checked: sections given as tables or as their classes; the default ``format`` is the newest."""
+    """A scene, checked: sections given as tables or as their classes; the default ``format`` is the
+    newest."""
 
-    def __init__(self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any) -> None:
-        """Check ``sections`` as read from ``source``; ``origin`` names another source of some keys."""
+    def __init__(
+        self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any
+    ) -> None:
+        """Check ``sections`` as read from ``source``; ``origin`` names another source of some
+        keys."""
         try:
             data = plain(sections)
         except RecursionError:
-            raise InputError(f"{source}: is not a scene: its tables are nested too deeply.") from None
+            raise InputError(
+                f"{source}: is not a scene: its tables are nested too deeply."
+            ) from None
         version, newest = data.get("format"), type(self).model_fields["format"].default
-        if isinstance(version, int) and version > newest:  # it may hold anything else that is unknown here
+        if (
+            isinstance(version, int) and version > newest
+        ):  # it may hold anything else that is unknown here
             said = f"is for a newer archord; this one reads format {newest}"
             raise InputError(f"{source}: format = {version} {said}.")
         try:
@@ -44,7 +60,9 @@ class Checked(Section):
             context = {"stress": str(units.get("stress", "MPa"))} if isinstance(units, dict) else {}
             self.__pydantic_validator__.validate_python(data, self_instance=self, context=context)
         except ValidationError as error:
-            raise InputError(in_sentences(error.errors(), data, type(self), source, dict(origin or {}))) from None
+            raise InputError(
+                in_sentences(error.errors(), data, type(self), source, dict(origin or {}))
+            ) from None
 
     def require_open(self: Any, chosen: tuple[str, ...]) -> None:
         """Raise `Fault` if the scene gives a key of those that its accuracy chooses."""
@@ -52,7 +70,9 @@ class Checked(Section):
             section, key = name.split(".")
             table = getattr(self, section)
             free = key not in table.model_fields_set or getattr(table, key) is None
-            require(free, name, "must not be given together with analysis.accuracy, which chooses it")
+            require(
+                free, name, "must not be given together with analysis.accuracy, which chooses it"
+            )
 
     @property
     def thickness(self: Any) -> float:
@@ -70,7 +90,8 @@ class Checked(Section):
         words how it hardens."""
         unit, solids = self.units.stress, self.solids.items()
         return {
-            name: solid.model_dump(include={"E", "nu", "yield_stress"}) | {"strength": solid.strength(unit)}
+            name: solid.model_dump(include={"E", "nu", "yield_stress"})
+            | {"strength": solid.strength(unit)}
             for name, solid in solids
         }
 
@@ -83,18 +104,23 @@ class Checked(Section):
 class Scene(Checked):
     """A pin joint and how to load it.
 
-    ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections: tables or their classes, whose
-    numbers and lists may be numpy's; None means absent. Raises `InputError`, a sentence for each fault.
+    ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections: tables or
+    their classes, whose numbers and lists may be numpy's; None means absent. Raises `InputError`, a
+    sentence for each fault.
     """
 
-    format: Literal[1] = key("version of the scene format; a scene of a newer version is refused", default=FORMAT)
+    format: Literal[1] = key(
+        "version of the scene format; a scene of a newer version is refused", default=FORMAT
+    )
     units: Units = Field(default_factory=Units, description="names of the units")
     joint: JointGeometry = Field(description="geometry and mesh")
     pin: Pin = Field(description="material of the pin")
     block: Solid = Field(description="material of the block")
     analysis: Analysis = Field(default_factory=Analysis, description="model and solver")
     load: Load = Field(description="loading")
-    stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
+    stepping: Stepping = Field(
+        default_factory=Stepping, description="control of the steps between outputs"
+    )
     output: Output = Field(default_factory=Output, description="what is written")
 
     @model_validator(mode="after")
@@ -108,9 +134,18 @@ class Scene(Checked):
             said = 'does not load a joint whose model is "ring"; give force or relative_force'
             require(self.force_controlled, load, said)
             require(not pin.rigid, "pin.rigid", 'must be false where joint.model is "ring"')
-            require(not pin.whole, "pin.whole", 'is for joint.model = "block": the pin of a ring is whole anyway')
-        scale, what = (self.E_star * self.thickness, "E* R") if self.force_controlled else (1.0, "the radius")
-        most, unit = 0.5 * scale * joint.radius, " clearances" if self.load.kind == "displacement" else ""
+            require(
+                not pin.whole,
+                "pin.whole",
+                'is for joint.model = "block": the pin of a ring is whole anyway',
+            )
+        scale, what = (
+            (self.E_star * self.thickness, "E* R") if self.force_controlled else (1.0, "the radius")
+        )
+        most, unit = (
+            0.5 * scale * joint.radius,
+            " clearances" if self.load.kind == "displacement" else "",
+        )
         said = f"must not exceed {most / self.load_unit:g}{unit}, half {what}"
         require(max(map(abs, self.targets)) <= most, load, said)
         return self
@@ -118,7 +153,9 @@ class Scene(Checked):
     def require_mesh(self) -> None:
         """Raise `InputError` if the scene leaves its mesh to `archord.studies.accuracy`."""
         if self.analysis.accuracy is not None:
-            raise InputError(f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it here.")
+            raise InputError(
+                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it here."
+            )
 
     @property
     def force_controlled(self) -> bool:
@@ -143,7 +180,8 @@ class Scene(Checked):
 
     @property
     def _doubts_of_path(self) -> list[str]:
-        """A warning of a pin that is lifted so far that it would meet the half of the hole that is not there."""
+        """A warning of a pin that is lifted so far that it would meet the half of the hole that is
+        not there."""
         lifted = -min(self.targets)
         if self.force_controlled or lifted <= 2 * self.joint.dR:
             return []
@@ -162,15 +200,19 @@ class Scene(Checked):
             farthest, least = farthest / (stiffest * self.E_star * self.thickness), "at least "
         if farthest <= self.small or self.joint.is_ring:
             return []
-        moved, error = f"load.{self.load.kind} moves the pin by {least}{farthest:.2g} R", self.too_low * farthest
+        moved, error = (
+            f"load.{self.load.kind} moves the pin by {least}{farthest:.2g} R",
+            self.too_low * farthest,
+        )
         fall = ", and may let it fall where it should rise" if farthest > _FAR else ""
         said = f"{moved}: small-strain theory makes P about {100 * error:.2g} % too low there{fall}"
         return [f'{said}; analysis.strain = "large" is for that']
 
     @property
     def too_low(self) -> float:
-        """By what part of itself P of small strain is about too low, over delta/R: of elastic joints 0.15 to 0.17, of
-        yielding ones 0.2 to 0.8, of dR/R from 0.5 to 5 % and delta up to R/10."""
+        """By what part of itself P of small strain is about too low, over delta/R: of elastic
+        joints 0.15 to 0.17, of yielding ones 0.2 to 0.8, of dR/R from 0.5 to 5 % and delta up to
+        R/10."""
         return 0.4 if self.plastic else 0.16
 
     @property
@@ -181,7 +223,10 @@ class Scene(Checked):
     @property
     def load_unit(self) -> float:
         """What the targets of the section load are multiplied by."""
-        scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius * self.thickness}
+        scale = {
+            "displacement": self.joint.dR,
+            "relative_force": self.E_star * self.joint.radius * self.thickness,
+        }
         return scale.get(self.load.kind, 1.0)
 
     @property
@@ -189,7 +234,9 @@ class Scene(Checked):
         """The load at every output step: the displacement of the pin, or the force on it."""
         ends = [0.0, *(stage * self.load_unit for stage in self.load.stages)]
         stages = zip(pairwise(ends), self.load.stage_steps, strict=True)
-        return [b if k == n else a + (b - a) * k / n for (a, b), n in stages for k in range(1, n + 1)]
+        return [
+            b if k == n else a + (b - a) * k / n for (a, b), n in stages for k in range(1, n + 1)
+        ]
 
     @property
     def travelled(self) -> list[list[float]]:
@@ -208,8 +255,11 @@ class Scene(Checked):
 
     @property
     def E_star(self) -> float:
-        """Contact modulus of the pair, ``1/E* = sum over deformable bodies of 1/E*_i`` (Johnson 1985, eq. 4.20)."""
-        return 1 / sum(1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in self.solids.values())
+        """Contact modulus of the pair, ``1/E* = sum over deformable bodies of 1/E*_i`` (Johnson
+        1985, eq. 4.20)."""
+        return 1 / sum(
+            1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in self.solids.values()
+        )
 
     @property
     def solids(self) -> dict[str, Solid]:
@@ -218,14 +268,25 @@ class Scene(Checked):
 
 
 def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
-    """Raise `Fault` for moduli and strengths, by their places, that leave the tolerances or the range of numbers."""
+    """Raise `Fault` for moduli and strengths, by their places, that leave the tolerances or the
+    range of numbers."""
     stiffest = max(solid.E for solid in solids.values())
     for place, solid in solids.items():
         modulus, strength = (*place, "E"), solid.yield_stress
-        require(1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units")
+        require(
+            1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units"
+        )
         said = f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in one unit"
         require(stiffest <= solid.E / _SOFTEST, modulus, said)
         strong = strength is None or strength >= _WEAKEST * solid.E
-        require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E, in the same unit")
+        require(
+            strong,
+            (*place, "yield_stress"),
+            f"must be at least {_WEAKEST:g} times E, in the same unit",
+        )
         allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
-        require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E, in the same unit")
+        require(
+            allowed,
+            (*place, "hardening"),
+            f"must not exceed {1 / _WEAKEST:g} times E, in the same unit",
+        )

@@ -1,4 +1,5 @@
-"""The sections of a scene but for the geometry: units, bodies, load, model and solver, steps, output."""
+"""The sections of a scene but for the geometry: units, bodies, load, model and solver, steps,
+output."""
 
 from __future__ import annotations
 
@@ -18,7 +19,10 @@ NotNegative = Annotated[float, Field(ge=0)]
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
-_E, _NU = "Young's modulus, unless a material brings it", "Poisson's ratio, unless a material brings it"
+_E, _NU = (
+    "Young's modulus, unless a material brings it",
+    "Poisson's ratio, unless a material brings it",
+)
 _STUCK = 1000.0  # coefficient of friction from which points are meant to stick
 MOST_STEPS = 10_000  # output steps
 _COERCIVE = 0.25  # gamma over the trace constant, from which on Nitsche's form is coercive
@@ -27,9 +31,13 @@ Side = Literal["both", "pin", "block"]
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS)]
 _Kind = Discriminator(lambda value: "list" if isinstance(value, list) else "number")
 StepCounts = Annotated[
-    Annotated[Steps, Tag("number")] | Annotated[list[Steps], Field(min_length=1), Tag("list")], _Kind
+    Annotated[Steps, Tag("number")] | Annotated[list[Steps], Field(min_length=1), Tag("list")],
+    _Kind,
 ]
-Targets = Annotated[Annotated[float, Tag("number")] | Annotated[list[float], Field(min_length=1), Tag("list")], _Kind]
+Targets = Annotated[
+    Annotated[float, Tag("number")] | Annotated[list[float], Field(min_length=1), Tag("list")],
+    _Kind,
+]
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 
 
@@ -57,7 +65,8 @@ def friction_doubts(frictions: dict[str, float]) -> list[str]:
 
 
 class Units(Section):
-    """Names of the scene's units, for headings; they must be consistent (force = stress times length squared)."""
+    """Names of the scene's units, for headings; they must be consistent (force = stress times
+    length squared)."""
 
     length: Name = key("unit of length", default="mm")
     stress: Name = key("unit of stress and of Young's modulus", default="MPa")
@@ -89,8 +98,12 @@ class Units(Section):
 class Solid(Section):
     """Isotropic elastic solid, elastic-plastic (J2) with a yield stress."""
 
-    material: str | None = key("metal of docs/materials.md, for keys not given", other="S355", exclude=True)
-    yield_stress: Positive | None = key("yield stress; elastic if absent", "stress", default=None, example=300.0)
+    material: str | None = key(
+        "metal of docs/materials.md, for keys not given", other="S355", exclude=True
+    )
+    yield_stress: Positive | None = key(
+        "yield stress; elastic if absent", "stress", default=None, example=300.0
+    )
     hardening: HardeningKey = key(
         "modulus d(yield stress)/d(PEEQ), 0: perfect plasticity; or points [PEEQ, true stress]; or a law: {saturation, "
         "rate} (Voce), {offset, exponent} (Swift), {engineering = points [strain, stress] of a tension test}",
@@ -98,7 +111,8 @@ class Solid(Section):
         default=0.0,
     )
     back_stresses: Annotated[list[BackStress], Field(min_length=1, max_length=3)] | None = key(
-        "back stresses (Armstrong and Frederick): up to three [modulus, rate of recovery]", other=[[20000.0, 100.0]]
+        "back stresses (Armstrong and Frederick): up to three [modulus, rate of recovery]",
+        other=[[20000.0, 100.0]],
     )
     E: Positive = key(_E, "stress", example=210000.0)
     nu: Ratio = key(_NU, example=0.3)
@@ -110,19 +124,35 @@ class Solid(Section):
 
     @model_validator(mode="after")
     def _plasticity(self):
-        require(self.yield_stress is not None or self.hardening == 0, "hardening", "needs a yield_stress")
-        require(self.yield_stress is not None or not self.back_stresses, "back_stresses", "need a yield_stress")
-        require(all(C > 0 for C, _ in self.back_stresses or ()), "back_stresses", "must have positive moduli")
+        require(
+            self.yield_stress is not None or self.hardening == 0,
+            "hardening",
+            "needs a yield_stress",
+        )
+        require(
+            self.yield_stress is not None or not self.back_stresses,
+            "back_stresses",
+            "need a yield_stress",
+        )
+        require(
+            all(C > 0 for C, _ in self.back_stresses or ()),
+            "back_stresses",
+            "must have positive moduli",
+        )
         if self.yield_stress is not None and self.E is not None:
             try:
-                first, rise = (float(np.max(of(np.zeros(1)))) for of in (self.law.stress, self.law.slope))
+                first, rise = (
+                    float(np.max(of(np.zeros(1)))) for of in (self.law.stress, self.law.slope)
+                )
             except ValueError as error:
                 raise Fault(("hardening",), f"is no hardening law: {error}") from None
             test = getattr(self.hardening, "engineering", None)
             true = f", the true stress of {test[0][1]:g}" if test else ""
             said = f"must begin at yield_stress ({self.yield_stress:g}), not at {first:g}{true}"
             require(math.isclose(first, self.yield_stress, rel_tol=1e-9), "hardening", said)
-            require(rise >= 0, "hardening", "must not soften: saturation must be at least yield_stress")
+            require(
+                rise >= 0, "hardening", "must not soften: saturation must be at least yield_stress"
+            )
         return self
 
     @property
@@ -153,8 +183,8 @@ class Solid(Section):
         return hardening_law(self.yield_stress or 0.0, self.hardening, self.E)
 
     def constitutive(self, plane: Plane, strain: str = "small") -> Material:
-        """The constitutive law: `Elastic`, `J2Material` with a yield stress, `KinematicMaterial` with back stresses; at
-        "large" ``strain`` as a `LargeStrain`."""
+        """The constitutive law: `Elastic`, `J2Material` with a yield stress, `KinematicMaterial`
+        with back stresses; at "large" ``strain`` as a `LargeStrain`."""
         if strain == "large":
             from archord.materials.finite import LargeStrain
 
@@ -177,7 +207,9 @@ class Pin(Solid):
     E: Positive | None = key(_E, "stress", default=None, example=210000.0)  # type: ignore[assignment]
     nu: Ratio | None = key(_NU, default=None, example=0.3)  # type: ignore[assignment]
     rigid: bool = key("a rigid pin: no mesh, no other key", default=False, other=True)
-    whole: bool = key("model the unloaded half behind the pressed diameter, too", default=False, other=True)
+    whole: bool = key(
+        "model the unloaded half behind the pressed diameter, too", default=False, other=True
+    )
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
@@ -186,12 +218,17 @@ class Pin(Solid):
             said = name in self.model_fields_set and getattr(self, name)
             require(not (self.rigid and said), name, "is not for a rigid pin")
         for name in ("E", "nu"):
-            require(self.rigid or getattr(self, name) is not None, name, "is missing (or set rigid = true)")
+            require(
+                self.rigid or getattr(self, name) is not None,
+                name,
+                "is missing (or set rigid = true)",
+            )
         return self
 
 
 class Loading(Section):
-    """A load of one of several ``kinds`` (keys): one value, or a list of values at the ends of stages."""
+    """A load of one of several ``kinds`` (keys): one value, or a list of values at the ends of
+    stages."""
 
     kinds: ClassVar[tuple[str, ...]] = ("displacement", "force")
 
@@ -221,20 +258,37 @@ def steps_of(steps: int | list[int], n: int, place: str) -> list[int]:
 
 
 class Load(Loading):
-    """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""
+    """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to
+    several in turn."""
 
     kinds = (*LOADS, "path")
-    displacement: Targets | None = key("displacement of the pin over dR: target, or list", default=None, example=2.0)
-    displacement_absolute: Targets | None = key("displacement delta of the pin, instead", "length", other=0.1)
-    force: Targets | None = key("force P on the whole pin, instead of a displacement", "force", other=1000.0)
+    displacement: Targets | None = key(
+        "displacement of the pin over dR: target, or list", default=None, example=2.0
+    )
+    displacement_absolute: Targets | None = key(
+        "displacement delta of the pin, instead", "length", other=0.1
+    )
+    force: Targets | None = key(
+        "force P on the whole pin, instead of a displacement", "force", other=1000.0
+    )
     relative_force: Targets | None = key("P/(E* R), instead of force", other=0.01)
-    path: Name | None = key("CSV file of targets: one column, headed by one of the names above", other="cycle.csv")
-    core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1, ge=0.01, le=0.5)
-    steps: StepCounts = key("output steps up to each target: one number for all, or a list", default=20)
+    path: Name | None = key(
+        "CSV file of targets: one column, headed by one of the names above", other="cycle.csv"
+    )
+    core_radius: float = key(
+        "ring: radius over R of the core that the force acts on", default=0.1, ge=0.01, le=0.5
+    )
+    steps: StepCounts = key(
+        "output steps up to each target: one number for all, or a list", default=20
+    )
 
     @model_validator(mode="after")
     def _steps(self) -> Load:
-        require(self.path is None, "path", "is for scene files alone; give the list of its targets instead")
+        require(
+            self.path is None,
+            "path",
+            "is for scene files alone; give the list of its targets instead",
+        )
         steps_of(self.steps, len(self.stages), "steps")
         return self
 
@@ -248,19 +302,35 @@ class Modelling(Section):
     """How a problem is modelled and solved."""
 
     plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
-    strain: Literal["small", "large"] = key("small strains, or large ones by logarithms", default="small")
-    kinematics: Literal["current", "reference"] = key("closest points on deformed curves, or fixed", default="current")
-    gamma_factor: float = key("Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6)
-    accuracy: Accuracy | None = key("relative error of P (delta under a force) to reach by mesh and steps", other=0.001)
-    degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
-    thickness: Positive | None = key("thickness; forces and energies are per unit if absent", "length", other=10.0)
-    tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
+    strain: Literal["small", "large"] = key(
+        "small strains, or large ones by logarithms", default="small"
+    )
+    kinematics: Literal["current", "reference"] = key(
+        "closest points on deformed curves, or fixed", default="current"
+    )
+    gamma_factor: float = key(
+        "Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6
+    )
+    accuracy: Accuracy | None = key(
+        "relative error of P (delta under a force) to reach by mesh and steps", other=0.001
+    )
+    degree: Literal[2, 3] = key(
+        "polynomial degree of displacements and of the curved geometry", default=2
+    )
+    thickness: Positive | None = key(
+        "thickness; forces and energies are per unit if absent", "length", other=10.0
+    )
+    tolerance: float = key(
+        "residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4
+    )
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
     @model_validator(mode="after")
     def _large(self):
         require(
-            self.strain == "small" or self.kinematics == "current", "kinematics", 'must be "current" at large strain'
+            self.strain == "small" or self.kinematics == "current",
+            "kinematics",
+            'must be "current" at large strain',
         )
         return self
 
@@ -278,20 +348,28 @@ class Modelling(Section):
 class PresetAnalysis(Modelling):
     """How a preset is modelled and solved."""
 
-    friction: float = key("Coulomb's coefficient of friction of all contacts", default=0.0, ge=0, le=1e6)
+    friction: float = key(
+        "Coulomb's coefficient of friction of all contacts", default=0.0, ge=0, le=1e6
+    )
 
 
 class Analysis(PresetAnalysis):
     """How the joint is modelled and solved."""
 
-    coarse_start: bool = key("guess every step on a fine mesh from a coarser one; false: for comparison", default=True)
-    integration: Side = key("whose edge carries the contact integral: both (unbiased), or one side's", default="both")
+    coarse_start: bool = key(
+        "guess every step on a fine mesh from a coarser one; false: for comparison", default=True
+    )
+    integration: Side = key(
+        "whose edge carries the contact integral: both (unbiased), or one side's", default="both"
+    )
 
 
 class ProblemAnalysis(Modelling):
     """How a general problem is modelled and solved."""
 
-    symmetry: int = key("how many times the part makes up the whole, of which results are", default=1, ge=1, le=100)
+    symmetry: int = key(
+        "how many times the part makes up the whole, of which results are", default=1, ge=1, le=100
+    )
 
 
 class Stepping(Section):
@@ -302,11 +380,17 @@ class Stepping(Section):
     maximum: float = key("length beyond which a step does not grow", default=1.0, gt=0, le=1)
     growth: float = key("factor on the length after an easy step", default=2.0, ge=1, le=10)
     cutback: float = key("factor on the length after a failed step", default=0.5, ge=0.05, le=0.9)
-    target_iterations: int = key("Newton iterations up to which a step was easy", default=15, ge=1, le=1000)
+    target_iterations: int = key(
+        "Newton iterations up to which a step was easy", default=15, ge=1, le=1000
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Stepping:
-        require(self.minimum <= self.initial <= self.maximum, "initial", "must be between stepping.minimum and maximum")
+        require(
+            self.minimum <= self.initial <= self.maximum,
+            "initial",
+            "must be between stepping.minimum and maximum",
+        )
         return self
 
 
@@ -322,14 +406,19 @@ class Output(Section):
     @model_validator(mode="before")
     @classmethod
     def _level(cls, data: Any) -> Any:
-        """True is the default; scenes of older versions have the keys stress (at the nodes) and points."""
+        """True is the default; scenes of older versions have the keys stress (at the nodes) and
+        points."""
         if not isinstance(data, dict) or not isinstance(data.get("fields", True), bool):
             return data
         default = cls.model_fields["fields"].default
-        old = {name: data[name] for name in ("stress", "points") if isinstance(data.get(name), bool)}
+        old = {
+            name: data[name] for name in ("stress", "points") if isinstance(data.get(name), bool)
+        }
         level = "nodes" if old.get("stress", default == "nodes") else "cells"
         found = "points" if old.get("points") else level
-        return {k: v for k, v in data.items() if k not in old} | {"fields": data.get("fields", True) and found}
+        return {k: v for k, v in data.items() if k not in old} | {
+            "fields": data.get("fields", True) and found
+        }
 
 
 class ProblemOutput(Output):

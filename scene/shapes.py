@@ -1,4 +1,5 @@
-"""Presets: a lug, perhaps with a bushing, a clevis, and a pin in sleeves; what general scene they stand for."""
+"""Presets: a lug, perhaps with a bushing, a clevis, and a pin in sleeves; what general scene they
+stand for."""
 
 from __future__ import annotations
 
@@ -23,7 +24,11 @@ from archord.scene.sections import (
     Units,
 )
 
-_THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
+_THINNEST, _DEEPEST, _FARTHEST = (
+    0.02 * (1 - 1e-9),
+    0.03,
+    1e3,
+)  # walls, overlaps and lengths over the pin's radius
 _MATERIAL = {*Solid.model_fields}
 PinPart = Literal["half", "whole", "none"]
 
@@ -32,12 +37,20 @@ class Shape(Section):
     """A shape around a pin, and how finely it is meshed."""
 
     radius: float = key("radius R of the pin", "length", example=10.0, ge=1e-30, le=1e30)
-    element_size: Positive | None = key("edge length of elements on the arcs; 0.04 R if absent", "length", other=0.4)
-    growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
+    element_size: Positive | None = key(
+        "edge length of elements on the arcs; 0.04 R if absent", "length", other=0.4
+    )
+    growth: float = key(
+        "growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2
+    )
 
     @model_validator(mode="after")
     def _mesh(self):
-        require(1e-3 <= self.h / self.radius <= 0.5, "element_size", "must be between 1e-3 and 0.5 times the radius")
+        require(
+            1e-3 <= self.h / self.radius <= 0.5,
+            "element_size",
+            "must be between 1e-3 and 0.5 times the radius",
+        )
         return self
 
     @property
@@ -53,11 +66,19 @@ class Shape(Section):
 class Lug(Shape):
     """A straight lug, clamped at one end, and its pin, which pulls at the other."""
 
-    clearance: float = key("hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1)
+    clearance: float = key(
+        "hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1
+    )
     width: Positive = key("width W", "length", example=40.0)
-    edge_distance: Positive | None = key("from hole's centre to the loaded end; W/2 if absent", "length", other=20.0)
-    length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
-    end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
+    edge_distance: Positive | None = key(
+        "from hole's centre to the loaded end; W/2 if absent", "length", other=20.0
+    )
+    length: Positive | None = key(
+        "from the hole's centre to the clamp; 1.5 W if absent", "length", default=None
+    )
+    end: Literal["round", "square"] = key(
+        "the loaded end: an arc of radius W/2, or straight", default="round"
+    )
     half: bool = key("model the half y >= 0 alone", default=True)
 
     @model_validator(mode="after")
@@ -73,8 +94,8 @@ class Lug(Shape):
         return self.radius + self.clearance
 
     def check(self, hole: float | None = None, place: tuple[str, ...] = ()) -> None:
-        """Raise `Fault` below ``place`` for a plate in which a ``hole`` of this radius, by default its own, leaves no
-        ligament."""
+        """Raise `Fault` below ``place`` for a plate in which a ``hole`` of this radius, by default
+        its own, leaves no ligament."""
         a, R, half = self.arguments(), self.radius, self.width / 2
         hole = hole or self.hole
         behind = a["length"] - max(hole, half - a["edge_distance"])
@@ -90,22 +111,35 @@ class Lug(Shape):
 
     def arguments(self) -> dict[str, Any]:
         """What draws it: lengths, and what is drawn."""
-        lengths = {"edge_distance": self.edge_distance or self.width / 2, "length": self.length or 1.5 * self.width}
+        lengths = {
+            "edge_distance": self.edge_distance or self.width / 2,
+            "length": self.length or 1.5 * self.width,
+        }
         return super().arguments() | lengths
 
 
 class LugBushing(Solid):
-    """A bushing pressed into the hole of a lug: the pin lies in it with the clearance of the section lug."""
+    """A bushing pressed into the hole of a lug: the pin lies in it with the clearance of the
+    section lug."""
 
     thickness: Positive = key("thickness of its wall", "length", example=2.0)
-    interference: NotNegative = key("its outer radius - radius of the hole in the plate", "length", default=0.0)
+    interference: NotNegative = key(
+        "its outer radius - radius of the hole in the plate", "length", default=0.0
+    )
     bonded: bool = key("bonded to the plate, without an interference", default=False)
-    touching: bool = key("the pin touches it on the load axis at first, as under a force", default=False)
+    touching: bool = key(
+        "the pin touches it on the load axis at first, as under a force", default=False
+    )
 
     def check(self, lug: Lug, place: tuple[str, ...] = ()) -> float:
-        """The radius of the hole that it needs in the plate of ``lug``. Raises `Fault` below ``place``."""
+        """The radius of the hole that it needs in the plate of ``lug``. Raises `Fault` below
+        ``place``."""
         R, outer = lug.radius, lug.radius + lug.clearance + self.thickness
-        require(self.thickness >= _THINNEST * R, (*place, "thickness"), f"must be at least {_THINNEST:g} R")
+        require(
+            self.thickness >= _THINNEST * R,
+            (*place, "thickness"),
+            f"must be at least {_THINNEST:g} R",
+        )
         said = f"must not exceed {_DEEPEST:g} of its outer radius"
         require(self.interference <= _DEEPEST * outer, (*place, "interference"), said)
         fits = not (self.bonded and self.interference)
@@ -118,9 +152,15 @@ class LugShape(Lug):
 
     pin: PinPart = "half"
     kind: Literal["lug"] = "lug"
-    wall: Positive | None = key("thickness of a bushing's wall, if there is one", "length", default=None)
-    interference: NotNegative = key("the bushing's outer radius - radius of the hole", "length", default=0.0)
-    touching: bool = key("the pin touches on the load axis at first, or is concentric", default=True)
+    wall: Positive | None = key(
+        "thickness of a bushing's wall, if there is one", "length", default=None
+    )
+    interference: NotNegative = key(
+        "the bushing's outer radius - radius of the hole", "length", default=0.0
+    )
+    touching: bool = key(
+        "the pin touches on the load axis at first, or is concentric", default=True
+    )
 
     @property
     def hole(self) -> float:
@@ -132,9 +172,15 @@ class PlateOutline(Section):
     """The outline of one plate of a clevis."""
 
     width: Positive = key("width W", "length", example=40.0)
-    edge_distance: Positive | None = key("from hole's centre to the loaded end; W/2 if absent", "length", other=20.0)
-    length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
-    end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
+    edge_distance: Positive | None = key(
+        "from hole's centre to the loaded end; W/2 if absent", "length", other=20.0
+    )
+    length: Positive | None = key(
+        "from the hole's centre to the clamp; 1.5 W if absent", "length", default=None
+    )
+    end: Literal["round", "square"] = key(
+        "the loaded end: an arc of radius W/2, or straight", default="round"
+    )
 
     def lug(self, clevis: Clevis) -> Lug:
         """The plate as a lug, unchecked."""
@@ -156,13 +202,17 @@ class ClevisPlate(PlateOutline, Solid):
 class DrawnPlate(PlateOutline):
     """The outline of one plate of a clevis, and what a margin of safety needs beside it."""
 
-    thickness: Positive | None = key("thickness of the plate, for its margins of safety", "length", default=None)
+    thickness: Positive | None = key(
+        "thickness of the plate, for its margins of safety", "length", default=None
+    )
 
 
 class Clevis(Shape):
     """A pin through one inner and two outer plates, and how finely they are meshed."""
 
-    clearance: float = key("hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1)
+    clearance: float = key(
+        "hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1
+    )
 
     @model_validator(mode="after")
     def _clearance(self) -> Clevis:
@@ -194,14 +244,20 @@ class ClevisShape(Clevis):
 class Bushing(Shape):
     """A pin in sleeves in a housing that is held at its outer edge."""
 
-    touching: bool = key("bodies touch on the load axis at first, as under a force, or are concentric", default=False)
+    touching: bool = key(
+        "bodies touch on the load axis at first, as under a force, or are concentric", default=False
+    )
 
     def check(self, rings: list[list[float]], names: list[str]) -> None:
         """Raise `Fault`, of the keys ``names``, for ``rings`` that do not fit."""
         R, edge = self.radius, self.radius
         fits = f"must not overlap what is inside by more than {_DEEPEST:g} of its radius, nor be wider by more than 0.5"
         for name, (inner, outer) in zip(names, rings, strict=True):
-            require(outer - inner >= _THINNEST * R, name, f"must have a wall of at least {_THINNEST:g} R")
+            require(
+                outer - inner >= _THINNEST * R,
+                name,
+                f"must have a wall of at least {_THINNEST:g} R",
+            )
             require(outer <= _FARTHEST * R, name, f"must not exceed {_FARTHEST:g} R")
             require(-_DEEPEST <= inner / edge - 1 <= 0.5, name, fits)
             edge = outer
@@ -233,7 +289,8 @@ class JointShape(JointGeometry):
 
 
 class Ring(Solid):
-    """A sleeve or the housing; with a bore smaller than what is inside they are pressed together."""
+    """A sleeve or the housing; with a bore smaller than what is inside they are pressed
+    together."""
 
     bore: Positive = key("inner radius", "length", example=10.05)
     outer: Positive = key("outer radius", "length", example=14.0)
@@ -242,14 +299,22 @@ class Ring(Solid):
 class PinLoad(Loading):
     """How the pin is moved in +x: by its diameter across the axis, or as a rigid disc."""
 
-    displacement: Targets | None = key("displacement of the pin", "length", default=None, example=0.1)
+    displacement: Targets | None = key(
+        "displacement of the pin", "length", default=None, example=0.1
+    )
     force: Targets | None = key("force on the whole pin, instead", "force", other=1000.0)
-    at: Literal["diameter", "centre"] = key("a force acts on the straight diameter or the centre", default="diameter")
+    at: Literal["diameter", "centre"] = key(
+        "a force acts on the straight diameter or the centre", default="diameter"
+    )
     steps: StepCounts = key("output steps up to each target", default=20)
 
     @model_validator(mode="after")
     def _at(self) -> PinLoad:
-        require(self.at == "diameter" or self.force is not None, "at", 'must be "diameter" for a displacement')
+        require(
+            self.at == "diameter" or self.force is not None,
+            "at",
+            'must be "diameter" for a displacement',
+        )
         return self
 
 
@@ -261,7 +326,9 @@ class Preset(Checked):
     pin: Pin = Field(description="material of the pin")
     load: PinLoad = Field(description="loading")
     analysis: PresetAnalysis = Field(default_factory=PresetAnalysis, description="model and solver")
-    stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
+    stepping: Stepping = Field(
+        default_factory=Stepping, description="control of the steps between outputs"
+    )
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
     def _require_whole(self, name: str, gap: float) -> None:
@@ -277,23 +344,40 @@ class Preset(Checked):
         gaps: list[float],
         laws: Sequence[str] = (),
     ) -> dict[str, Any]:
-        """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their ``surfaces`` the
-        first faces the second at the first of the ``gaps`` by the first of the ``laws``, the third the fourth, ..."""
+        """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their
+        ``surfaces`` the first faces the second at the first of the ``gaps`` by the first of the
+        ``laws``, the third the fourth, ..."""
         half, touching = (shape.get(name, True) for name in ("half", "touching"))
         rigid, names, contacts = self.pin.rigid, ["pin", *solids], list[dict[str, Any]]()
         for k, gap in enumerate(gaps):
-            facing = {"name": f"{names[k]} in {names[k + 1]}", "surfaces": surfaces[2 * k : 2 * k + 2]}
+            facing = {
+                "name": f"{names[k]} in {names[k + 1]}",
+                "surfaces": surfaces[2 * k : 2 * k + 2],
+            }
             law = {"law": laws[k]} if laws else {}
             contacts.append(facing | law | {"overlap": max(-gap, 0.0)})
         if rigid:
-            disc = {"centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0], "radius": shape["radius"]}
+            disc = {
+                "centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0],
+                "radius": shape["radius"],
+            }
             contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
         supports = [{"name": held, "on": held, "fixed": ["x", "y"]}]
         if half or not rigid:
             supports.append({"name": "axis", "on": "axis" if half else "centre", "fixed": ["y"]})
         place = contacts[0]["name"] if rigid else {"diameter": "flat"}.get(self.load.at, "centre")
-        pull = {"name": "pull", "on": place, "direction": "x", self.load.kind: getattr(self.load, self.load.kind)}
-        parts = {"interaction": contacts, "support": supports, "load": [pull], "path": {"steps": self.load.steps}}
+        pull = {
+            "name": "pull",
+            "on": place,
+            "direction": "x",
+            self.load.kind: getattr(self.load, self.load.kind),
+        }
+        parts = {
+            "interaction": contacts,
+            "support": supports,
+            "load": [pull],
+            "path": {"steps": self.load.steps},
+        }
         return _general(self, shape, 2 if half else 1, solids, **parts)
 
 
@@ -316,18 +400,26 @@ class LugScene(Preset):
         shape = self.lug.arguments() | {"kind": "lug"}
         sleeve = self.bushing
         if sleeve is None:
-            return self._pulled(shape, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance])
+            return self._pulled(
+                shape, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance]
+            )
         touching = sleeve.touching or self.load.force is not None
-        shape |= {"wall": sleeve.thickness, "interference": sleeve.interference, "touching": touching}
+        shape |= {
+            "wall": sleeve.thickness,
+            "interference": sleeve.interference,
+            "touching": touching,
+        }
         solids = {"bushing": sleeve, "lug": self.plate}
         surfaces = ["pin", "bushing inside", "bushing outside", "hole"]
         laws = ["frictionless", "tied" if sleeve.bonded else "frictionless"]
-        return self._pulled(shape, solids, "clamp", surfaces, [self.lug.clearance, -sleeve.interference], laws)
+        return self._pulled(
+            shape, solids, "clamp", surfaces, [self.lug.clearance, -sleeve.interference], laws
+        )
 
 
 class ClevisScene(Preset):
-    """A pin through one inner plate and two outer ones: the plane problem of the inner plate, under the force P, beside
-    the one of an outer plate, under P/2, each per unit of its own thickness."""
+    """A pin through one inner plate and two outer ones: the plane problem of the inner plate, under
+    the force P, beside the one of an outer plate, under P/2, each per unit of its own thickness."""
 
     clevis: Clevis = Field(description="radius of the pin, clearance in all plates, and mesh")
     inner: ClevisPlate = Field(description="geometry and material of the inner plate")
@@ -361,8 +453,12 @@ class ClevisScene(Preset):
             contact = {"name": f"pin in {name}", "surfaces": surfaces, "overlap": overlap}
             place = {"diameter": f"{name} flat"}.get(self.load.at, f"{name} centre")
             forces = [share / plate.thickness * force for force in self.load.stages]
-            parts["load"].append({"name": f"{name} pull", "on": place, "direction": "x", "force": forces})
-            parts["support"].append({"name": f"{name} clamp", "on": f"{name} clamp", "fixed": ["x", "y"]})
+            parts["load"].append(
+                {"name": f"{name} pull", "on": place, "direction": "x", "force": forces}
+            )
+            parts["support"].append(
+                {"name": f"{name} clamp", "on": f"{name} clamp", "fixed": ["x", "y"]}
+            )
             parts["interaction"].append(contact)
             bodies |= {f"{name} pin": self.pin, name: plate}
         parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
@@ -370,7 +466,8 @@ class ClevisScene(Preset):
 
 
 class BushingScene(Preset):
-    """A pin, sleeves around it and a housing; they touch on the load axis at first if the load is a force."""
+    """A pin, sleeves around it and a housing; they touch on the load axis at first if the load is a
+    force."""
 
     bushing: Bushing = Field(description="radius of the pin, and mesh")
     sleeve: list[Ring] = Field(default_factory=list, description="sleeves from the pin outward")
@@ -390,30 +487,53 @@ class BushingScene(Preset):
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
         sleeves = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
-        surfaces = ["pin", *(f"{name} {side}" for name in sleeves for side in ("inside", "outside")), "bore"]
+        surfaces = [
+            "pin",
+            *(f"{name} {side}" for name in sleeves for side in ("inside", "outside")),
+            "bore",
+        ]
         touching = self.bushing.touching or self.load.force is not None
-        shape = self.bushing.arguments() | {"kind": "bushing", "rings": self._rings, "touching": touching}
+        shape = self.bushing.arguments() | {
+            "kind": "bushing",
+            "rings": self._rings,
+            "touching": touching,
+        }
         inner = [self.bushing.radius, *(outer for _, outer in self._rings)]
         gaps = [bore - edge for edge, (bore, _) in zip(inner, self._rings, strict=False)]
-        return self._pulled(shape, sleeves | {"housing": self.housing}, "outer edge", surfaces, gaps)
+        return self._pulled(
+            shape, sleeves | {"housing": self.housing}, "outer edge", surfaces, gaps
+        )
 
 
 def _general(
-    scene: Scene | Preset, shape: dict[str, Any], symmetry: int, solids: Mapping[str, Solid], **parts: Any
+    scene: Scene | Preset,
+    shape: dict[str, Any],
+    symmetry: int,
+    solids: Mapping[str, Solid],
+    **parts: Any,
 ) -> dict[str, Any]:
-    """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that ``scene`` has, too, the
-    keys that were given, as an accuracy chooses some others."""
-    pin, said = scene.pin, {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")}
+    """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that
+    ``scene`` has, too, the keys that were given, as an accuracy chooses some others."""
+    pin, said = (
+        scene.pin,
+        {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")},
+    )
     for name in ("integration", "coarse_start", "friction"):  # of presets alone
         said["analysis"].pop(name, None)
     if friction := scene.analysis.friction:
         parts["interaction"] = [
-            part if part.get("law") == "tied" else part | {"friction": friction} for part in parts["interaction"]
+            part if part.get("law") == "tied" else part | {"friction": friction}
+            for part in parts["interaction"]
         ]
     bodies = solids if pin.rigid or pin in solids.values() else {"pin": pin, **solids}
     parts |= {
-        "mesh": {"shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}},
-        "body": [{"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL) for n, s in bodies.items()],
+        "mesh": {
+            "shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}
+        },
+        "body": [
+            {"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL)
+            for n, s in bodies.items()
+        ],
     }
     return said | parts | {"analysis": said["analysis"] | {"symmetry": symmetry}}
 
@@ -421,20 +541,31 @@ def _general(
 def general_joint(scene: Scene) -> dict[str, Any]:
     """The general scene that the ``scene`` of a joint stands for; its pin is pressed along -y."""
     g, pin, load = scene.joint, scene.pin, scene.load
-    contact: dict[str, Any] = {"name": "contact", "surfaces": ["pin", "hole"], "overlap": max(-g.dR, 0.0)}
+    contact: dict[str, Any] = {
+        "name": "contact",
+        "surfaces": ["pin", "hole"],
+        "overlap": max(-g.dR, 0.0),
+    }
     if pin.rigid:
         contact |= {"surfaces": ["hole"], "rigid": {"centre": [0.0, -g.dR], "radius": g.radius}}
     elif scene.analysis.integration != "both":
         contact["integrated"] = "pin" if scene.analysis.integration == "pin" else "hole"
     on = "contact" if pin.rigid else "pin" if g.is_ring else "pin top"
     press: dict[str, Any] = {"name": "press", "on": on, "direction": "y"}
-    press["force" if scene.force_controlled else "displacement"] = [-at * scene.load_unit for at in load.stages]
+    press["force" if scene.force_controlled else "displacement"] = [
+        -at * scene.load_unit for at in load.stages
+    ]
     if g.is_ring:
         press["core"] = {"centre": [0.0, 0.0], "radius": load.core_radius * g.radius}
     shape = g.model_dump(exclude_none=True) | {"kind": "joint", "core_radius": load.core_radius}
     axis = {"name": "axis", "on": "symmetry", "fixed": ["x"]}
     block = {"name": "block", "on": "block held", "fixed": ["x", "y"]}
-    parts = {"interaction": [contact], "support": [axis, block], "load": [press], "path": {"steps": load.stage_steps}}
+    parts = {
+        "interaction": [contact],
+        "support": [axis, block],
+        "load": [press],
+        "path": {"steps": load.stage_steps},
+    }
     return _general(scene, shape, 2, {"block": scene.block}, **parts)
 
 

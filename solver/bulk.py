@@ -1,7 +1,9 @@
-"""Bulk terms: internal forces and tangents of elastic and elastic-plastic bodies, assembled by dolfinx.
+"""Bulk terms: internal forces and tangents of elastic and elastic-plastic bodies, assembled by
+dolfinx.
 
-Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies, and of all at large strain, carry
-history, a return map and a tangent that changes; without them nothing of it is compiled or stored.
+Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies, and of all at
+large strain, carry history, a return map and a tangent that changes; without them nothing of it is
+compiled or stored.
 """
 
 from __future__ import annotations
@@ -43,16 +45,23 @@ def _gradient(u):
     return ufl.as_vector([g[0, 0], g[1, 1], g[0, 1], g[1, 0]])
 
 
-_SMALL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1]])  # the small strain of a displacement gradient
+_SMALL = np.array(
+    [[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1]]
+)  # the small strain of a displacement gradient
 
 
-def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarray] = _NO_SLOTS) -> PETSc.Mat:
-    """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` blocks (rows, columns), in
-    global block dofs and rows that this rank owns. PETSc gives back what is not written before the first assembly."""
+def matrix(
+    V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarray] = _NO_SLOTS
+) -> PETSc.Mat:
+    """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` blocks
+    (rows, columns), in global block dofs and rows that this rank owns. PETSc gives back what is not
+    written before the first assembly."""
     index_map = V.dofmap.index_map
     n, start = index_map.size_local, index_map.local_range[0]
     rows, columns = extra
-    slots = [(rows - start, (columns >= start) & (columns < start + n))]  # local rows, and which are in owned columns
+    slots = [
+        (rows - start, (columns >= start) & (columns < start + n))
+    ]  # local rows, and which are in owned columns
     for form in forms:
         pattern = fem.create_sparsity_pattern(form)
         pattern.finalize()
@@ -61,7 +70,9 @@ def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarr
         slots.append((np.repeat(np.arange(n), np.diff(offsets[: n + 1])), owned))
     rows, inside = (np.concatenate(part) for part in zip(*slots, strict=True))
     room = (rows[inside], n), (rows[~inside], index_map.size_global - n)
-    nnz = [np.minimum(np.bincount(of, minlength=n), most).astype(PETSc.IntType) for of, most in room]
+    nnz = [
+        np.minimum(np.bincount(of, minlength=n), most).astype(PETSc.IntType) for of, most in room
+    ]
     A = PETSc.Mat().createBAIJ([[2 * n, None]] * 2, bsize=2, nnz=nnz, comm=V.mesh.comm)
     nodes = index_map.local_to_global(np.arange(n + index_map.num_ghosts, dtype=np.int32))
     lgmap = PETSc.LGMap().create(nodes.astype(PETSc.IntType), bsize=2, comm=V.mesh.comm)
@@ -71,8 +82,9 @@ def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarr
 
 
 def assemble(A: PETSc.Mat, forms: list[fem.Form], bcs: Sequence[fem.DirichletBC] = ()) -> None:
-    """Add bilinear ``forms`` to ``A``, with ones on the diagonal of the rows of ``bcs``. dolfinx inserts those ones;
-    without a flush after each form the next one's additions would be dropped silently."""
+    """Add bilinear ``forms`` to ``A``, with ones on the diagonal of the rows of ``bcs``. dolfinx
+    inserts those ones; without a flush after each form the next one's additions would be dropped
+    silently."""
     for form in forms:
         fem_petsc.assemble_matrix(A, form, list(bcs))
         A.assemblyBegin(PETSc.Mat.AssemblyType.FLUSH)
@@ -93,16 +105,20 @@ class _BodyPoints:
         self.stress: Array = np.zeros((self.weight.size, 4))
         self.finite, C = material.finite, material.elastic_tangent
         self.elastic = _SMALL.T @ C @ _SMALL if self.finite else C
-        self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
+        self.yielding = cells[
+            :0
+        ]  # cells that had a point off its elastic tangent at the last update
 
     def update(self, u: Array) -> Array:
-        """Keep the stress at the nodal displacements ``u``; returns the tangent ``(n q, k, k)``, k = 3 or 4."""
+        """Keep the stress at the nodal displacements ``u``; returns the tangent ``(n q, k, k)``, k
+        = 3 or 4."""
         self.strain = self.measure(u).reshape(-1, len(self.elastic))
         self.stress, tangent = self.points.update(self.strain)
         return tangent
 
     def measure(self, u: Array) -> Array:
-        """Strain ``(n, q, 3)`` at the nodal displacements ``u``, or displacement gradient ``(n, q, 4)``."""
+        """Strain ``(n, q, 3)`` at the nodal displacements ``u``, or displacement gradient ``(n, q,
+        4)``."""
         return (displacement_gradient if self.finite else strain)(self.gradient, self.dofs, u)
 
     def forces(self) -> Array:
@@ -112,8 +128,9 @@ class _BodyPoints:
 
 
 class Distortion(NamedTuple):
-    """The largest principal ``strain`` at the middle of a cell, of the body with this ``tag``; the largest ``angle`` by
-    which one turns, in radians; and how many cells are turned ``inside_out``, at a corner at least."""
+    """The largest principal ``strain`` at the middle of a cell, of the body with this ``tag``; the
+    largest ``angle`` by which one turns, in radians; and how many cells are turned ``inside_out``,
+    at a corner at least."""
 
     strain: float = 0.0
     tag: int = -1
@@ -123,12 +140,15 @@ class Distortion(NamedTuple):
     def joined(self, other: Distortion) -> Distortion:
         """Of the cells of both."""
         strain, tag = max(self[:2], other[:2])
-        return Distortion(strain, tag, max(self.angle, other.angle), self.inside_out + other.inside_out)
+        return Distortion(
+            strain, tag, max(self.angle, other.angle), self.inside_out + other.inside_out
+        )
 
 
 class PointFields(NamedTuple):
-    """Fields at the integration points ``coordinates`` ``(n, q, 2)`` of a body's ``cells`` ``(n,)``: ``weight`` and
-    ``peeq`` ``(n, q)``, ``stress`` and ``plastic_strain`` ``(n, q, 4)``."""
+    """Fields at the integration points ``coordinates`` ``(n, q, 2)`` of a body's ``cells``
+    ``(n,)``: ``weight`` and ``peeq`` ``(n, q)``, ``stress`` and ``plastic_strain`` ``(n, q,
+    4)``."""
 
     cells: np.ndarray
     coordinates: Array
@@ -139,22 +159,27 @@ class PointFields(NamedTuple):
 
 
 def _check_elastic_tangent(material: Material) -> None:
-    """Raise ValueError for what would be assembled wrongly: an elastic tangent that is not symmetric, or a response
-    that is not that tangent's though the material does not yield."""
+    """Raise ValueError for what would be assembled wrongly: an elastic tangent that is not
+    symmetric, or a response that is not that tangent's though the material does not yield."""
     material = getattr(material, "inner", material)
     C, probe = material.elastic_tangent, 1e-3 * np.array([[3.0, -1.0, 2.0], [-20.0, 5.0, 10.0]])
     if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
         raise ValueError("elastic_tangent of a material must be symmetric")
     expected, found = probe @ C, material.update(probe, material.state(2))[0][:, [0, 1, 3]]
     if not material.yields and np.abs(found - expected).max() > 1e-9 * np.abs(expected).max():
-        raise ValueError("a material whose update is not its elastic_tangent's must say yields = True")
+        raise ValueError(
+            "a material whose update is not its elastic_tangent's must say yields = True"
+        )
 
 
 class Bulk:
-    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components), whose ``cells`` and
-    ``materials`` are given by their tags. ``elastic_forms``, one a body, span the matrix's pattern."""
+    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components),
+    whose ``cells`` and ``materials`` are given by their tags. ``elastic_forms``, one a body, span
+    the matrix's pattern."""
 
-    def __init__(self, V: fem.FunctionSpace, cells: Mapping[int, Index], materials: Mapping[int, Material]) -> None:
+    def __init__(
+        self, V: fem.FunctionSpace, cells: Mapping[int, Index], materials: Mapping[int, Material]
+    ) -> None:
         self.V, self.materials = V, materials
         self.degree = V.element.basix_element.degree
         rule = bulk_quadrature_degree(V.mesh.basix_cell(), self.degree)
@@ -175,20 +200,31 @@ class Bulk:
             _check_elastic_tangent(material)
             moduli = fem.Constant(V.mesh, np.array(material.elastic_tangent))
             domain = [(1, self.cells[tag])]
-            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})(1)
+            dx = ufl.Measure(
+                "dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule}
+            )(1)
             elastic[tag] = fem.form(ufl.inner(ufl.dot(moduli, u), v) * dx)
         self.elastic_forms = list(elastic.values())
         if self._nonlinear:
-            cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
+            cell, metadata = (
+                V.mesh.basix_cell(),
+                {"quadrature_degree": rule, "quadrature_rule": "default"},
+            )
             k = self._k = len(next(iter(self._nonlinear.values())).elastic)
-            element = [basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((k,), (k, k))]
-            self._sigma, self._correction = (fem.Function(fem.functionspace(V.mesh, e)) for e in element)
+            element = [
+                basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((k,), (k, k))
+            ]
+            self._sigma, self._correction = (
+                fem.Function(fem.functionspace(V.mesh, e)) for e in element
+            )
             if k == 4:
                 u, v = _gradient(ufl.TrialFunction(V)), _gradient(ufl.TestFunction(V))
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._nonlinear.values()])))]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
             self._force = fem.form(ufl.inner(self._sigma, v) * dx)
-            self._correction_kernel = fem.compile_form(V.mesh.comm, ufl.inner(ufl.dot(self._correction, u), v) * dx)
+            self._correction_kernel = fem.compile_form(
+                V.mesh.comm, ufl.inner(ufl.dot(self._correction, u), v) * dx
+            )
         self._corrected_cells: np.ndarray | None = None  # those of the form that was made last
         self._correction_forms: list[fem.Form] = []
         self.stiffness = None  # of the bodies that stay linear
@@ -199,11 +235,13 @@ class Bulk:
             self.stiffness.assemble()
 
     def histories(self) -> dict[int, tuple[np.ndarray, Points]]:
-        """Cells ``(n,)`` of this rank and their ``n q`` points, by the tag of a body that is not linear."""
+        """Cells ``(n,)`` of this rank and their ``n q`` points, by the tag of a body that is not
+        linear."""
         return {tag: (body.cells, body.points) for tag, body in self._nonlinear.items()}
 
     def update(self, u: Array) -> None:
-        """Return-map the bodies that are not linear at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
+        """Return-map the bodies that are not linear at the nodal displacements ``u`` ``(n_nodes,
+        2)`` of this rank."""
         for body in self._nonlinear.values():
             tangent, (n, q), k = body.update(u), body.weight.shape, self._k
             self._sigma.x.array.reshape(-1, q, k)[body.cells] = body.forces()
@@ -213,10 +251,13 @@ class Bulk:
             correction = self._correction.x.array.reshape(-1, k * k * q)
             correction[body.yielding] = 0.0
             body.yielding = body.cells[flows]
-            correction[body.yielding] = (tangent.reshape(n, q, k, k)[flows] - body.elastic).reshape(-1, k * k * q)
+            correction[body.yielding] = (tangent.reshape(n, q, k, k)[flows] - body.elastic).reshape(
+                -1, k * k * q
+            )
 
     def add_force(self, u: PETSc.Vec, force: PETSc.Vec) -> None:
-        """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
+        """Add the internal force of the displacement ``u`` (last passed to `update`) to
+        ``force``."""
         if self.stiffness is not None:
             self.stiffness.multAdd(u, force, force)
         if self._nonlinear:
@@ -225,23 +266,29 @@ class Bulk:
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
-        """Add the last tangent, applied to ``direction``, to ``out``; `add_force` then needs another `update`."""
+        """Add the last tangent, applied to ``direction``, to ``out``; `add_force` then needs
+        another `update`."""
         for body in self._nonlinear.values():
             eps, k = body.measure(direction.x.array.reshape(-1, 2)), self._k
             q = eps.shape[1]
             moduli = self._correction.x.array.reshape(-1, q, k, k)[body.cells] + body.elastic
-            self._sigma.x.array.reshape(-1, q, k)[body.cells] = np.einsum("nqij,nqj->nqi", moduli, eps)
+            self._sigma.x.array.reshape(-1, q, k)[body.cells] = np.einsum(
+                "nqij,nqj->nqi", moduli, eps
+            )
         self.add_force(direction.x.petsc_vec, out)
 
     def assemble_correction(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
-        """Add the tangent correction to ``A``: the consistent minus the elastic tangent, in the cells that yield."""
+        """Add the tangent correction to ``A``: the consistent minus the elastic tangent, in the
+        cells that yield."""
         if not self._nonlinear:
             return
         cells = np.sort(np.concatenate([body.yielding for body in self._nonlinear.values()]))
         if self._corrected_cells is None or not np.array_equal(cells, self._corrected_cells):
             domains = {fem.IntegralType.cell: [(1, cells)]}
             coefficients = {self._correction: self._correction}
-            form = fem.create_form(self._correction_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
+            form = fem.create_form(
+                self._correction_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {}
+            )
             self._corrected_cells, self._correction_forms = cells, [form]
         assemble(A, self._correction_forms, bcs)
 
@@ -251,7 +298,9 @@ class Bulk:
         for data in self._nonlinear.values():
             w, points = data.weight.ravel(), data.points
             stored += float(w @ points.material.stored(data.strain, data.stress, points.trial))
-            dissipated += float(w @ np.broadcast_to(points.material.dissipation(points.trial), w.shape))
+            dissipated += float(
+                w @ np.broadcast_to(points.material.dissipation(points.trial), w.shape)
+            )
         if self.stiffness is not None:
             x, force = self.stiffness.createVecs()
             x.array[:] = u[: x.local_size // 2].ravel()
@@ -276,20 +325,26 @@ class Bulk:
         return np.asarray(body.points.peeq), body.point.reshape(-1, 2)
 
     def at_points(self, u: Array) -> Iterator[PointFields]:
-        """The state at this rank's integration points, body by body, at ``u`` ``(n_nodes, 2)`` of the last update."""
+        """The state at this rank's integration points, body by body, at ``u`` ``(n_nodes, 2)`` of
+        the last update."""
         for tag, cells in self.cells.items():
             body = self._nonlinear.get(tag)
             if body is None:
                 body = _BodyPoints(self.V, cells, self.materials[tag])
                 body.update(u)
             shape, points = (*body.weight.shape, 4), body.points
-            stress = points.material.true_stress(body.strain, body.stress, points.trial).reshape(shape)
-            plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(stress)).reshape(shape)
+            stress = points.material.true_stress(body.strain, body.stress, points.trial).reshape(
+                shape
+            )
+            plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(stress)).reshape(
+                shape
+            )
             peeq = points.peeq.reshape(body.weight.shape)
             yield PointFields(cells, body.point, body.weight, stress, plastic_strain, peeq)
 
     def distortion(self, u: Array) -> Distortion:
-        """How far the cells of this rank are strained, turned and turned over at ``u`` ``(n_nodes, 2)``."""
+        """How far the cells of this rank are strained, turned and turned over at ``u`` ``(n_nodes,
+        2)``."""
         worst = Distortion()
         for tag in self.cells:
             H = displacement_gradient(self._corners(tag), self.V.dofmap.list[self.cells[tag]], u)
@@ -302,16 +357,19 @@ class Bulk:
         return worst
 
     def _corners(self, tag: int) -> Array:
-        """Gradients ``(n, q, a, 2)`` of the basis at the middle and at the corners of a body's cells."""
+        """Gradients ``(n, q, a, 2)`` of the basis at the middle and at the corners of a body's
+        cells."""
         if tag not in self._at_corners:
             corners = basix.geometry(self.V.mesh.basix_cell())
             X = np.vstack([corners.mean(axis=0), corners])
-            self._at_corners[tag] = cell_basis(self.V.mesh, self.degree, self.cells[tag], X).gradient
+            self._at_corners[tag] = cell_basis(
+                self.V.mesh, self.degree, self.cells[tag], X
+            ).gradient
         return self._at_corners[tag]
 
     def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
-        """Cell means of `at_points`: "von_mises" and "mean_stress" ``(n_cells,)``, "stress" ``(n_cells, 4)``; where a
-        body can yield "peeq" and "plastic_strain"."""
+        """Cell means of `at_points`: "von_mises" and "mean_stress" ``(n_cells,)``, "stress"
+        ``(n_cells, 4)``; where a body can yield "peeq" and "plastic_strain"."""
         fields: dict[str, Array] = {}
         for part in parts:
             values = {

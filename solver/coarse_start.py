@@ -1,7 +1,8 @@
 """Guesses from a coarser mesh (nested iteration), which follows the path of loads step by step.
 
-Newton's method moves the edge of the contact, and of a plastic zone, by few elements an iteration. The coarse problem
-finds both edges where iterations are cheap; the fine one corrects its increments by less than a coarse element.
+Newton's method moves the edge of the contact, and of a plastic zone, by few elements an iteration.
+The coarse problem finds both edges where iterations are cheap; the fine one corrects its increments
+by less than a coarse element.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ from archord.solver.mesh_order import MeshOrder
 from archord.solver.system import System
 
 _FEWEST_DOFS = 8_000  # of a problem that is worth a coarse start
-_FEWEST_STRESS = 4_000  # of one that yields in plane stress, where flow localises and Newton's method is slow
+_FEWEST_STRESS = (
+    4_000  # of one that yields in plane stress, where flow localises and Newton's method is slow
+)
 _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing can be learnt
 
 
 def coarse_start(system: System) -> CoarseStart | None:
-    """The coarse start of ``system``; None where that is coarse itself, or has no coarser problem. Collective."""
+    """The coarse start of ``system``; None where that is coarse itself, or has no coarser problem.
+    Collective."""
     if system.n_dofs < _fewest_dofs(system.bulk) or system.problem.coarser is None:
         return None
     with system.timer("coarse start"):
@@ -38,7 +42,8 @@ def _fewest_dofs(bulk: Bulk) -> int:
 
 
 class CoarseStart:
-    """Increments of the state of ``fine`` from those of ``coarse``, the same problem on a coarser mesh. Collective."""
+    """Increments of the state of ``fine`` from those of ``coarse``, the same problem on a coarser
+    mesh. Collective."""
 
     def __init__(self, fine: System, coarse: System) -> None:
         self.fine, self.coarse = fine, coarse
@@ -46,16 +51,21 @@ class CoarseStart:
         self.path = coarse.load_path(coarse=coarse_start(coarse))
         self.iterations = 0  # of the last attempt, on all coarser meshes
         order = self._order = MeshOrder(coarse)
-        x, cells, of_cells = fine.comm.bcast((order.coordinates, order.nodes_of_cell, order.bodies()))
+        x, cells, of_cells = fine.comm.bcast(
+            (order.coordinates, order.nodes_of_cell, order.bodies())
+        )
         places = fine.V.tabulate_dof_coordinates()[:, :2]
-        self._maps: list[tuple[np.ndarray, Interpolation]] = []  # nodes of a body on this rank, and their values
+        self._maps: list[
+            tuple[np.ndarray, Interpolation]
+        ] = []  # nodes of a body on this rank, and their values
         for body in fine.problem.bodies:
             nodes, on = fine.nodes_of(body), of_cells == coarse.problem.tag(body)
             self._maps.append((nodes, Interpolation(x[:, :2], cells[on], places[nodes])))
         self._reached: float | None = None
 
     def increment(self, load: float) -> Array | None:
-        """What a step to ``load`` adds to the fine state ``(2 n_local + d,)``, None if the coarse one fails."""
+        """What a step to ``load`` adds to the fine state ``(2 n_local + d,)``, None if the coarse
+        one fails."""
         with self.fine.timer("coarse start"):
             result, contact = self.path.attempt(load), self.coarse.contact
             self.iterations = result.iterations + self.path.coarse_iterations
@@ -71,7 +81,8 @@ class CoarseStart:
             return np.append(u, levels)
 
     def follow(self) -> bool:
-        """Follow the fine problem, which has accepted the last step; returns whether the coarse one could."""
+        """Follow the fine problem, which has accepted the last step; returns whether the coarse one
+        could."""
         if self._reached is None:
             return False
         with self.fine.timer("coarse start"):

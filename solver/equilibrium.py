@@ -1,7 +1,8 @@
 """Static equilibrium at a given load: the residual and the tangent of bulk and contact.
 
-The residual is internal minus contact forces and loads; rows of prescribed displacements are left out of it, and out of
-the matrix with their columns. It is measured against the reaction of the supports: the tolerance has no unit.
+The residual is internal minus contact forces and loads; rows of prescribed displacements are left
+out of it, and out of the matrix with their columns. It is measured against the reaction of the
+supports: the tolerance has no unit.
 """
 
 from __future__ import annotations
@@ -30,19 +31,28 @@ from archord.solver.tangent import TangentMatrix
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and ``contact`` under the drives of ``problem`` at their ``levels`` ``(d,)``. Collective.
+    """Equilibrium of ``bulk`` and ``contact`` under the drives of ``problem`` at their ``levels``
+    ``(d,)``. Collective.
 
-    ``linear`` is the strategy that solves with the tangent of all unknowns, ``border`` that of the unknown levels. What
-    the last evaluation left are the ``changes``, points that opened or closed, the ``reaction_norm`` and the ``noise``,
-    a residual that is round-off, each over all ranks; ``largest_reaction`` is the largest norm of all accepted states.
+    ``linear`` is the strategy that solves with the tangent of all unknowns, ``border`` that of the
+    unknown levels. What the last evaluation left are the ``changes``, points that opened or closed,
+    the ``reaction_norm`` and the ``noise``, a residual that is round-off, each over all ranks;
+    ``largest_reaction`` is the largest norm of all accepted states.
     """
 
     def __init__(self, problem: Problem, bulk: Bulk, contact: Contact, timer: Timer) -> None:
         self.problem, self.bulk, self.contact, self.timer = problem, bulk, contact, timer
         self.V, self.comm, V = bulk.V, bulk.V.mesh.comm, bulk.V
-        self.interrupt, self.u, self._increment = Interrupt(), fem.Function(V, name="displacement"), fem.Function(V)
+        self.interrupt, self.u, self._increment = (
+            Interrupt(),
+            fem.Function(V, name="displacement"),
+            fem.Function(V),
+        )
         self.load, index_map = 0.0, V.dofmap.index_map
-        self.n_owned, self.n_local = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        self.n_owned, self.n_local = (
+            index_map.size_local,
+            index_map.size_local + index_map.num_ghosts,
+        )
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
         self.drives = drives = Drives(problem, V, contact, self._stiffest)
         self.levels: Array = np.zeros(len(drives.rate))
@@ -67,11 +77,14 @@ class Equilibrium:
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
             if by_force:
-                self.border = Bordered(self.tangent.A, len(drives.unknown), self._stiffest, self._factoriser)
+                self.border = Bordered(
+                    self.tangent.A, len(drives.unknown), self._stiffest, self._factoriser
+                )
             self._choose_linear()
 
     def pack(self, state: Array, x: PETSc.Vec) -> None:
-        """Put ``state``, shaped like `state`, with its prescribed values replaced, into the unknowns ``x``."""
+        """Put ``state``, shaped like `state`, with its prescribed values replaced, into the
+        unknowns ``x``."""
         drives, given = self.drives, state[2 * self.n_local :]
         self.levels = drives.values(self.load)
         self.levels[drives.unknown] = given[drives.unknown]
@@ -84,7 +97,8 @@ class Equilibrium:
         return self.border.vector() if self.border else ghosted_vector(self.V.dofmap.index_map, 2)
 
     def _join(self, x: PETSc.Vec, u: Array, levels: Array) -> None:
-        """Put displacements (or forces) ``u`` and unknown levels (or what their equations lack) into ``x``."""
+        """Put displacements (or forces) ``u`` and unknown levels (or what their equations lack)
+        into ``x``."""
         n = 2 * self.n_owned
         x.array[:n], x.array[n:] = u.ravel(), levels[: x.local_size - n]
 
@@ -99,7 +113,8 @@ class Equilibrium:
                 self.border.update(*self.tangent.border(), factorise=factorise)
 
     def _follow_pattern(self) -> bool:
-        """Replace the matrix where the pairs of the last evaluation slid out of its pattern; returns whether."""
+        """Replace the matrix where the pairs of the last evaluation slid out of its pattern;
+        returns whether."""
         if self._pattern_grew:
             self.tangent.renew()
             self.renew_factorisation()
@@ -112,8 +127,9 @@ class Equilibrium:
             self.border.replace(self.tangent.A)
 
     def residual_of(self, x: PETSc.Vec, f: PETSc.Vec) -> bool:
-        """The residual ``f`` at the unknowns ``x``; returns whether there is another tangent matrix now. Collective.
-        Raises `ProjectionError` if a contact point finds no partner, and what `evaluate` raises."""
+        """The residual ``f`` at the unknowns ``x``; returns whether there is another tangent matrix
+        now. Collective. Raises `ProjectionError` if a contact point finds no partner, and what
+        `evaluate` raises."""
         self.u.x.array[: 2 * self.n_owned] = x.array_r[: 2 * self.n_owned]
         self.u.x.scatter_forward()
         drives = self.drives
@@ -130,7 +146,8 @@ class Equilibrium:
         return renewed
 
     def evaluate(self) -> None:
-        """Residual, reactions and trial history at the current state. Raises `Interrupted`, on every rank."""
+        """Residual, reactions and trial history at the current state. Raises `Interrupted`, on
+        every rank."""
         u = self.u.x.array.reshape(-1, 2)
         with self.timer("return mapping"):
             self.bulk.update(u)
@@ -147,7 +164,9 @@ class Equilibrium:
         if self.springs:
             self.springs.evaluate(self.u.x.array[: 2 * self.n_owned], self.levels)
             self._force.array[:] += self.springs.forces
-        self._reaction = np.where(self.fixed[: self.n_owned], self._force.array_r.reshape(-1, 2), 0.0)
+        self._reaction = np.where(
+            self.fixed[: self.n_owned], self._force.array_r.reshape(-1, 2), 0.0
+        )
         squares = (self._reaction**2).sum() + (applied**2).sum(), self.contact.round_off() ** 2
         totals = np.array([*squares, self.interrupt.received > 0, self.contact.active_set_changes])
         self.comm.Allreduce(MPI.IN_PLACE, totals)
@@ -160,8 +179,9 @@ class Equilibrium:
             raise Interrupted(self.comm.allreduce(self.interrupt.received, op=MPI.MAX))
 
     def revised(self, increment: Array) -> tuple[PETSc.Mat, Array] | None:
-        """Go over to the points that touch and stick after an ``increment`` of this rank's unknowns: another matrix for
-        them, valid until the next one, and what they add to the residual; None if no point changes. Collective."""
+        """Go over to the points that touch and stick after an ``increment`` of this rank's
+        unknowns: another matrix for them, valid until the next one, and what they add to the
+        residual; None if no point changes. Collective."""
         n, levels = 2 * self.n_owned, np.zeros_like(self.levels)
         if self.border:
             levels[self.drives.unknown] = self.drives.weight * self.comm.bcast(increment[n:])
@@ -187,24 +207,32 @@ class Equilibrium:
         if not self.border:
             return free
         rates = drives.unknown_rate[:, : self.n_owned].reshape(len(drives.weight), -1)
-        on_rigid = np.broadcast_to(self.contact.force_on_drives(), self.levels.shape)[drives.unknown]
+        on_rigid = np.broadcast_to(self.contact.force_on_drives(), self.levels.shape)[
+            drives.unknown
+        ]
         on_levels = self.comm.allreduce(rates @ (force.ravel() - free)) + drives.weight * on_rigid
         return np.append(free, on_levels[: self.border.last.extra])
 
     def _where_free(self) -> Array:
-        """The forces of the last evaluation ``(n_owned, 2)`` where displacements are not prescribed, zero elsewhere."""
+        """The forces of the last evaluation ``(n_owned, 2)`` where displacements are not
+        prescribed, zero elsewhere."""
         return np.where(self.fixed[: self.n_owned], 0.0, self._force.array_r.reshape(-1, 2))
 
     def reaction(self, name: str) -> Array:
-        """Forces ``(n_owned, 2)`` of the supports and means ``name`` on the nodes at the last evaluation."""
-        drives, means = self.drives, [mean.drive for mean in self.problem.means if mean.name == name]
+        """Forces ``(n_owned, 2)`` of the supports and means ``name`` on the nodes at the last
+        evaluation."""
+        drives, means = (
+            self.drives,
+            [mean.drive for mean in self.problem.means if mean.name == name],
+        )
         levels = [drives.names.index(drive) for drive in means]
         spread = np.tensordot(self.levels[levels], drives.applied[levels], 1)
         return drives.share_of(name) * self._reaction + spread
 
     def conjugates(self) -> Array:
-        """What is conjugate to the levels ``(d,)``, of the modelled part: forces on what moves, that of contact on
-        rigid discs included, and displacements along applied forces; over all ranks."""
+        """What is conjugate to the levels ``(d,)``, of the modelled part: forces on what moves,
+        that of contact on rigid discs included, and displacements along applied forces; over all
+        ranks."""
         u, drives = self.u.x.array[: 2 * self.n_owned], self.drives
         rates = drives.rate[:, : self.n_owned].reshape(len(self.levels), -1)
         own = rates @ self._reaction.ravel() + drives.applied.reshape(rates.shape) @ u
@@ -213,7 +241,9 @@ class Equilibrium:
 
     def points(self) -> list[Points]:
         """The points of bulk and contact, of materials and of contact laws."""
-        return [points for part in (self.bulk, self.contact) for _, points in part.histories().values()]
+        return [
+            points for part in (self.bulk, self.contact) for _, points in part.histories().values()
+        ]
 
     def plastic_points(self) -> list[Points]:
         """Those that can yield."""
@@ -236,7 +266,8 @@ class Equilibrium:
         return self.u.x.array.reshape(-1, 2).copy()
 
     def state(self) -> Array:
-        """All that is solved for: nodal displacements ``(2 n_local,)`` of this rank, then the levels ``(d,)``."""
+        """All that is solved for: nodal displacements ``(2 n_local,)`` of this rank, then the
+        levels ``(d,)``."""
         return np.append(self.u.x.array, self.levels)
 
     def restore(self, load: float, state: Array) -> None:
@@ -247,7 +278,8 @@ class Equilibrium:
             self.springs.last = state[: 2 * self.n_owned].copy(), self.levels.copy()
 
     def resume(self, load: float, state: Array, largest_reaction: float) -> None:
-        """Take up an accepted state of an earlier process, whose history the points have already, and evaluate it."""
+        """Take up an accepted state of an earlier process, whose history the points have already,
+        and evaluate it."""
         self.restore(load, state)
         self.largest_reaction = largest_reaction
         self.contact.search()

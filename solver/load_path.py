@@ -1,4 +1,5 @@
-"""A path of loads and the equilibria on it: the state reached last, and the guesses for the next step."""
+"""A path of loads and the equilibria on it: the state reached last, and the guesses for the next
+step."""
 
 from __future__ import annotations
 
@@ -16,16 +17,19 @@ if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
 
 _STRAIGHT = 1e-6  # part of a step that may lie beside the line of the last one
-_AS_GOOD = 2.0  # residual of an extrapolated guess over that of a coarse start, below which it serves as well
+# residual of an extrapolated guess over that of a coarse start, below which it serves as well
+_AS_GOOD = 2.0
 _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
 
 
 @dataclass
 class Position:
-    """The place on a path between two steps: what is needed besides the state of the equilibrium to go on from it.
+    """The place on a path between two steps: what is needed besides the state of the equilibrium to
+    go on from it.
 
-    ``targets_done`` output targets were reached, the last step being of length ``stride`` in the load; ``increment`` is
-    what it changed in the state, None before the first step. ``size`` is the length of the next, in output steps.
+    ``targets_done`` output targets were reached, the last step being of length ``stride`` in the
+    load; ``increment`` is what it changed in the state, None before the first step. ``size`` is the
+    length of the next, in output steps.
     """
 
     targets_done: int = 0
@@ -36,19 +40,30 @@ class Position:
 
 
 class LoadPath:
-    """The path that ``solver``'s equilibrium follows from the position ``at``, from the beginning if absent.
+    """The path that ``solver``'s equilibrium follows from the position ``at``, from the beginning
+    if absent.
 
-    The guess for a step extrapolates the last increment; where that fails elastic bodies start from the last state
-    itself. Where the path starts or turns, or another drive takes over, the guess comes from the elastic solution, at
-    the start from ``first_guess(load)``. The increment from a state without equilibrium (a press fit), or of loose
-    bodies, says nothing about the next. Where there is a ``coarse`` start, what a coarser mesh found comes first,
-    unless bodies yield and extrapolation leaves a residual of the same size or less.
+    The guess for a step extrapolates the last increment; where that fails elastic bodies start from
+    the last state itself. Where the path starts or turns, or another drive takes over, the guess
+    comes from the elastic solution, at the start from ``first_guess(load)``. The increment from a
+    state without equilibrium (a press fit), or of loose bodies, says nothing about the next. Where
+    there is a ``coarse`` start, what a coarser mesh found comes first, unless bodies yield and
+    extrapolation leaves a residual of the same size or less.
     """
 
     def __init__(
-        self, solver: Recovery, first_guess: Callable[[float], Array], at: Position | None, coarse: CoarseStart | None
+        self,
+        solver: Recovery,
+        first_guess: Callable[[float], Array],
+        at: Position | None,
+        coarse: CoarseStart | None,
     ) -> None:
-        self.solver, self._first_guess, self.at, self.coarse = solver, first_guess, at or Position(), coarse
+        self.solver, self._first_guess, self.at, self.coarse = (
+            solver,
+            first_guess,
+            at or Position(),
+            coarse,
+        )
         self.state = solver.equilibrium.state()
         self.coarse_iterations = 0  # of the last attempt
 
@@ -57,7 +72,8 @@ class LoadPath:
         return self.solver.solve(load, self._guesses(load))
 
     def _guesses(self, load: float) -> Iterator[tuple[Array, bool]]:
-        """Guesses for a step to ``load``, and whether to find the elastic solution from there first."""
+        """Guesses for a step to ``load``, and whether to find the elastic solution from there
+        first."""
         self.coarse_iterations = 0
         ahead = None
         if self.coarse is not None:
@@ -89,12 +105,17 @@ class LoadPath:
             yield self.state, True
 
     def _ratio(self, load: float) -> float | None:
-        """How far the step to ``load`` goes on the line of the last one, over that one's length; None if off it."""
+        """How far the step to ``load`` goes on the line of the last one, over that one's length;
+        None if off it."""
         at, course = self.at, self.solver.equilibrium.drives.course
         before, last, now = course(at.load - at.stride), course(at.load), course(load)
         step, length = last - before, float(np.linalg.norm(last - before))
         ratio = float(step @ (now - last)) / length**2 if length else 0.0
-        return ratio if np.linalg.norm(now - last - ratio * step) <= _STRAIGHT * np.linalg.norm(now - last) else None
+        return (
+            ratio
+            if np.linalg.norm(now - last - ratio * step) <= _STRAIGHT * np.linalg.norm(now - last)
+            else None
+        )
 
     def accept(self, load: float) -> None:
         """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""

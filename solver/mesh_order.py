@@ -1,7 +1,9 @@
-"""Fields and histories in the order of the mesh generator, whatever the number of ranks and their cut of the mesh.
+"""Fields and histories in the order of the mesh generator, whatever the number of ranks and their
+cut of the mesh.
 
-Rank 0 holds what is collected. The number of a point is that of its cell or facet times points per cell, plus its own.
-Neither the order of a cell's nodes, and so of its points, nor that along a contact edge depends on the ranks.
+Rank 0 holds what is collected. The number of a point is that of its cell or facet times points per
+cell, plus its own. Neither the order of a cell's nodes, and so of its points, nor that along a
+contact edge depends on the ranks.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ Arrays = dict[str, np.ndarray]
 
 
 class Gather:
-    """Brings values of owned entities to rank 0, in the order of their input indices. Collective."""
+    """Brings values of owned entities to rank 0, in the order of their input indices.
+    Collective."""
 
     def __init__(self, comm: MPI.Comm, index: np.ndarray) -> None:
         self.comm = comm
@@ -46,8 +49,9 @@ class Gather:
 class MeshOrder:
     """The generator's order of the nodes and cells of ``system``. Collective.
 
-    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank 0. Nodes are the
-    displacement's: where the geometry is of another order, they come as the cells first name them.
+    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank
+    0. Nodes are the displacement's: where the geometry is of another order, they come as the cells
+    first name them.
     """
 
     def __init__(self, system: System) -> None:
@@ -59,18 +63,27 @@ class MeshOrder:
         self.cells = Gather(system.comm, self._cell_index)
         index, owned = np.asarray(geometry.input_global_indices), geometry.index_map().size_local
         nodes = Gather(system.comm, index[:owned])
-        self.coordinates, cells = nodes(geometry.x[:owned]), self.cells(index[cell_nodes(mesh)[: self.n_cells]])
+        self.coordinates, cells = (
+            nodes(geometry.x[:owned]),
+            self.cells(index[cell_nodes(mesh)[: self.n_cells]]),
+        )
         root = system.comm.rank == 0
         self.nodes_of_cell = np.searchsorted(nodes.unique, cells) if root else cells
-        if V.element.basix_element.degree == cell_degree(mesh):  # both number the nodes of a cell alike
+        if V.element.basix_element.degree == cell_degree(
+            mesh
+        ):  # both number the nodes of a cell alike
             self._index = np.zeros(self._n_local, dtype=np.int64)
             self._index[dofs] = index[cell_nodes(mesh)]
         else:
             numbers = V.dofmap.index_map.local_to_global(np.arange(self._n_local, dtype=np.int32))
             of_cells, first = self.cells(numbers[dofs[: self.n_cells]]), None
             if root:
-                at = tabulate(mesh.basix_cell(), cell_degree(mesh), V.element.basix_element.points)[0]
-                places = np.einsum("qa,nai->nqi", at, self.coordinates[self.nodes_of_cell]).reshape(-1, 3)
+                at = tabulate(mesh.basix_cell(), cell_degree(mesh), V.element.basix_element.points)[
+                    0
+                ]
+                places = np.einsum("qa,nai->nqi", at, self.coordinates[self.nodes_of_cell]).reshape(
+                    -1, 3
+                )
                 first = np.unique(of_cells, return_index=True)[1]
                 self.coordinates = places[np.sort(first)]
                 self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
@@ -82,7 +95,9 @@ class MeshOrder:
 
     def mesh_digest(self) -> str:
         """SHA-256 of coordinates and cells, on rank 0."""
-        return hashlib.sha256(self.coordinates.tobytes() + self.nodes_of_cell.astype("<i8").tobytes()).hexdigest()
+        return hashlib.sha256(
+            self.coordinates.tobytes() + self.nodes_of_cell.astype("<i8").tobytes()
+        ).hexdigest()
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
@@ -93,32 +108,43 @@ class MeshOrder:
         return self.cells(of_cells)
 
     def facet_sets(self) -> dict[str, np.ndarray]:
-        """Both vertices ``(k, 2)`` of every facet of the named sets, as nodes of the mesh, on rank 0. Collective."""
+        """Both vertices ``(k, 2)`` of every facet of the named sets, as nodes of the mesh, on rank
+        0. Collective."""
         tagged, comm = self.system.problem.mesh, self.system.comm
         mesh, found = tagged.mesh, {}
         for name in (name for name, tags in tagged.facet_sets.items() if tags):
             facets = tagged.facets_in(name)
             # dolfinx divides by their number
-            ends = entities_to_geometry(mesh, 1, facets)[:, :2] if len(facets) else np.zeros((0, 2), dtype=np.int32)
+            ends = (
+                entities_to_geometry(mesh, 1, facets)[:, :2]
+                if len(facets)
+                else np.zeros((0, 2), dtype=np.int32)
+            )
             parts = comm.gather(np.sort(self._index[self._dof_of_vertex[ends]], axis=1))
             if parts is not None:
-                found[name] = np.searchsorted(self._nodes.unique, np.unique(np.concatenate(parts), axis=0))
+                found[name] = np.searchsorted(
+                    self._nodes.unique, np.unique(np.concatenate(parts), axis=0)
+                )
         return found
 
     def at_points(self, name: str, parts: Iterable[PointFields]) -> np.ndarray:
-        """The attribute ``name`` of `PointFields` of all cells ``(n, q, ...)`` on rank 0. Collective."""
+        """The attribute ``name`` of `PointFields` of all cells ``(n, q, ...)`` on rank 0.
+        Collective."""
         cells, values = zip(*((part.cells, getattr(part, name)) for part in parts), strict=True)
         whole = np.zeros((self.n_cells, *values[0].shape[1:]))
         whole[np.concatenate(cells)] = np.concatenate(values)
         return self.cells(whole)
 
     def contact_facets(self) -> np.ndarray:
-        """Cell, and nodes along it within the cell, ``(k, 1 + degree + 1)`` of the facets of all integrated contact
-        surfaces, one surface after the other, on rank 0. Collective."""
-        return self.on_facets(lambda pair: np.column_stack([self._cell_index[pair.surface.cells], pair.surface.trace]))
+        """Cell, and nodes along it within the cell, ``(k, 1 + degree + 1)`` of the facets of all
+        integrated contact surfaces, one surface after the other, on rank 0. Collective."""
+        return self.on_facets(
+            lambda pair: np.column_stack([self._cell_index[pair.surface.cells], pair.surface.trace])
+        )
 
     def on_facets(self, values: Callable[[Pair], np.ndarray]) -> np.ndarray:
-        """The ``values`` ``(n, ...)`` of a pair's facets for all `contact_facets`, on rank 0. Collective."""
+        """The ``values`` ``(n, ...)`` of a pair's facets for all `contact_facets`, on rank 0.
+        Collective."""
         pairs = self.system.contact.pairs
         parts = [Gather(self.system.comm, pair.surface.facet)(values(pair)) for pair in pairs]
         return np.concatenate(parts) if parts else np.zeros(0)
@@ -128,18 +154,21 @@ class MeshOrder:
         return self._nodes(u[: self._n_owned])
 
     def spread(self, whole: Array | None) -> Array:
-        """The inverse of `collect`: this rank's nodal values ``(n_local, k)``, ghosts included. Collective."""
+        """The inverse of `collect`: this rank's nodal values ``(n_local, k)``, ghosts included.
+        Collective."""
         comm = self.system.comm
         index, values = comm.bcast((self._nodes.unique, whole) if comm.rank == 0 else None)
         return values[np.searchsorted(index, self._index)]
 
     def collect_history(self) -> Arrays:
-        """Histories on rank 0: "history/PLACE/point", numbers of points that have one in rising order, and
-        "history/PLACE/NAME" for every array of their state. Collective."""
+        """Histories on rank 0: "history/PLACE/point", numbers of points that have one in rising
+        order, and "history/PLACE/NAME" for every array of their state. Collective."""
         whole = {}
         for place, points, number in self._points():
             now, virgin = vars(points.state), vars(points.material.state(points.n))
-            changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in now.items()]
+            changed = [
+                (v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in now.items()
+            ]
             used = np.logical_or.reduce(changed)
             gather = Gather(self.system.comm, number[used])
             for name, values in ({"point": number} | now).items():
@@ -158,7 +187,10 @@ class MeshOrder:
 
     def _points(self) -> Iterator[tuple[str, Points, np.ndarray]]:
         """The places with history, this rank's points there, and their numbers ``(n q,)``."""
-        found = {f"bulk {tag}": (self._cell_index[c], p) for tag, (c, p) in self.system.bulk.histories().items()}
+        found = {
+            f"bulk {tag}": (self._cell_index[c], p)
+            for tag, (c, p) in self.system.bulk.histories().items()
+        }
         for place, (entity, points) in (found | self.system.contact.histories()).items():
             if points.state is not None:
                 q = points.n // max(len(entity), 1)

@@ -1,4 +1,5 @@
-"""Newton's method for equilibrium: PETSc's SNES, with a linear strategy, and tests of its own for when to stop."""
+"""Newton's method for equilibrium: PETSc's SNES, with a linear strategy, and tests of its own for
+when to stop."""
 
 from __future__ import annotations
 
@@ -22,15 +23,23 @@ from archord.solver.linear.look_ahead import LookAhead
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
-_ADDED_UP = ("iterations", "residuals", "active_set_changes", "factorisations", "evaluations")  # of several solves
+_ADDED_UP = (
+    "iterations",
+    "residuals",
+    "active_set_changes",
+    "factorisations",
+    "evaluations",
+)  # of several solves
 
 
 @dataclass
 class Newton:
-    """What a nonlinear solve did: whether it converged and why not, its iterations and residuals relative to reaction.
+    """What a nonlinear solve did: whether it converged and why not, its iterations and residuals
+    relative to reaction.
 
-    Without convergence ``worst`` is the place ``(2,)`` of the largest residual, ``plastic_increment`` the largest of
-    PEEQ. ``active_set_changes`` belong to each residual. ``held`` contact points had to stay on their facets.
+    Without convergence ``worst`` is the place ``(2,)`` of the largest residual,
+    ``plastic_increment`` the largest of PEEQ. ``active_set_changes`` belong to each residual.
+    ``held`` contact points had to stay on their facets.
     """
 
     converged: bool
@@ -47,14 +56,19 @@ class Newton:
     @staticmethod
     def together(solves: Sequence[Newton]) -> Newton:
         """Several ``solves`` as one, which ended as the last of them did."""
-        added = {name: sum((getattr(s, name) for s in solves[1:]), getattr(solves[0], name)) for name in _ADDED_UP}
+        added = {
+            name: sum((getattr(s, name) for s in solves[1:]), getattr(solves[0], name))
+            for name in _ADDED_UP
+        }
         return replace(solves[-1], **added, held=any(s.held for s in solves))
 
 
 class NewtonSolver:
-    """Newton's method for ``equilibrium``, to the tolerance and within the iterations that its problem allows.
+    """Newton's method for ``equilibrium``, to the tolerance and within the iterations that its
+    problem allows.
 
-    ``watch(load, result)`` is called on every rank after each residual, with what the solve did so far.
+    ``watch(load, result)`` is called on every rank after each residual, with what the solve did so
+    far.
     """
 
     watch: Callable[[float, Newton], None] = staticmethod(lambda load, result: None)
@@ -65,12 +79,17 @@ class NewtonSolver:
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
         looks, yields = equilibrium.choice.uses("look_ahead"), equilibrium.bulk.plastic
         self._ahead = LookAhead(equilibrium.revised, yields=yields) if looks else None
-        for sums in ("vec_mdot_use_gemv", "vec_maxpy_use_gemv"):  # in an order that depends on where memory lies
+        for sums in (
+            "vec_mdot_use_gemv",
+            "vec_maxpy_use_gemv",
+        ):  # in an order that depends on where memory lies
             PETSc.Options()[sums] = False
         self._x = equilibrium.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
-            self._solvers = {searches: self._solver("bt" if searches else "basic") for searches in (True, False)}
+            self._solvers = {
+                searches: self._solver("bt" if searches else "basic") for searches in (True, False)
+            }
             self._start_linear()
 
     def _solver(self, line_search: str) -> PETSc.SNES:
@@ -81,12 +100,15 @@ class NewtonSolver:
         snes.setType("newtonls")
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
         snes.setConvergenceTest(self._guarded(self._test))
-        snes.setTolerances(stol=0.0)  # else a line search that ends in a short step counts as convergence
+        snes.setTolerances(
+            stol=0.0
+        )  # else a line search that ends in a short step counts as convergence
         snes.setFromOptions()
         return snes
 
     def _start_linear(self) -> None:
-        """Start with a new linear solver: after a singular matrix PETSc's MUMPS may skip the next factorisation."""
+        """Start with a new linear solver: after a singular matrix PETSc's MUMPS may skip the next
+        factorisation."""
         self._ksp = PETSc.KSP().create(self.equilibrium.comm)
         self._ksp.setPreSolve(self._guarded(self._before_solve))
         self._ksp.setPostSolve(self._guarded(self._after_solve))
@@ -110,15 +132,20 @@ class NewtonSolver:
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         border = self.equilibrium.border
-        if self._ahead is None or ksp.getConvergedReason() < 0 or (border and border.singular is not None):
+        if (
+            self._ahead is None
+            or ksp.getConvergedReason() < 0
+            or (border and border.singular is not None)
+        ):
             return
         self._ahead.improve(b, x, self._linear.matrix)
         if border:
             border.singular = None  # vectors that FGMRES tries say nothing of it
 
     def _guarded(self, callback: Callable) -> Callable:
-        """Keep what ``callback``, a method, raises, which PETSc would turn into an error number. It does not keep this
-        object alive, which holds PETSc's: not every petsc4py lets Python collect such cycles."""
+        """Keep what ``callback``, a method, raises, which PETSc would turn into an error number. It
+        does not keep this object alive, which holds PETSc's: not every petsc4py lets Python collect
+        such cycles."""
         method = WeakMethod(callback)
 
         def call(*arguments) -> Any:
@@ -133,10 +160,12 @@ class NewtonSolver:
         return call
 
     def solve(self, guess: Array | None, *, line_search: bool = True, goal: float = 0.0) -> Newton:
-        """Newton's method at the equilibrium's load, to a residual of ``goal``, the own tolerance without.
+        """Newton's method at the equilibrium's load, to a residual of ``goal``, the own tolerance
+        without.
 
-        ``guess`` is shaped like the equilibrium's `state`; contact points search their partners there. Without one the
-        solve goes on from the last iterate and its partners. Steps are full ones without ``line_search``.
+        ``guess`` is shaped like the equilibrium's `state`; contact points search their partners
+        there. Without one the solve goes on from the last iterate and its partners. Steps are full
+        ones without ``line_search``.
         """
         at, snes = self.equilibrium, self._solvers[line_search]
         self._goal = goal or self.tolerance
@@ -163,15 +192,22 @@ class NewtonSolver:
             at.renew_factorisation()
             self._start_linear()
         result.converged = code > 0
-        result.reason = "converged" if result.converged else self._failure or _REASONS.get(code, f"SNES reason {code}")
+        result.reason = (
+            "converged"
+            if result.converged
+            else self._failure or _REASONS.get(code, f"SNES reason {code}")
+        )
         if not result.converged:
-            grown = [(p.peeq - p.material.peeq(p.state)).max(initial=0.0) for p in at.plastic_points()]
+            grown = [
+                (p.peeq - p.material.peeq(p.state)).max(initial=0.0) for p in at.plastic_points()
+            ]
             result.plastic_increment = at.comm.allreduce(float(max(grown, default=0.0)), op=MPI.MAX)
             result.worst = at.worst_place()
         return result
 
     def residual_norm(self, guess: Array) -> float:
-        """The norm of the residual at a ``guess`` for `solve`; infinite where a contact point finds no partner."""
+        """The norm of the residual at a ``guess`` for `solve`; infinite where a contact point finds
+        no partner."""
         at, f = self.equilibrium, self._x.duplicate()
         at.pack(guess, self._x)
         at.contact.search()
@@ -182,7 +218,8 @@ class NewtonSolver:
         return float(f.norm())
 
     def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-        """The residual ``f`` at the unknowns ``x``, not a number where a contact point finds no partner."""
+        """The residual ``f`` at the unknowns ``x``, not a number where a contact point finds no
+        partner."""
         self._result.evaluations += 1
         try:
             self._renewed |= self.equilibrium.residual_of(x, f)
@@ -194,12 +231,15 @@ class NewtonSolver:
             self._attach()
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Assemble the tangent unless the last one will do, and factorise it unless a lagged factorisation will."""
+        """Assemble the tangent unless the last one will do, and factorise it unless a lagged
+        factorisation will."""
         at, result = self.equilibrium, self._result
         if self._close():
             return
         lagged, changes = self._lagged, result.active_set_changes[-1]
-        factorise = lagged is None or lagged.factorises(self._ksp.getIterationNumber(), changes, renewed=self._renewed)
+        factorise = lagged is None or lagged.factorises(
+            self._ksp.getIterationNumber(), changes, renewed=self._renewed
+        )
         self._reuse = not factorise
         before = at.tangent.factorisations
         at.update_tangent(factorise=factorise)
@@ -207,8 +247,9 @@ class NewtonSolver:
         self._renewed = False
 
     def _close(self) -> bool:
-        """Whether one more step with the last factorisation will do: Newton's method converges, and the residual that
-        such a step leaves, smaller by the last reduction, is below the tolerance."""
+        """Whether one more step with the last factorisation will do: Newton's method converges, and
+        the residual that such a step leaves, smaller by the last reduction, is below the
+        tolerance."""
         residuals = self._result.residuals
         if len(residuals) < 2 or self._result.active_set_changes[-1] or self._renewed:
             return False
@@ -217,7 +258,12 @@ class NewtonSolver:
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Note the residual and tell SNES whether to go on."""
-        at, result, norm, reasons = self.equilibrium, self._result, norms[2], PETSc.SNES.ConvergedReason
+        at, result, norm, reasons = (
+            self.equilibrium,
+            self._result,
+            norms[2],
+            PETSc.SNES.ConvergedReason,
+        )
         reaction = max(at.reaction_norm, at.largest_reaction)
         result.active_set_changes.append(at.changes)
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
@@ -225,7 +271,9 @@ class NewtonSolver:
         if at.border and at.border.singular is not None:
             pressed = at.load > 0 and at.contact.n_active() > 0
             level = at.drives.unknown[at.border.singular]
-            of = "".join(f" of the drive {name!r}" for name in at.drives.names[level : level + 1] if name)
+            of = "".join(
+                f" of the drive {name!r}" for name in at.drives.names[level : level + 1] if name
+            )
             self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'}{of} (singular mode)"
             return reasons.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):

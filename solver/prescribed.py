@@ -1,7 +1,8 @@
-"""Prescribed displacements of nodes, and what holds where the sets of several supports share a node.
+"""Prescribed displacements of nodes, and what holds where the sets of several supports share a
+node.
 
-What fixes a node wins over a displacement. Whatever else meets at a node must move it alike. So the order of supports
-has no part in a result.
+What fixes a node wins over a displacement. Whatever else meets at a node must move it alike. So the
+order of supports has no part in a result.
 """
 
 from __future__ import annotations
@@ -25,10 +26,9 @@ Place = tuple[float, float]
 class _Motion:
     """What the supports of one name prescribe for one set along one axis.
 
-    nodes (k,): block dofs on this rank, ghosts included
-    rate (d, k): their displacement per unit of each drive
-    moves: whether any drive moves the set; if not, it is fixed
-    together: whether the set must move as one, as it does under a force, or where both axes are prescribed
+    nodes (k,): block dofs on this rank, ghosts included rate (d, k): their displacement per unit of
+    each drive moves: whether any drive moves the set; if not, it is fixed together: whether the set
+    must move as one, as it does under a force, or where both axes are prescribed
     """
 
     name: str
@@ -40,16 +40,18 @@ class _Motion:
     together: bool = False
 
     def __str__(self) -> str:
-        return f"{self.name!r}" if self.name == self.facets else f"{self.name!r} (on {self.facets!r})"
+        return (
+            f"{self.name!r}" if self.name == self.facets else f"{self.name!r} (on {self.facets!r})"
+        )
 
 
 class Prescribed:
-    """What the supports of ``problem`` prescribe for the nodes of ``V``, by its ``drives``. Collective.
+    """What the supports of ``problem`` prescribe for the nodes of ``V``, by its ``drives``.
+    Collective.
 
-    names: those of the supports
-    rate (d, n_local, 2): displacements of the nodes per unit of each drive
-    holder (n_local, 2): number of the name that a displacement is prescribed by, the last of several; -1 if it is free
-    warnings: displacements that nodes do not follow, as supports fix them
+    names: those of the supports rate (d, n_local, 2): displacements of the nodes per unit of each
+    drive holder (n_local, 2): number of the name that a displacement is prescribed by, the last of
+    several; -1 if it is free warnings: displacements that nodes do not follow, as supports fix them
 
     Raises ValueError on all ranks where supports contradict each other.
     """
@@ -86,8 +88,8 @@ class Prescribed:
         self.rate /= np.maximum(meeting, 1)
 
     def share_of(self, name: str) -> Array:
-        """The part ``(n_local, 2)`` of the reaction at each node that is of the supports ``name``: equal parts where
-        several hold a node."""
+        """The part ``(n_local, 2)`` of the reaction at each node that is of the supports ``name``:
+        equal parts where several hold a node."""
         if name not in self.names:
             return np.zeros(self.holder.shape)
         return self._holds[self.names.index(name)] / np.maximum(self._holds.sum(axis=0), 1)
@@ -106,7 +108,9 @@ class Prescribed:
             if not s.moves:
                 continue
             if (*key, s.drive) in given:
-                raise ValueError(f"{s.name!r} gives {s.facets!r} two rates in {_AXES[s.axis]} by the drive {s.drive!r}")
+                raise ValueError(
+                    f"{s.name!r} gives {s.facets!r} two rates in {_AXES[s.axis]} by the drive {s.drive!r}"
+                )
             given.add((*key, s.drive))
             motion = found[key]
             motion.rate[number[s.drive]] = self._rate(s, motion.nodes)
@@ -128,9 +132,11 @@ class Prescribed:
         """What tells apart how the motion's nodes are displaced along the path ``(k, d)``."""
         return motion.rate.T @ self._course
 
-    def _require_free(self, moving: list[_Motion], fixing: list[_Motion], fixed: np.ndarray, round_off: Array) -> None:
-        """Warn where a motion meets what fixes. Raises ValueError where that leaves nothing of it, or bends a set that
-        must move as one."""
+    def _require_free(
+        self, moving: list[_Motion], fixing: list[_Motion], fixed: np.ndarray, round_off: Array
+    ) -> None:
+        """Warn where a motion meets what fixes. Raises ValueError where that leaves nothing of it,
+        or bends a set that must move as one."""
         free = np.zeros(len(moving), dtype=np.int64)
         met: list[tuple[int, int, Place]] = []
         for m, motion in enumerate(moving):
@@ -139,7 +145,9 @@ class Prescribed:
             away = np.abs(self._displaced(motion)).max(axis=1, initial=0.0) > round_off[m]
             for f, fix in enumerate(fixing):
                 if fix.axis == motion.axis:
-                    met += self._first_place(m, f, np.intersect1d(motion.nodes[held & away], fix.nodes))
+                    met += self._first_place(
+                        m, f, np.intersect1d(motion.nodes[held & away], fix.nodes)
+                    )
         free = self._comm.allreduce(free)
         for m, f, place in self._everywhere(met):
             motion, fix = moving[m], fixing[f]
@@ -179,7 +187,8 @@ class Prescribed:
             )
 
     def _first_place(self, a: int, b: int, nodes: np.ndarray) -> list[tuple[int, int, Place]]:
-        """Where the motions ``a`` and ``b`` meet first, by x and y, at ``nodes`` of this rank; nothing without any."""
+        """Where the motions ``a`` and ``b`` meet first, by x and y, at ``nodes`` of this rank;
+        nothing without any."""
         digits = _ALIKE * self._size
         places = [tuple((np.round(x / digits) * digits + 0.0).tolist()) for x in self._x[nodes]]
         return [(a, b, min(places))] if places else []
@@ -195,8 +204,9 @@ class Prescribed:
 def _courses(drives: list[Drive]) -> Array:
     """What tells drives apart ``(d, d)``: rows of drives that move alike along the path are equal.
 
-    Displacements are compared at the load factors 0, 1, 2, ..., where paths have their corners. A drive under a force,
-    whose displacement is unknown, is like itself alone. Rows keep their scalar products when columns are reduced to d.
+    Displacements are compared at the load factors 0, 1, 2, ..., where paths have their corners. A
+    drive under a force, whose displacement is unknown, is like itself alone. Rows keep their scalar
+    products when columns are reduced to d.
     """
     count = len(drives)
     factors = np.arange(max((len(drive.path) for drive in drives), default=0) + 2.0)

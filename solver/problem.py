@@ -1,7 +1,9 @@
-"""A problem of solid mechanics to be solved: bodies on a mesh, what they touch, what holds them, what loads them.
+"""A problem of solid mechanics to be solved: bodies on a mesh, what they touch, what holds them,
+what loads them.
 
-Sets of cells, facets and points are named in the mesh. One number, the load factor, runs along the path; drives turn it
-into displacements of supports and rigid circles, and into forces (per unit thickness), in any consistent units.
+Sets of cells, facets and points are named in the mesh. One number, the load factor, runs along the
+path; drives turn it into displacements of supports and rigid circles, and into forces (per unit
+thickness), in any consistent units.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Body:
-    """The cells of the set ``cells`` (that of the body's ``name`` if empty), of one ``material``."""
+    """The cells of the set ``cells`` (that of the body's ``name`` if empty), of one
+    ``material``."""
 
     name: str
     material: Any
@@ -31,11 +34,13 @@ class Body:
 
 @dataclass(frozen=True)
 class Drive:
-    """What moves supports, rigid circles and means, or multiplies loads: by a displacement or a force on the ``path``.
+    """What moves supports, rigid circles and means, or multiplies loads: by a displacement or a
+    force on the ``path``.
 
-    ``path`` holds the values at the load factors 0, 1, 2, ..., with straight lines between, constant behind; without
-    one the value is the load factor itself. Under ``control`` "force" the value is the force that works on the drive's
-    displacement, over all symmetric parts of the problem, and the displacement is unknown. Loads always take a force.
+    ``path`` holds the values at the load factors 0, 1, 2, ..., with straight lines between,
+    constant behind; without one the value is the load factor itself. Under ``control`` "force" the
+    value is the force that works on the drive's displacement, over all symmetric parts of the
+    problem, and the displacement is unknown. Loads always take a force.
     """
 
     name: str
@@ -48,20 +53,25 @@ class Drive:
 
     def values(self, factors: Array) -> Array:
         """The values at the load ``factors``."""
-        return np.interp(factors, np.arange(len(self.path)), self.path) if len(self.path) else factors
+        return (
+            np.interp(factors, np.arange(len(self.path)), self.path) if len(self.path) else factors
+        )
 
 
 @dataclass(frozen=True)
 class Support:
-    """Component ``axis`` of the displacement of a facet set is ``rate`` times that of the ``drive``.
+    """Component ``axis`` of the displacement of a facet set is ``rate`` times that of the
+    ``drive``.
 
-    ``rate`` is a number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``. Supports of one
-    ``name`` have one reaction, and those of one set their drives add up. Drives "x", "y", "turn" of one name, at rates
-    1, 1, ``(Y - y, x - X)``, are a rigid reference point (X, Y).
+    ``rate`` is a number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``.
+    Supports of one ``name`` have one reaction, and those of one set their drives add up. Drives
+    "x", "y", "turn" of one name, at rates 1, 1, ``(Y - y, x - X)``, are a rigid reference point (X,
+    Y).
 
-    Where sets share a node, a support without a rate wins over a displacement, with a warning. It must not meet a set
-    that moves as one, under a force or along both axes, unless that keeps the node at rest. All other supports of a
-    node must move it alike. Those that hold a node together have equal parts of its reaction.
+    Where sets share a node, a support without a rate wins over a displacement, with a warning. It
+    must not meet a set that moves as one, under a force or along both axes, unless that keeps the
+    node at rest. All other supports of a node must move it alike. Those that hold a node together
+    have equal parts of its reaction.
     """
 
     name: str
@@ -80,8 +90,9 @@ class Support:
 class Load:
     """Dead loads on the cells or the facets of a set, times the value of the ``drive``.
 
-    ``force`` is that over all symmetric parts of the problem, spread as ``density(x)``, a UFL expression of the
-    position, says, evenly without. ``pressure`` acts on facets, along the undeformed normal into the body.
+    ``force`` is that over all symmetric parts of the problem, spread as ``density(x)``, a UFL
+    expression of the position, says, evenly without. ``pressure`` acts on facets, along the
+    undeformed normal into the body.
     """
 
     cells: str = ""
@@ -94,13 +105,15 @@ class Load:
 
 @dataclass(frozen=True)
 class Mean:
-    """The mean motion of a facet set, as that of a reference ``point`` along ``axis`` 0, 1 or 2, its rotation.
+    """The mean motion of a facet set, as that of a reference ``point`` along ``axis`` 0, 1 or 2,
+    its rotation.
 
-    With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x - c|^2`` about the
-    centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive`` prescribes that motion, or the force
-    (moment) on the point, which the facets get spread as the motion's derivative says: statically equivalent. Without a
-    point it is the centroid, as also of facets that a symmetric half shows of an edge across its axis: the mirrored
-    facets take up the moment. Means of one ``name`` have one reaction. A drive has one mean at most.
+    With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x -
+    c|^2`` about the centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive``
+    prescribes that motion, or the force (moment) on the point, which the facets get spread as the
+    motion's derivative says: statically equivalent. Without a point it is the centroid, as also of
+    facets that a symmetric half shows of an edge across its axis: the mirrored facets take up the
+    moment. Means of one ``name`` have one reaction. A drive has one mean at most.
     """
 
     name: str
@@ -112,7 +125,8 @@ class Mean:
 
 @dataclass(frozen=True)
 class Guess:
-    """Where the first solve starts: the displacement of the drive "", and by how much each body has moved rigidly."""
+    """Where the first solve starts: the displacement of the drive "", and by how much each body has
+    moved rigidly."""
 
     factor: float
     moved: Mapping[str, Vector] = field(default_factory=dict)
@@ -122,17 +136,20 @@ class Guess:
 class Problem:
     """What is to be solved.
 
-    A load on the path is the load factor, which each of the ``drives`` turns into its value. The drive "" is there
-    without being given, with the load factor for its displacement. ``load_name`` names the load in messages.
+    A load on the path is the load factor, which each of the ``drives`` turns into its value. The
+    drive "" is there without being given, with the load factor for its displacement. ``load_name``
+    names the load in messages.
 
-    With ``fit`` the path begins with a stage of its own: between the load factors 0 and 1 interferences grow from
-    nothing. With ``stabilise`` weak springs hold bodies that supports do not, which so may begin without contact.
+    With ``fit`` the path begins with a stage of its own: between the load factors 0 and 1
+    interferences grow from nothing. With ``stabilise`` weak springs hold bodies that supports do
+    not, which so may begin without contact.
 
-    ``symmetry`` is how many times the modelled part makes up the whole, whose forces and energies are reported.
-    ``travel`` is the size of displacements to be expected, which limits what counts as round-off. Newton's method stops
-    at a residual of ``tolerance`` over the reaction. ``guess`` starts the first step at a load; ``from_rest`` tells
-    whether the bodies are in equilibrium before it (they are not in a press fit without a stage of its own).
-    ``coarser`` makes the same problem on a coarser mesh, for guesses.
+    ``symmetry`` is how many times the modelled part makes up the whole, whose forces and energies
+    are reported. ``travel`` is the size of displacements to be expected, which limits what counts
+    as round-off. Newton's method stops at a residual of ``tolerance`` over the reaction. ``guess``
+    starts the first step at a load; ``from_rest`` tells whether the bodies are in equilibrium
+    before it (they are not in a press fit without a stage of its own). ``coarser`` makes the same
+    problem on a coarser mesh, for guesses.
     """
 
     mesh: TaggedMesh
@@ -161,28 +178,49 @@ class Problem:
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} must have different names, these are {', '.join(names)}")
         for load in self.loads:
-            if bool(load.cells) == bool(load.facets) or (load.pressure and (load.cells or any(load.force))):
-                raise ValueError("a load is a force on the cells of a set or on its facets, or a pressure on facets")
-        moves, loads, means = self.moving_drives(), {x.drive for x in self.loads}, [x.drive for x in self.means]
+            if bool(load.cells) == bool(load.facets) or (
+                load.pressure and (load.cells or any(load.force))
+            ):
+                raise ValueError(
+                    "a load is a force on the cells of a set or on its facets, or a pressure on facets"
+                )
+        moves, loads, means = (
+            self.moving_drives(),
+            {x.drive for x in self.loads},
+            [x.drive for x in self.means],
+        )
         known = [drive.name for drive in self.all_drives]
         for name in (*moves, *loads, *means):
             if name not in known:
-                raise ValueError(f"there is no drive {name!r}; there are {', '.join(map(repr, known))}")
+                raise ValueError(
+                    f"there is no drive {name!r}; there are {', '.join(map(repr, known))}"
+                )
             if (name in moves) + (name in loads) + means.count(name) > 1:
-                raise ValueError(f"the drive {name!r} must move supports and discs, multiply loads, or have one mean")
+                raise ValueError(
+                    f"the drive {name!r} must move supports and discs, multiply loads, or have one mean"
+                )
         for name in known:
             if name and name not in (*moves, *loads, *means):
                 raise ValueError(f"the drive {name!r} moves nothing and multiplies no load")
 
     def moving_drives(self) -> set[str]:
         """Names of the drives that move supports or rigid discs."""
-        discs = [given for i in self.interactions for given in i.surfaces if isinstance(given, Rigid)]
-        return {s.drive for s in self.supports if s.moves} | {name for disc in discs for name in disc.moved_by()}
+        discs = [
+            given for i in self.interactions for given in i.surfaces if isinstance(given, Rigid)
+        ]
+        return {s.drive for s in self.supports if s.moves} | {
+            name for disc in discs for name in disc.moved_by()
+        }
 
     @property
     def all_drives(self) -> list[Drive]:
-        """The ``drives``, and the one of the load factor where it is used and not given, or alone."""
-        used = self.moving_drives() | {load.drive for load in self.loads} | {mean.drive for mean in self.means}
+        """The ``drives``, and the one of the load factor where it is used and not given, or
+        alone."""
+        used = (
+            self.moving_drives()
+            | {load.drive for load in self.loads}
+            | {mean.drive for mean in self.means}
+        )
         alone = not self.drives or ("" in used and all(drive.name for drive in self.drives))
         return [*self.drives, *([Drive("")] if alone else [])]
 
@@ -206,9 +244,13 @@ class Problem:
     def body_of(self, facets: str) -> Body:
         """The body that a facet set belongs to. Collective; raises ValueError if it is not one."""
         tags = self.mesh.tags_behind(facets)
-        found = [body for body in self.bodies if tags & set(self.mesh.cell_tags(body.cells or body.name))]
+        found = [
+            body for body in self.bodies if tags & set(self.mesh.cell_tags(body.cells or body.name))
+        ]
         if not found:
             raise ValueError(f"the facet set {facets!r} is of no body: give that body, too")
         if len(found) > 1 or not tags <= set(self.mesh.cell_tags(found[0].cells or found[0].name)):
-            raise ValueError(f"the facet set {facets!r} belongs to {len(tags)} cell sets, a surface to one body")
+            raise ValueError(
+                f"the facet set {facets!r} belongs to {len(tags)} cell sets, a surface to one body"
+            )
         return found[0]

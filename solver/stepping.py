@@ -1,6 +1,8 @@
-"""Load stepping along a path: output targets are hit exactly, a step that fails is taken back with all history and cut.
+"""Load stepping along a path: output targets are hit exactly, a step that fails is taken back with
+all history and cut.
 
-The path is a list of loads, reached on straight lines, up, down and through zero. Steps are measured in output steps.
+The path is a list of loads, reached on straight lines, up, down and through zero. Steps are
+measured in output steps.
 """
 
 from __future__ import annotations
@@ -21,8 +23,9 @@ _SLIVER = 1e-3  # of an output step: a step that would leave less than this goes
 class StepRules:
     """How the length of a step follows Newton's method; lengths are in output steps.
 
-    The first step has the length ``initial``; it grows by ``growth`` after a solve in at most ``target_iterations``, is
-    cut by ``cutback`` after one that failed, and stays between ``minimum`` and ``maximum``.
+    The first step has the length ``initial``; it grows by ``growth`` after a solve in at most
+    ``target_iterations``, is cut by ``cutback`` after one that failed, and stays between
+    ``minimum`` and ``maximum``.
     """
 
     initial: float = 1.0
@@ -34,7 +37,8 @@ class StepRules:
 
 
 class StepFailure(RuntimeError):
-    """No equilibrium even with the smallest step in the output step ``attempt``; the last accepted state remains."""
+    """No equilibrium even with the smallest step in the output step ``attempt``; the last accepted
+    state remains."""
 
     def __init__(self, message: str, attempt: Step) -> None:
         super().__init__(message)
@@ -43,9 +47,11 @@ class StepFailure(RuntimeError):
 
 @dataclass
 class Step:
-    """What happened on the way to an output target: Newton iterations (failed attempts included), cutbacks, substeps.
+    """What happened on the way to an output target: Newton iterations (failed attempts included),
+    cutbacks, substeps.
 
-    ``attempts`` are the solves, the failed ones with their diagnostics; ``coarse_iterations`` those on coarser meshes.
+    ``attempts`` are the solves, the failed ones with their diagnostics; ``coarse_iterations`` those
+    on coarser meshes.
     """
 
     load: float
@@ -58,7 +64,11 @@ class Step:
     @property
     def residual(self) -> float:
         """Residual over reaction of the last solve."""
-        return self.attempts[-1].residuals[-1] if self.attempts and self.attempts[-1].residuals else 0.0
+        return (
+            self.attempts[-1].residuals[-1]
+            if self.attempts and self.attempts[-1].residuals
+            else 0.0
+        )
 
 
 def march(
@@ -70,10 +80,11 @@ def march(
     target_done: Callable[[Step, Position], None] = lambda step, position: None,
     attempted: Callable[[float, int], None] = lambda load, iterations: None,
 ) -> None:
-    """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` say so, to loads between.
+    """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` say so,
+    to loads between.
 
-    ``substep_done(load)`` follows every accepted step, ``target_done(step, position)`` every output target,
-    ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
+    ``substep_done(load)`` follows every accepted step, ``target_done(step, position)`` every output
+    target, ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
     """
     at, rules = path.at, rules or StepRules()
     size = at.size or rules.initial
@@ -99,7 +110,9 @@ def march(
             record.cutbacks += 1
             path.take_back()
             if size <= rules.minimum:
-                raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at.load, size), record)
+                raise StepFailure(
+                    _why(result, path.solver.equilibrium.problem, load, at.load, size), record
+                )
             size, just_cut = max(rules.minimum, rules.cutback * size), True
         at.targets_done = number + 1
         target_done(record, at)
@@ -107,10 +120,26 @@ def march(
 
 def _why(result: Newton, problem: Problem, load: float, held: float, size: float) -> str:
     name, by_force = problem.load_name, problem.by_force
-    where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
-    last = f"{result.residuals[-1]:.1e}" if result.residuals and np.isfinite(result.residuals[-1]) else "none"
-    cut = f"the step was cut to {size:.2g} of an output step" if size < 1 else "no smaller step is allowed"
-    limit = "; if the bodies yield as a whole, the limit load is close" if by_force and result.plastic_increment else ""
+    where = (
+        ""
+        if result.worst is None
+        else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
+    )
+    last = (
+        f"{result.residuals[-1]:.1e}"
+        if result.residuals and np.isfinite(result.residuals[-1])
+        else "none"
+    )
+    cut = (
+        f"the step was cut to {size:.2g} of an output step"
+        if size < 1
+        else "no smaller step is allowed"
+    )
+    limit = (
+        "; if the bodies yield as a whole, the limit load is close"
+        if by_force and result.plastic_increment
+        else ""
+    )
     return (
         f"no equilibrium at {name} = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
         f"over reaction was {last}{where}; {cut}; the last load that held is {name} = {held:.6g}{limit}"

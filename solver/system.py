@@ -1,4 +1,5 @@
-"""A problem, assembled: displacement space, bulk, contact, equilibrium, Newton's method, and the path of its loads."""
+"""A problem, assembled: displacement space, bulk, contact, equilibrium, Newton's method, and the
+path of its loads."""
 
 from __future__ import annotations
 
@@ -33,17 +34,22 @@ _AT_REST = 10.0  # times the round-off: forces that are none
 
 
 def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:
-    """Displacements of ``degree`` on ``mesh``, by their values at evenly spaced nodes. Collective."""
+    """Displacements of ``degree`` on ``mesh``, by their values at evenly spaced nodes.
+    Collective."""
     variant = basix.LagrangeVariant.equispaced
-    element = basix.ufl.element("P", mesh.basix_cell(), degree, shape=(2,), lagrange_variant=variant)
+    element = basix.ufl.element(
+        "P", mesh.basix_cell(), degree, shape=(2,), lagrange_variant=variant
+    )
     return fem.functionspace(mesh, element)
 
 
 class System:
-    """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric parts included.
+    """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric
+    parts included.
 
-    ``sides`` holds the surfaces of bodies in contact by the name of their facet set; ``n_dofs`` counts prescribed
-    displacements, too. Collective; raises ValueError for contradictions, `ProjectionError` for surfaces that miss.
+    ``sides`` holds the surfaces of bodies in contact by the name of their facet set; ``n_dofs``
+    counts prescribed displacements, too. Collective; raises ValueError for contradictions,
+    `ProjectionError` for surfaces that miss.
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
@@ -55,12 +61,19 @@ class System:
             cells = {problem.tag(body): problem.cells_of(body) for body in problem.bodies}
             self.bulk = Bulk(self.V, cells, materials)
             self.sides: dict[str, Surface] = {}
-            surfaces = [[self._surface(given, i.name) for given in i.surfaces] for i in problem.interactions]
+            surfaces = [
+                [self._surface(given, i.name) for given in i.surfaces] for i in problem.interactions
+            ]
             self.contact = Contact(self.V, list(map(Interface, problem.interactions, surfaces)))
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
-        self.n_dofs, self.n_cells = 2 * self.V.dofmap.index_map.size_global, mesh.topology.index_map(2).size_global
-        self.cell_kind = f"{'curved' if cell_degree(mesh) > 1 else 'straight'} {mesh.basix_cell().name}s"
+        self.n_dofs, self.n_cells = (
+            2 * self.V.dofmap.index_map.size_global,
+            mesh.topology.index_map(2).size_global,
+        )
+        self.cell_kind = (
+            f"{'curved' if cell_degree(mesh) > 1 else 'straight'} {mesh.basix_cell().name}s"
+        )
         self.drive_names = self.equilibrium.drives.names
         self._path: LoadPath | None = None
 
@@ -77,7 +90,8 @@ class System:
         return np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
 
     def solve(self, loads: Sequence[float], rules: StepRules | None = None) -> None:
-        """Follow the path of the ``loads``, from where the last call has ended. Raises `StepFailure`."""
+        """Follow the path of the ``loads``, from where the last call has ended. Raises
+        `StepFailure`."""
         self._path = self._path or self.load_path()
         self._path.at.targets_done, self._path.at.size = 0, None
         march(self._path, loads, rules=rules)
@@ -93,12 +107,16 @@ class System:
         for body in self.problem.bodies:
             u[self.nodes_of(body)] = guess.moved.get(body.name, 0.0)
         levels = np.zeros(len(self.equilibrium.levels))
-        levels[: len(self.drive_names)] = [0.0 if name else guess.factor for name in self.drive_names]
+        levels[: len(self.drive_names)] = [
+            0.0 if name else guess.factor for name in self.drive_names
+        ]
         return np.append(u, levels)
 
     def reaction(self, name: str) -> Array:
         """Force ``(2,)`` of the supports and means ``name`` on the whole."""
-        return self.problem.symmetry * self.comm.allreduce(self.equilibrium.reaction(name).sum(axis=0))
+        return self.problem.symmetry * self.comm.allreduce(
+            self.equilibrium.reaction(name).sum(axis=0)
+        )
 
     def reaction_moment(self, name: str, point: Sequence[float]) -> float:
         """Moment of these forces about ``point``, anticlockwise, on the whole."""
@@ -116,11 +134,13 @@ class System:
         return self.problem.symmetry * self.contact.moment(name, point)
 
     def driven(self) -> tuple[Array, Array]:
-        """Displacements and forces ``(d,)`` of the ``drive_names`` on the whole, which do the work: of what a drive
-        moves, or the mean displacement along its loads and their force."""
+        """Displacements and forces ``(d,)`` of the ``drive_names`` on the whole, which do the work:
+        of what a drive moves, or the mean displacement along its loads and their force."""
         at, moving = self.equilibrium, self.equilibrium.drives.moving
         conjugates, n = self.problem.symmetry * at.conjugates(), len(self.drive_names)
-        return np.where(moving, at.levels, conjugates)[:n], np.where(moving, conjugates, at.levels)[:n]
+        return np.where(moving, at.levels, conjugates)[:n], np.where(moving, conjugates, at.levels)[
+            :n
+        ]
 
     def drive_force(self, name: str) -> float:
         """Force of the drive ``name``."""
@@ -143,7 +163,8 @@ class System:
 
     @property
     def hardest_held(self) -> str:
-        """The body, or the interaction with a disc, on which these springs did most work in the last accepted step."""
+        """The body, or the interaction with a disc, on which these springs did most work in the
+        last accepted step."""
         springs = self.equilibrium.springs
         works = springs.works if springs else {}
         return max(works, key=lambda name: works[name], default="")
@@ -155,7 +176,8 @@ class System:
         return float(stored), float(dissipated)
 
     def energy_noise(self) -> float:
-        """Energy of the whole that is round-off: noise of forces along the largest displacement. Collective."""
+        """Energy of the whole that is round-off: noise of forces along the largest displacement.
+        Collective."""
         u = np.abs(self.equilibrium.u.x.array).max(initial=0.0)
         largest = self.comm.allreduce(u, op=MPI.MAX)
         return float(self.problem.symmetry * self.equilibrium.noise * largest)
@@ -167,13 +189,15 @@ class System:
     def peeq(self) -> tuple[float, float]:
         """Largest PEEQ at a quadrature point, and the integral of PEEQ over the whole."""
         largest, integral = self.bulk.peeq()
-        return self.comm.allreduce(largest, op=MPI.MAX), self.problem.symmetry * self.comm.allreduce(integral)
+        return self.comm.allreduce(
+            largest, op=MPI.MAX
+        ), self.problem.symmetry * self.comm.allreduce(integral)
 
     def largest_peeq(
         self, *bodies: Body, within: Callable[[Array], np.ndarray] | None = None
     ) -> tuple[float, float, float]:
-        """Largest PEEQ at a quadrature point of the ``bodies``, of those at ``x`` ``(n, 2)`` for which ``within(x)``
-        is true; and its place x, y. Zeros without any."""
+        """Largest PEEQ at a quadrature point of the ``bodies``, of those at ``x`` ``(n, 2)`` for
+        which ``within(x)`` is true; and its place x, y. Zeros without any."""
         found = [(0.0, 0.0, 0.0)]
         for peeq, x in (self.bulk.peeq_of(self.problem.tag(body)) for body in bodies):
             peeq = peeq if within is None else np.where(within(x), peeq, 0.0)
@@ -188,12 +212,14 @@ class System:
         return reduce(Distortion.joined, found)
 
     def force_balance(self, before: float = 0.0) -> float:
-        """Largest resultant on a body over the largest force: of a support, of an interaction, as the sum of the sizes
-        of its points' forces, the norm of nodal ones, as of a pure moment, or the force ``before``; 0 if all are
-        round-off."""
+        """Largest resultant on a body over the largest force: of a support, of an interaction, as
+        the sum of the sizes of its points' forces, the norm of nodal ones, as of a pure moment, or
+        the force ``before``; 0 if all are round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
         forces: list[Array] = [np.zeros(2)]
-        forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
+        forces += [
+            self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)
+        ]
         of_supports = np.linalg.norm(forces, axis=1).max()
         nodal = max(self.equilibrium.reaction_norm, self.equilibrium.largest_reaction)
         on_part = max(nodal, self.contact.largest_pressed())

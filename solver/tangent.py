@@ -1,4 +1,5 @@
-"""The tangent of bulk and contact as one PETSc matrix, without rows and columns of prescribed displacements."""
+"""The tangent of bulk and contact as one PETSc matrix, without rows and columns of prescribed
+displacements."""
 
 from __future__ import annotations
 
@@ -19,29 +20,47 @@ from archord.solver.stabilisation import Springs
 class TangentMatrix:
     """``A``, of the last evaluation of ``bulk`` and ``contact``, assembled by `update`. Collective.
 
-    ``drives`` tell the prescribed displacements, and what they are per unit of the unknown levels. With ``condense``,
-    for elastic bodies which their supports hold, ``A`` is that of the bulk, and the contact is in ``condensed``.
-    ``factorisations`` counts those of sparse matrices that `update` asked for.
+    ``drives`` tell the prescribed displacements, and what they are per unit of the unknown levels.
+    With ``condense``, for elastic bodies which their supports hold, ``A`` is that of the bulk, and
+    the contact is in ``condensed``. ``factorisations`` counts those of sparse matrices that
+    `update` asked for.
     """
 
     def __init__(
-        self, bulk: Bulk, contact: Contact, drives: Drives, springs: Springs | None, timer: Timer, *, condense: bool
+        self,
+        bulk: Bulk,
+        contact: Contact,
+        drives: Drives,
+        springs: Springs | None,
+        timer: Timer,
+        *,
+        condense: bool,
     ) -> None:
         self.V, self.bulk, self.contact, self.timer = bulk.V, bulk, contact, timer
         self.comm, index_map = self.V.mesh.comm, self.V.dofmap.index_map
-        self._size, self._start, self._n = index_map.size_global, index_map.local_range[0], index_map.size_local
+        self._size, self._start, self._n = (
+            index_map.size_global,
+            index_map.local_range[0],
+            index_map.size_local,
+        )
         self.drives, self.springs, fixed, m = drives, springs, drives.fixed, len(drives.unknown)
-        self._fixed, rate = fixed[: self._n], drives.unknown_rate[:, : self._n].reshape(m, 2 * self._n).T
+        self._fixed, rate = (
+            fixed[: self._n],
+            drives.unknown_rate[:, : self._n].reshape(m, 2 * self._n).T,
+        )
         self._direction = fem.Function(self.V)
         dofs = [2 * np.flatnonzero(fixed[:, axis]).astype(np.int32) + axis for axis in range(2)]
         self._bcs = [fem.dirichletbc(0.0, dofs[axis], self.V.sub(axis)) for axis in range(2)]
-        # prescribed dofs of all ranks and their rates, with those of rigid surfaces and one that is none behind
+        # prescribed dofs of all ranks and their rates, with those of rigid surfaces and one that is
+        # none behind
         own = np.flatnonzero(self._fixed)
         discs = [drives.weight[:, None] * surface.rate[drives.unknown] for surface in contact.rigid]
         rigid = np.hstack([*discs, np.zeros((m, 1))]).T
         parts = [*self.comm.allgather((2 * self._start + own, rate[own]))]
         parts.append((2 * self._size + np.arange(len(rigid)), rigid))
-        self._prescribed, self._rates = (np.concatenate(column) for column in zip(*parts, strict=True))
+        self._prescribed, self._rates = (
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
         self.factorisations = 0
         self.A = self._elastic = self._revised = PETSc.Mat()
         self.condensed: Condensed | None = None
@@ -50,21 +69,27 @@ class TangentMatrix:
             self.A.assemble()
             with self.timer(BEFORE_SOLVING):
                 self.A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
-                nodes = np.unique(np.concatenate([surface.curve_dofs for surface in contact.surfaces]))
+                nodes = np.unique(
+                    np.concatenate([surface.curve_dofs for surface in contact.surfaces])
+                )
                 self.condensed = Condensed(self.A, nodes, self._revise_condensed)
         self.renew()
 
     def _allocated(self, *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
-        """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this rank."""
+        """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this
+        rank."""
         A = matrix(self.V, self.bulk.elastic_forms, *slots)
         assemble(A, self.bulk.elastic_forms, self._bcs)
         return A
 
     def renew(self) -> None:
-        """Allocate every slot that bulk and contact may fill, a condensed matrix those of contact alone."""
+        """Allocate every slot that bulk and contact may fill, a condensed matrix those of contact
+        alone."""
         tangent = self.contact.tangent
         self._in_matrix = (tangent.rows < self._size) & (tangent.columns < self._size)
-        (row_free, self._row_rate), (free, self._column_rate) = map(self._at, (tangent.rows, tangent.columns))
+        (row_free, self._row_rate), (free, self._column_rate) = map(
+            self._at, (tangent.rows, tangent.columns)
+        )
         self._free = row_free[:, :, None] * free[:, None, :]
         self._contact_blocks: Array = np.zeros((len(tangent.rows), 2, 2))
         if self.condensed is not None:
@@ -84,7 +109,8 @@ class TangentMatrix:
         self._elastic = self.A.copy()
 
     def _at(self, nodes: np.ndarray) -> tuple[Array, Array]:
-        """Which displacements of block dofs ``nodes`` ``(k,)`` are free ``(k, 2)``; others' rates ``(k, 2, m)``."""
+        """Which displacements of block dofs ``nodes`` ``(k,)`` are free ``(k, 2)``; others' rates
+        ``(k, 2, m)``."""
         dofs = 2 * nodes[:, None] + np.arange(2)
         at = np.searchsorted(self._prescribed, dofs)
         free = self._prescribed[at] != dofs
@@ -113,7 +139,9 @@ class TangentMatrix:
             with self.timer("assemble bulk"):
                 self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
                 if self.springs:
-                    self.A.axpy(1.0, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+                    self.A.axpy(
+                        1.0, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+                    )
                 self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
             self._contact_blocks = self.contact.tangent.blocks()
@@ -121,11 +149,14 @@ class TangentMatrix:
                 self._add_contact(self.A, self._contact_blocks)
             else:
                 self.factorisations = 1
-                self.condensed.update(self._contact_blocks[self._in_matrix] * self._free[self._in_matrix])
+                self.condensed.update(
+                    self._contact_blocks[self._in_matrix] * self._free[self._in_matrix]
+                )
 
     def _revise_condensed(self, increment: Array) -> Array | None:
-        """Go over to the points that ``increment`` ``(k, 2)`` of the nodes near the contact would close: the change of
-        the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if no point changes."""
+        """Go over to the points that ``increment`` ``(k, 2)`` of the nodes near the contact would
+        close: the change of the residual ``(m, 2)`` at those of the contact, with the matrix up to
+        date; None if no point changes."""
         assert self.condensed is not None
         with self.timer("contact"):
             index_map = self.V.dofmap.index_map
@@ -146,8 +177,8 @@ class TangentMatrix:
         return np.where(self._fixed, 0.0, force)
 
     def revised(self) -> tuple[PETSc.Mat, Array]:
-        """``A`` for the points that touch and stick now, beside that of the last `update` and valid until the next
-        call; and the contact's blocks."""
+        """``A`` for the points that touch and stick now, beside that of the last `update` and valid
+        until the next call; and the contact's blocks."""
         with self.timer("assemble contact"):
             blocks = self.contact.tangent.blocks()
             if not self._revised:
@@ -157,14 +188,18 @@ class TangentMatrix:
         return self._revised, blocks
 
     def border(self, blocks: Array | None = None) -> tuple[Array, Array, Array]:
-        """Derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of what these prescribe
-        with respect to the displacements, alike, and with respect to the levels ``(m, m)``, of all ranks; with the
-        contact's ``blocks``, else those of the last `update`. The bulk's of the first two are the same where its
-        tangent is symmetric, as of all materials without recovery of back stresses."""
+        """Derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of
+        what these prescribe with respect to the displacements, alike, and with respect to the
+        levels ``(m, m)``, of all ranks; with the contact's ``blocks``, else those of the last
+        `update`. The bulk's of the first two are the same where its tangent is symmetric, as of all
+        materials without recovery of back stresses."""
         drives, tangent = self.drives, self.contact.tangent
         blocks = self._contact_blocks if blocks is None else blocks
         m, free = len(drives.unknown), ~self._fixed.ravel()
-        load, rate = drives.unknown_load.reshape(m, -1), drives.unknown_rate[:, : self._n].reshape(m, -1)
+        load, rate = (
+            drives.unknown_load.reshape(m, -1),
+            drives.unknown_rate[:, : self._n].reshape(m, -1),
+        )
         on_rows = np.einsum("nij,njm->nim", blocks, self._column_rate)
         on_columns = np.einsum("nim,nij->njm", self._row_rate, blocks)
         D = np.tensordot(self._row_rate, on_rows, ((0, 1), (0, 1))) - rate @ load.T + load @ rate.T
@@ -178,10 +213,15 @@ class TangentMatrix:
                     b.array[:] += self.springs.pull(self._direction.x.array[: 2 * self._n])
                 D[:, level] += rate @ b.array_r
             c = b.copy()
-            for vector, nodes, values, whole in ((b, tangent.rows, on_rows, B), (c, tangent.columns, on_columns, C)):
+            for vector, nodes, values, whole in (
+                (b, tangent.rows, on_rows, B),
+                (c, tangent.columns, on_columns, C),
+            ):
                 inside = nodes < self._size
                 at = nodes[inside].astype(PETSc.IntType)
-                vector.setValuesBlocked(at, np.ascontiguousarray(values[inside, :, level]), PETSc.InsertMode.ADD)
+                vector.setValuesBlocked(
+                    at, np.ascontiguousarray(values[inside, :, level]), PETSc.InsertMode.ADD
+                )
                 vector.assemble()
                 whole[:, level] += vector.array_r
                 vector.destroy()

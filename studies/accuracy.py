@@ -1,8 +1,10 @@
-"""A scene solved to an accuracy: on ever finer meshes, in short enough steps, until the estimated error is below it.
+"""A scene solved to an accuracy: on ever finer meshes, in short enough steps, until the estimated
+error is below it.
 
-What is estimated is the error of P at the output steps, over the largest; of delta, if the load is a force. Mesh and
-steps err independently. The steps of a plastic joint are chosen first, where that is cheap, on the coarsest mesh; then
-meshes follow until both errors together are small enough. Each mesh is an ordinary run, and the last one stays.
+What is estimated is the error of P at the output steps, over the largest; of delta, if the load is
+a force. Mesh and steps err independently. The steps of a plastic joint are chosen first, where that
+is cheap, on the coarsest mesh; then meshes follow until both errors together are small enough. Each
+mesh is an ordinary run, and the last one stays.
 """
 
 from __future__ import annotations
@@ -36,8 +38,9 @@ MOST_SUBSTEPS = 64
 
 @dataclass(frozen=True)
 class Level:
-    """One mesh, solved: its sizes (``element_size`` over R, of a file over that of its cells), what it cost, the
-    ``last`` value of P (under a force of delta), and the errors estimated with it, if it told any."""
+    """One mesh, solved: its sizes (``element_size`` over R, of a file over that of its cells), what
+    it cost, the ``last`` value of P (under a force of delta), and the errors estimated with it, if
+    it told any."""
 
     mesh: int
     element_size: float
@@ -53,7 +56,8 @@ class Level:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What was ``asked`` and is ``estimated`` (None if unknown) of the last level: errors of mesh and steps, added."""
+    """What was ``asked`` and is ``estimated`` (None if unknown) of the last level: errors of mesh
+    and steps, added."""
 
     asked: float
     estimated: float | None
@@ -75,15 +79,19 @@ def solve_to_accuracy(
     on_level: Callable[[Level], None] = lambda level: None,
     **options: Any,
 ) -> Outcome:
-    """Solve ``scene`` to its ``analysis.accuracy`` into ``folder``; as `solve_scene`, whose arguments the others are
-    and whose errors it raises, where it has none or a run goes on from ``start``. Collective.
+    """Solve ``scene`` to its ``analysis.accuracy`` into ``folder``; as `solve_scene`, whose
+    arguments the others are and whose errors it raises, where it has none or a run goes on from
+    ``start``. Collective.
 
-    The run that stays has the finest mesh; its scene.toml holds that mesh and the length of its steps, its run.json the
-    `Accuracy`, which the outcome has, too. ``on_level`` reports every mesh on every rank. If the finest mesh or the
-    shortest steps allowed do not do, a warning says so. A mesh that cannot be solved ends everything, as interrupts do.
+    The run that stays has the finest mesh; its scene.toml holds that mesh and the length of its
+    steps, its run.json the `Accuracy`, which the outcome has, too. ``on_level`` reports every mesh
+    on every rank. If the finest mesh or the shortest steps allowed do not do, a warning says so. A
+    mesh that cannot be solved ends everything, as interrupts do.
     """
     if scene.analysis.accuracy is None or start is not None:
-        return solve_scene(scene, folder, comm, start=start, interrupt=interrupt, on_start=on_start, **options)
+        return solve_scene(
+            scene, folder, comm, start=start, interrupt=interrupt, on_start=on_start, **options
+        )
     with nullcontext(interrupt) if interrupt else Interrupt() as interrupt:
         search = _Search(scene, folder, comm, interrupt, on_start, on_level, options)
         with suppress(_End):
@@ -111,17 +119,26 @@ class _Search:
     mesh_error: float | None = None
 
     def __post_init__(self) -> None:
-        self.asked, self.begun, self.levels = self.scene.analysis.accuracy or 0.0, perf_counter(), list[Level]()
+        self.asked, self.begun, self.levels = (
+            self.scene.analysis.accuracy or 0.0,
+            perf_counter(),
+            list[Level](),
+        )
         self.step_error = None if self.scene.plastic else 0.0
         self.family: MeshFamily | ProblemFamily
         if isinstance(self.scene, Scene):
-            self.family = MeshFamily(self.scene, self.asked / 2 if self.scene.plastic else self.asked)
+            self.family = MeshFamily(
+                self.scene, self.asked / 2 if self.scene.plastic else self.asked
+            )
         else:
             self.family = ProblemFamily(self.scene)
 
     def refine(self) -> None:
-        """Solve until the estimate is as small as asked. Raises `_End` if there is no finer mesh, or a run stops."""
-        curves: list[Curve] = []  # in steps of the final length, on the meshes that resolve the contact
+        """Solve until the estimate is as small as asked. Raises `_End` if there is no finer mesh,
+        or a run stops."""
+        curves: list[
+            Curve
+        ] = []  # in steps of the final length, on the meshes that resolve the contact
         for mesh in count():
             curve, level = self._solve(mesh, self.substeps)
             if curve is None:
@@ -137,7 +154,8 @@ class _Search:
                 return
 
     def _choose_steps(self, mesh: int, curve: Curve, level: Level) -> tuple[Curve, Level]:
-        """Halve the steps until what they err by is at most half of what was asked; the curve with these steps."""
+        """Halve the steps until what they err by is at most half of what was asked; the curve with
+        these steps."""
         while True:
             finer, finer_level = self._solve(mesh, 2 * self.substeps)
             if finer is None:
@@ -148,7 +166,12 @@ class _Search:
                 self._tell(replace(finer_level, step_error=error))
                 return curve, replace(level, step_error=self.step_error)
             self._tell(replace(level, step_error=self.step_error))
-            curve, level, self.substeps, self.step_error = finer, finer_level, 2 * self.substeps, error
+            curve, level, self.substeps, self.step_error = (
+                finer,
+                finer_level,
+                2 * self.substeps,
+                error,
+            )
             if 2 * error <= self.asked or self.substeps >= MOST_SUBSTEPS:
                 return curve, replace(level, step_error=error)
 
@@ -156,7 +179,9 @@ class _Search:
         """The curve on ``mesh``, None where that hardly notices the contact. Raises `_End`."""
         scene, before, begun = self.family.scene_of(mesh, substeps), self.outcome, perf_counter()
         if scene is None and before is None:
-            raise InputError("analysis.accuracy: no mesh within the limits of its element sizes would do.")
+            raise InputError(
+                "analysis.accuracy: no mesh within the limits of its element sizes would do."
+            )
         received = self.comm.allreduce(self.interrupt.received, op=MPI.MAX)
         if received and before is not None:
             message = f"{Interrupted(received)} between two meshes"
@@ -173,7 +198,10 @@ class _Search:
         if outcome.status != "done" and outcome.message != UNSEEN:
             raise _End
         curve = self.comm.bcast(self.family.curve(outcome.steps))
-        iterations, seconds = sum(m.iterations for m in outcome.steps), round(perf_counter() - begun, 4)
+        iterations, seconds = (
+            sum(m.iterations for m in outcome.steps),
+            round(perf_counter() - begun, 4),
+        )
         sizes = self.family.sizes(scene)
         level = Level(mesh + 1, *sizes, substeps, self.family.dofs, curve[-1], seconds, iterations)
         return curve if self.family.resolved(scene, outcome.steps) else None, level
@@ -188,7 +216,9 @@ class _Search:
         done, seconds = self.outcome.status == "done", round(perf_counter() - self.begun, 4)
         mesh, steps = (self.mesh_error, self.step_error) if done else (None, None)
         estimated = None if mesh is None or steps is None else mesh + steps
-        accuracy = Accuracy(self.asked, estimated, mesh, steps, self.substeps, seconds, tuple(self.levels))
+        accuracy = Accuracy(
+            self.asked, estimated, mesh, steps, self.substeps, seconds, tuple(self.levels)
+        )
         outcome = replace(self.outcome, accuracy=accuracy)
         if done and (estimated is None or estimated > self.asked) and self.comm.rank == 0:
             outcome.warnings = [*outcome.warnings, self._shortfall(estimated)]
@@ -196,7 +226,11 @@ class _Search:
         def note() -> None:
             path = self.folder / "run.json"
             content = read_report(path)
-            content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
+            content |= {
+                "status": outcome.status,
+                "message": outcome.message,
+                "warnings": outcome.warnings,
+            }
             content["accuracy"] = asdict(accuracy)
             content["error_estimates"] |= {"mesh": mesh, "steps": steps}
             replace_file(path, report_text(content))

@@ -1,5 +1,5 @@
-"""Sweep files, a base scene and what is varied, checked; and their cases: overrides, multiplied, and for each a checked
-scene with a name made from its content."""
+"""Sweep files, a base scene and what is varied, checked; and their cases: overrides, multiplied,
+and for each a checked scene with a name made from its content."""
 
 from __future__ import annotations
 
@@ -15,7 +15,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
@@ -41,12 +48,17 @@ Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
 _MOST_SENTENCES = 20
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
-_SOLVED_ALIKE_SINCE = "0.1.0"  # the version from which on scenes have the same solution, and sweeps go on
-Factor = tuple[str, list[Overrides]]  # of the product: its source in the sweep file, and its choices
+_SOLVED_ALIKE_SINCE = (
+    "0.1.0"  # the version from which on scenes have the same solution, and sweeps go on
+)
+Factor = tuple[
+    str, list[Overrides]
+]  # of the product: its source in the sweep file, and its choices
 
 
 def flattened(table: Any, prefix: str = "") -> Any:
-    """``table`` by dotted keys: ``{"joint": {"radius": 1}}`` and ``{"joint.radius": 1}`` mean the same."""
+    """``table`` by dotted keys: ``{"joint": {"radius": 1}}`` and ``{"joint.radius": 1}`` mean the
+    same."""
     if not isinstance(table, dict):
         return table
     out: Overrides = {}
@@ -59,7 +71,8 @@ def flattened(table: Any, prefix: str = "") -> Any:
 
 
 class Range(Section):
-    """Where the values of a key are sampled: evenly between two numbers, or between their logarithms."""
+    """Where the values of a key are sampled: evenly between two numbers, or between their
+    logarithms."""
 
     model_config = ConfigDict(populate_by_name=True)
     low: float = Field(alias="from")
@@ -70,7 +83,11 @@ class Range(Section):
     @classmethod
     def _pair(cls, value: Any) -> Any:
         """The short form is ``[low, high]``."""
-        return dict(zip(("from", "to"), value, strict=True)) if isinstance(value, list) and len(value) == 2 else value
+        return (
+            dict(zip(("from", "to"), value, strict=True))
+            if isinstance(value, list) and len(value) == 2
+            else value
+        )
 
     @model_validator(mode="after")
     def _ordered(self) -> Range:
@@ -82,7 +99,8 @@ class Range(Section):
 
 
 class LatinHypercube(Section):
-    """``number`` samples of several keys at once, each key stratified (McKay, Beckman, Conover 1979)."""
+    """``number`` samples of several keys at once, each key stratified (McKay, Beckman, Conover
+    1979)."""
 
     number: int = Field(ge=1, le=100_000)
     seed: int = Field(default=0, ge=0)
@@ -90,17 +108,21 @@ class LatinHypercube(Section):
 
 
 _Lists = Annotated[
-    dict[str, Annotated[list[Any], Field(min_length=1)]], BeforeValidator(flattened), Field(min_length=1)
+    dict[str, Annotated[list[Any], Field(min_length=1)]],
+    BeforeValidator(flattened),
+    Field(min_length=1),
 ]
 
 
 class SweepFile(Section):
-    """A sweep: the scenes are ``base`` with the overrides of ``list``, ``zip``, ``grid`` and ``latin_hypercube``, in
-    all combinations."""
+    """A sweep: the scenes are ``base`` with the overrides of ``list``, ``zip``, ``grid`` and
+    ``latin_hypercube``, in all combinations."""
 
     model_config = ConfigDict(populate_by_name=True)
     base: dict[str, Any]
-    list_: list[Annotated[Overrides, BeforeValidator(flattened)]] = Field(default=[], alias="list", min_length=1)
+    list_: list[Annotated[Overrides, BeforeValidator(flattened)]] = Field(
+        default=[], alias="list", min_length=1
+    )
     zip: _Lists = Field(default={})
     grid: _Lists = Field(default={})
     latin_hypercube: LatinHypercube | None = None
@@ -115,16 +137,21 @@ class SweepFile(Section):
 
     def resolved(self) -> str:
         """The sweep as TOML with its base scene in it; it gives the same cases."""
-        return tomli_w.dumps(self.model_dump(by_alias=True, exclude_none=True, exclude_defaults=True))
+        return tomli_w.dumps(
+            self.model_dump(by_alias=True, exclude_none=True, exclude_defaults=True)
+        )
 
 
 def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
-    """Read and check the sweep file ``path``; ``base`` then is the base scene's table, with ``overrides`` like
-    ``"joint.radius=2"`` on top and the targets of its load.path, and other paths are absolute. It is not checked, as it
-    may be whole only with what is varied. Raises `InputError` with one sentence per fault."""
+    """Read and check the sweep file ``path``; ``base`` then is the base scene's table, with
+    ``overrides`` like ``"joint.radius=2"`` on top and the targets of its load.path, and other paths
+    are absolute. It is not checked, as it may be whole only with what is varied. Raises
+    `InputError` with one sentence per fault."""
     data = read_toml(path)
     if "base" not in data and not {"joint", "mesh", "lug", "clevis", "bushing"}.isdisjoint(data):
-        raise InputError(f"{path}: is a scene, not a sweep; solve it by archord solve, or name a scene as a base.")
+        raise InputError(
+            f"{path}: is a scene, not a sweep; solve it by archord solve, or name a scene as a base."
+        )
     source = path
     if isinstance(data.get("base"), str):
         source = path.parent / data["base"]
@@ -144,7 +171,8 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
 
 
 def _absolute(value: Any, folder: Path) -> Any:
-    """The path of a CSV file, or a list of them, which count from ``folder``; the word for no path stays."""
+    """The path of a CSV file, or a list of them, which count from ``folder``; the word for no path
+    stays."""
     if isinstance(value, list):
         return [_absolute(entry, folder) for entry in value]
     return str((folder / value).resolve()) if isinstance(value, str) and value != ABSENT else value
@@ -155,13 +183,16 @@ def _sentence(error: Any, path: Path) -> str:
     key = ".".join(f"entry {part + 1}" if isinstance(part, int) else part for part in error["loc"])
     own = {"missing": "is missing", "extra_forbidden": "is not a known key"}.get(error["type"])
     said = own or str(error.get("ctx", {}).get("error", error["msg"]))
-    given = "" if isinstance(error["input"], dict) else f" = {shortened(toml_value(error['input']))}"
+    given = (
+        "" if isinstance(error["input"], dict) else f" = {shortened(toml_value(error['input']))}"
+    )
     return f"{path}: {key}{given}: {said[0].lower()}{said[1:]}."
 
 
 @dataclass(frozen=True)
 class Case:
-    """Case ``number`` (from 1) of a sweep; ``run`` is the name of its run folder, the same for identical scenes."""
+    """Case ``number`` (from 1) of a sweep; ``run`` is the name of its run folder, the same for
+    identical scenes."""
 
     number: int
     overrides: Overrides
@@ -170,7 +201,8 @@ class Case:
 
     def value(self, key: str) -> Any:
         """What the case's scene says for the dotted ``key``; None if nothing."""
-        # a scene holds the targets that were in the file of its path, and a preset's scene none of the preset's keys
+        # a scene holds the targets that were in the file of its path, and a preset's scene none of
+        # the preset's keys
         if key == "load.path" or not isinstance(self.scene, Scene):
             return self.overrides.get(key)
         section, _, name = key.partition(".")
@@ -193,8 +225,8 @@ class Sweep:
 
 
 def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
-    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case. Raises
-    `InputError` with one sentence per fault."""
+    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every
+    case. Raises `InputError` with one sentence per fault."""
     path = Path(path)
     file = load_sweep(path, overrides)
     varied = factors(file)
@@ -232,14 +264,18 @@ def factors(sweep: SweepFile) -> list[Factor]:
     if sweep.zip:
         rows = zip(*sweep.zip.values(), strict=True)
         found.append(("[zip]", [flattened(dict(zip(sweep.zip, row, strict=True))) for row in rows]))
-    found += [("[grid]", [flattened({key: value}) for value in values]) for key, values in sweep.grid.items()]
+    found += [
+        ("[grid]", [flattened({key: value}) for value in values])
+        for key, values in sweep.grid.items()
+    ]
     if sweep.latin_hypercube is not None:
         found.append(("[latin_hypercube]", samples(sweep.latin_hypercube)))
     return found
 
 
 def samples(hypercube: LatinHypercube) -> list[Overrides]:
-    """The samples of a Latin hypercube, by its seed: each of the ``number`` equal parts of a range holds one."""
+    """The samples of a Latin hypercube, by its seed: each of the ``number`` equal parts of a range
+    holds one."""
     from scipy.stats import qmc
 
     ranges, generator = hypercube.ranges, np.random.default_rng(hypercube.seed)
@@ -248,11 +284,15 @@ def samples(hypercube: LatinHypercube) -> list[Overrides]:
         low, high = np.log([r.low, r.high]) if r.scale == "log" else (r.low, r.high)
         values = low + columns[k] * (high - low)
         columns[k] = np.exp(values) if r.scale == "log" else values
-    return [{key: float(f"{v:.{_DIGITS}g}") for key, v in zip(ranges, row, strict=True)} for row in columns.T]
+    return [
+        {key: float(f"{v:.{_DIGITS}g}") for key, v in zip(ranges, row, strict=True)}
+        for row in columns.T
+    ]
 
 
 def combinations(found: list[Factor]) -> list[Overrides]:
-    """The overrides of every case, the last factor varying fastest. Raises `InputError` if there are too many."""
+    """The overrides of every case, the last factor varying fastest. Raises `InputError` if there
+    are too many."""
     number = math.prod(len(choices) for _, choices in found)
     if number > MOST_CASES:
         raise InputError(f"has {number} cases; {MOST_CASES} are allowed.")
@@ -261,8 +301,9 @@ def combinations(found: list[Factor]) -> list[Overrides]:
 
 
 def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
-    """All dotted keys that vary. Raises `InputError` for one that no scene has or that cannot vary, and for a quantity
-    that two factors give. Keys of a ``joint`` have two parts; those of other scenes may name a part between."""
+    """All dotted keys that vary. Raises `InputError` for one that no scene has or that cannot vary,
+    and for a quantity that two factors give. Keys of a ``joint`` have two parts; those of other
+    scenes may name a part between."""
     keys: list[str] = []
     given: dict[tuple[str, str], str] = {}
     for source, choices in found:
@@ -272,9 +313,13 @@ def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
             if not name or ("." in name and joint):
                 raise InputError(f"{source} {key}: must read section.key, like joint.clearance.")
             if section == "units" and source != "--set":
-                raise InputError(f"{source} {key}: cannot vary; all cases of a table have the same units.")
+                raise InputError(
+                    f"{source} {key}: cannot vary; all cases of a table have the same units."
+                )
             # of alternative keys a scene holds one
-            first = next((names[0] for names in ALTERNATIVES.get(section, []) if name in names), name)
+            first = next(
+                (names[0] for names in ALTERNATIVES.get(section, []) if name in names), name
+            )
             if (section, first) in given:
                 raise InputError(f"{source} {key}: is varied by {given[section, first]} already.")
             own[section, first] = f"{source} {key}"
@@ -283,17 +328,26 @@ def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
     return keys
 
 
-_LATER = {"friction": 0.0, "strain": "small"}  # keys of analysis that the first version did not have, and what it did
+_LATER = {
+    "friction": 0.0,
+    "strain": "small",
+}  # keys of analysis that the first version did not have, and what it did
 
 
 def run_name(scene: AnyScene) -> str:
-    """Twelve hexadecimal digits that stand for the resolved scene, its output in the words of the first version that
-    solved it so, and how archord solves it."""
+    """Twelve hexadecimal digits that stand for the resolved scene, its output in the words of the
+    first version that solved it so, and how archord solves it."""
     data, fields = tomllib.loads(resolved(scene)), scene.output.fields
-    data["output"] = {"fields": bool(fields), "stress": fields in ("nodes", "points"), "points": fields == "points"}
+    data["output"] = {
+        "fields": bool(fields),
+        "stress": fields in ("nodes", "points"),
+        "points": fields == "points",
+    }
     for name in [name for name, default in _LATER.items() if data["analysis"].get(name) == default]:
         del data["analysis"][name]
-    return hashlib.sha256(f"archord {_SOLVED_ALIKE_SINCE}\n{tomli_w.dumps(data)}".encode()).hexdigest()[:12]
+    return hashlib.sha256(
+        f"archord {_SOLVED_ALIKE_SINCE}\n{tomli_w.dumps(data)}".encode()
+    ).hexdigest()[:12]
 
 
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> AnyScene:

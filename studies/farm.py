@@ -1,8 +1,9 @@
 """The cases of a sweep on the ranks that mpirun started, each case on one rank.
 
-Rank 0 hands out the cases through mpi4py.futures, whose manager runs in a thread, and solves cases itself: it takes the
-last one that has not been handed out by cancelling its future. (`MPICommExecutor` alone would leave rank 0 idle, half
-of two ranks.) All ranks must import this file together: it imports PETSc.
+Rank 0 hands out the cases through mpi4py.futures, whose manager runs in a thread, and solves cases
+itself: it takes the last one that has not been handed out by cancelling its future.
+(`MPICommExecutor` alone would leave rank 0 idle, half of two ranks.) All ranks must import this
+file together: it imports PETSc.
 """
 
 from __future__ import annotations
@@ -37,16 +38,24 @@ _interrupt = Interrupt()  # of this rank
 
 
 def solve_cases(
-    comm: MPI.Intracomm, cases: list[Case], folder: Path, report: Callable[[Result], Any], *, force: bool = False
+    comm: MPI.Intracomm,
+    cases: list[Case],
+    folder: Path,
+    report: Callable[[Result], Any],
+    *,
+    force: bool = False,
 ) -> int:
-    """Solve ``cases`` (known on rank 0), the longest first, into the sweep's ``folder``; returns the signal that
-    interrupted them, or 0. With ``force`` all from the beginning, whatever is there. Collective.
+    """Solve ``cases`` (known on rank 0), the longest first, into the sweep's ``folder``; returns
+    the signal that interrupted them, or 0. With ``force`` all from the beginning, whatever is
+    there. Collective.
 
-    On rank 0 ``report(result)`` follows each, from any thread but never from two at once. After a signal no case is
-    begun and those that are running stop at the next iteration.
+    On rank 0 ``report(result)`` follows each, from any thread but never from two at once. After a
+    signal no case is begun and those that are running stop at the next iteration.
     """
     global _interrupt
-    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc would end the batch where its reader has seen enough
+    signal.signal(
+        signal.SIGPIPE, signal.SIG_IGN
+    )  # PETSc would end the batch where its reader has seen enough
     gc.collect()
     gc.freeze()  # what the imports made need not be searched after every case
     try:
@@ -64,7 +73,9 @@ def solve_cases(
         gc.unfreeze()
 
 
-def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Result], Any], force: bool) -> None:
+def _share(
+    executor: Any, cases: list[Case], folder: Path, report: Callable[[Result], Any], force: bool
+) -> None:
     """Hand ``cases`` to the other ranks, and solve here from the end of the list."""
     lock = threading.Lock()
 
@@ -77,7 +88,9 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
     of = {executor.submit(solve_case, case, folder, force): case for case in cases}
     for future in of:
         future.add_done_callback(ended)
-    if MPI.Query_thread() == MPI.THREAD_MULTIPLE:  # else the manager's thread must be the only one that calls MPI
+    if (
+        MPI.Query_thread() == MPI.THREAD_MULTIPLE
+    ):  # else the manager's thread must be the only one that calls MPI
         for future, case in reversed(of.items()):
             if future.cancel():
                 result = solve_case(case, folder, force)
@@ -86,9 +99,8 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
 
 
 def solve_case(case: Case, folder: Path, force: bool = False) -> Result:
-    """Solve ``case`` into its run folder on this rank alone, or without ``force`` finish what is there; after a signal
-    begin nothing.
-    Whatever goes wrong in a case is its result."""
+    """Solve ``case`` into its run folder on this rank alone, or without ``force`` finish what is
+    there; after a signal begin nothing. Whatever goes wrong in a case is its result."""
     if _interrupt.received:
         return Result(case.run, "open")
     begun, run = perf_counter(), of_case(case, folder)
@@ -97,15 +109,19 @@ def solve_case(case: Case, folder: Path, force: bool = False) -> Result:
     except Exception as error:
         sentence = " ".join(f"{type(error).__name__}: {error}".split())
         with suppress(OSError):
-            replace_file(run / FAILURE, f"{sentence}\n\n{''.join(traceback.format_exception(error))}")
+            replace_file(
+                run / FAILURE, f"{sentence}\n\n{''.join(traceback.format_exception(error))}"
+            )
         result = Result(case.run, "failed", sentence)
     gc.collect()
     return replace(result, seconds=perf_counter() - begun)
 
 
 def _solved(case: Case, run: Path, force: bool) -> Result:
-    """Raises whatever goes wrong twice: what is there may not be continued, e.g. by another gmsh, and is replaced."""
-    # what is there of a scene that asks for an accuracy is one of its meshes: it cannot be continued
+    """Raises whatever goes wrong twice: what is there may not be continued, e.g. by another gmsh,
+    and is replaced."""
+    # what is there of a scene that asks for an accuracy is one of its meshes: it cannot be
+    # continued
     for going_on in (case.scene.analysis.accuracy is None and not force, False):
         try:
             claim_folder(run, force=True)
@@ -114,7 +130,9 @@ def _solved(case: Case, run: Path, force: bool) -> Result:
             if plan is not None and plan.finished:
                 return Result(case.run, "done", steps=len(case.scene.targets))
             start = plan.start if plan else None
-            outcome = solve_to_accuracy(case.scene, run, MPI.COMM_SELF, start=start, interrupt=_interrupt)
+            outcome = solve_to_accuracy(
+                case.scene, run, MPI.COMM_SELF, start=start, interrupt=_interrupt
+            )
             return Result(case.run, outcome.status, outcome.message, len(outcome.steps))
         except InputError as error:
             if "another archord" in str(error):

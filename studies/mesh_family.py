@@ -1,8 +1,8 @@
 """Meshes of a scene from coarse to fine, near and far elements alike, and the scene on each.
 
-Of a joint, lengths are in the size of the contact that is to be expected: a small contact in a large pin is resolved as
-a wide one is, by elements that are as much smaller as it is and grow as fast. Of a general scene, a shape gets smaller
-elements, and of a file the cells are cut in four.
+Of a joint, lengths are in the size of the contact that is to be expected: a small contact in a
+large pin is resolved as a wide one is, by elements that are as much smaller as it is and grow as
+fast. Of a general scene, a shape gets smaller elements, and of a file the cells are cut in four.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from archord.scene.scene import Scene
 
 RATIO = 1.5  # of the element sizes from one mesh to the next
 _GROWTH = 6.25  # over the element size in R, for a wide contact
-_WIDE = 1.17  # semi-angle [rad] of the contact for which the constants below hold: the paper's joint at 2 dR
+# semi-angle [rad] of the contact for which the constants below hold: the paper's joint at 2 dR
+_WIDE = 1.17
 _COARSEST = 0.2  # element size over R, for a wide contact
 _CONSTANTS = {2: 1.4, 3: 0.15}  # error of P over (h/R)^3 by degree (docs/accuracy.md)
 _MARGIN = 2.0  # an estimate over the error itself, where the order is 3 and the estimate assumes 2
@@ -34,8 +35,9 @@ _MOST_DOFS = 1_500_000
 
 
 class MeshFamily:
-    """The meshes ``0, 1, 2, ...`` for ``scene`` that are to make the error of the mesh fall below ``accuracy`` with the
-    third, or with the second if that is coarse; each by ``ratio`` finer. Whoever solves them notes their ``dofs``."""
+    """The meshes ``0, 1, 2, ...`` for ``scene`` that are to make the error of the mesh fall below
+    ``accuracy`` with the third, or with the second if that is coarse; each by ``ratio`` finer.
+    Whoever solves them notes their ``dofs``."""
 
     ratio, order, dofs = RATIO, 2.0, 0
 
@@ -50,10 +52,13 @@ class MeshFamily:
         self.scale = max(scale, RATIO * smallest / self.first)
 
     def scene_of(self, level: int, substeps: int) -> Scene | None:
-        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too fine for the
-        limits of the keys."""
+        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would
+        be too fine for the limits of the keys."""
         size, keys = self.first / RATIO**level, self.scene.joint.model_dump(exclude_none=True)
-        keys |= {"relative_element_size": rounded(size * self.scale), "growth": rounded(min(2.0, _GROWTH * size))}
+        keys |= {
+            "relative_element_size": rounded(size * self.scale),
+            "growth": rounded(min(2.0, _GROWTH * size)),
+        }
         try:
             joint = JointGeometry.model_validate(keys)
         except ValidationError:
@@ -77,9 +82,10 @@ class MeshFamily:
 
 
 class ProblemFamily:
-    """The meshes ``0, 1, 2, ...`` for ``scene``, each by ``ratio`` finer. Its corners, as where an edge is clamped, let
-    forces converge with the ``order`` 1.5 at the end, like their energy (Williams 1952), and where bodies yield single
-    differences are too small for more. Whoever solves them notes their ``dofs``."""
+    """The meshes ``0, 1, 2, ...`` for ``scene``, each by ``ratio`` finer. Its corners, as where an
+    edge is clamped, let forces converge with the ``order`` 1.5 at the end, like their energy
+    (Williams 1952), and where bodies yield single differences are too small for more. Whoever
+    solves them notes their ``dofs``."""
 
     order, dofs = 1.5, 0
 
@@ -88,24 +94,34 @@ class ProblemFamily:
         self.ratio = _OF_FILES if self.shape is None else RATIO
 
     def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
-        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too large."""
+        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would
+        be too large."""
         if level and self.dofs * self.ratio**2 > _MOST_DOFS:
             return None
         changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _FIRST_OF_SHAPE / self.ratio**level
-            sizes = {"element_size": rounded(factor * self.shape.h), "growth": rounded(factor * self.shape.growth)}
+            sizes = {
+                "element_size": rounded(factor * self.shape.h),
+                "growth": rounded(factor * self.shape.growth),
+            }
             changes = {"shape": self.shape.model_copy(update=sizes)}
         mesh = self.scene.mesh.model_copy(update=changes)
         return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
 
     def sizes(self, scene: Any) -> tuple[float, float]:
-        """Element size over R and growth of ``scene``; of a file, the size over that of its own cells."""
+        """Element size over R and growth of ``scene``; of a file, the size over that of its own
+        cells."""
         shape = scene.mesh.shape
-        return (0.5**scene.mesh.refine, 0.0) if shape is None else (shape.h / shape.radius, shape.growth)
+        return (
+            (0.5**scene.mesh.refine, 0.0)
+            if shape is None
+            else (shape.h / shape.radius, shape.growth)
+        )
 
     def curve(self, steps: Sequence[Record]) -> list[float]:
-        """The force of the last load at every step, or its displacement where it is a force or a pressure."""
+        """The force of the last load at every step, or its displacement where it is a force or a
+        pressure."""
         return [m.values[self.scene.accurate] for m in steps]
 
     def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
@@ -114,19 +130,27 @@ class ProblemFamily:
 
 
 def expected_angle(scene: Scene) -> float:
-    """About the largest semi-angle [rad] of the contact, rather too large: where circles that go through each other
-    unchanged by the largest ``delta`` meet, ``cos(angle) = dR/(dR + delta)``; a force P stands for ``P/(E* t)``."""
+    """About the largest semi-angle [rad] of the contact, rather too large: where circles that go
+    through each other unchanged by the largest ``delta`` meet, ``cos(angle) = dR/(dR + delta)``; a
+    force P stands for ``P/(E* t)``."""
     dR = scene.joint.dR
     if dR <= 0:
         return math.pi
-    delta = max([0.0, *scene.targets]) / (scene.E_star * scene.thickness if scene.force_controlled else 1.0)
+    delta = max([0.0, *scene.targets]) / (
+        scene.E_star * scene.thickness if scene.force_controlled else 1.0
+    )
     return math.atan2(math.sqrt(delta * (2 * dR + delta)), dR) if delta else _WIDE
 
 
 def chosen(scene: AnyScene, substeps: int) -> dict[str, Any]:
-    """The sections of ``scene`` that make it ask for no accuracy, but for so many ``substeps`` an output step."""
+    """The sections of ``scene`` that make it ask for no accuracy, but for so many ``substeps`` an
+    output step."""
     length = 1 / substeps
-    stepping = {"initial": length, "maximum": length, "minimum": min(scene.stepping.minimum, length)}
+    stepping = {
+        "initial": length,
+        "maximum": length,
+        "minimum": min(scene.stepping.minimum, length),
+    }
     return {
         "stepping": scene.stepping.model_copy(update=stepping),
         "analysis": scene.analysis.model_copy(update={"accuracy": None}),

@@ -1,5 +1,6 @@
-"""A sweep's folder: sweep.toml and cases/, with a run folder for each case; how they ended, what is left and what it
-costs, and the tables gathered from the run folders: sweep.csv (a row per case and step), cases.csv (a row per case)."""
+"""A sweep's folder: sweep.toml and cases/, with a run folder for each case; how they ended, what is
+left and what it costs, and the tables gathered from the run folders: sweep.csv (a row per case and
+step), cases.csv (a row per case)."""
 
 from __future__ import annotations
 
@@ -26,7 +27,12 @@ FILE = "sweep.toml"
 CASES = "cases"  # the folder of all run folders
 FAILURE = "failure.txt"  # what raised in a case that failed: a sentence, and the traceback
 _COST = ("message", "steps", "seconds [s]", "iterations", "cutbacks", "cells", "dofs")
-_PER_STEP = ("step", "iterations", "cutbacks", "seconds [s]")  # of history.csv; cases.csv has sums of them
+_PER_STEP = (
+    "step",
+    "iterations",
+    "cutbacks",
+    "seconds [s]",
+)  # of history.csv; cases.csv has sums of them
 _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
 _STEP = {False: 1.7e-5, True: 2.8e-5}  # seconds per dof of an elastic and of a plastic output step
 _GENERAL = 0.5  # seconds of an output step of a general scene
@@ -36,9 +42,10 @@ Row = list[str]
 
 @dataclass(frozen=True)
 class Result:
-    """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
-    (an error), "interrupted", "busy" (another process solves it) or "open", also where files of a finished case are
-    ``damaged``, as ``message`` says; ``seconds`` are those of this process."""
+    """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be
+    written), "failed" (an error), "interrupted", "busy" (another process solves it) or "open", also
+    where files of a finished case are ``damaged``, as ``message`` says; ``seconds`` are those of
+    this process."""
 
     run: str
     status: str
@@ -57,10 +64,14 @@ def result_of(case: Case, folder: Path) -> Result:
     """What the run folder of ``case`` in the sweep's ``folder`` says about it."""
     run = of_case(case, folder)
     with suppress(OSError):
-        return Result(case.run, "failed", (run / FAILURE).read_text(encoding="utf-8").partition("\n")[0])
+        return Result(
+            case.run, "failed", (run / FAILURE).read_text(encoding="utf-8").partition("\n")[0]
+        )
     report = report_of(run)
     status, steps = report.get("status"), len(report.get("steps", []))
-    between_meshes = case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
+    between_meshes = (
+        case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
+    )
     if status == "done" and not between_meshes:
         fault = fault_of_run(run, case.scene, report)
         if fault:
@@ -71,11 +82,14 @@ def result_of(case: Case, folder: Path) -> Result:
 
 
 def claim(sweep: Sweep, folder: Path) -> None:
-    """Make ``folder`` ready for the sweep, or go on in it, and write the resolved sweep file. Raises `InputError` if it
-    cannot be used or holds something else; a sweep that shares a case is taken for an earlier state of this one."""
+    """Make ``folder`` ready for the sweep, or go on in it, and write the resolved sweep file.
+    Raises `InputError` if it cannot be used or holds something else; a sweep that shares a case is
+    taken for an earlier state of this one."""
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / FILE).exists():
-            raise InputError(f"{folder}: is not empty and holds no sweep; choose another folder with -o.")
+            raise InputError(
+                f"{folder}: is not empty and holds no sweep; choose another folder with -o."
+            )
         (folder / CASES).mkdir(parents=True, exist_ok=True)
         with occupied(folder / CASES, wait=True):
             held = {run.name for run in (folder / CASES).iterdir()}
@@ -90,8 +104,8 @@ def claim(sweep: Sweep, folder: Path) -> None:
 
 
 def part_of(cases: list[Case], part: str) -> list[Case]:
-    """Part "I/N" of ``cases`` for a job array: every N-th, the longest first, so that all parts take about as long.
-    Raises `InputError`."""
+    """Part "I/N" of ``cases`` for a job array: every N-th, the longest first, so that all parts
+    take about as long. Raises `InputError`."""
     found = re.fullmatch(r"(\d+)/(\d+)", part)
     if not found or not 1 <= int(found[1]) <= int(found[2]):
         raise InputError(f"--array {part}: must be I/N, with I from 1 to N.")
@@ -102,8 +116,8 @@ def part_of(cases: list[Case], part: str) -> list[Case]:
 def open_cases(
     cases: list[Case], folder: Path, *, retry: bool = False, force: bool = False
 ) -> tuple[list[Result], list[Case], list[Result]]:
-    """What of ``cases`` has ended already, those that are left, and the damaged ones among them; with ``retry`` those
-    that stopped or failed are left, too, with ``force`` all."""
+    """What of ``cases`` has ended already, those that are left, and the damaged ones among them;
+    with ``retry`` those that stopped or failed are left, too, with ``force`` all."""
     over = ("done",) if retry else ("done", "stopped", "failed")
     if force:
         return [], cases, []
@@ -114,11 +128,11 @@ def open_cases(
 
 
 def expected_seconds(scene: AnyScene) -> float:
-    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has solved before; of a
-    general scene, whose mesh is not known yet, a guess.
+    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has
+    solved before; of a general scene, whose mesh is not known yet, a guess.
 
-    Fitted by hand to runs of 2 450 to 8 336 dofs, elastic and plastic (README); beyond ``_LINEAR`` dofs the
-    factorisation of a plane mesh grows as dofs^1.5 (George 1973).
+    Fitted by hand to runs of 2 450 to 8 336 dofs, elastic and plastic (README); beyond ``_LINEAR``
+    dofs the factorisation of a plane mesh grows as dofs^1.5 (George 1973).
     """
     if not isinstance(scene, Scene):
         return _GENERAL * len(scene.targets)
@@ -128,18 +142,27 @@ def expected_seconds(scene: AnyScene) -> float:
 
 
 def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> dict[str, Result]:
-    """Write both tables, from what is in the run folders now, several processes one after the other; returns how each
-    run ended. ``results`` of this process hold where a run folder says nothing. Raises `InputError`."""
+    """Write both tables, from what is in the run folders now, several processes one after the
+    other; returns how each run ended. ``results`` of this process hold where a run folder says
+    nothing. Raises `InputError`."""
     own = {result.run: result for result in results}
     try:
         with occupied(folder / CASES, wait=True):
             found = {case.run: result_of(case, folder) for case in sweep.distinct}
-            found |= {run: own[run] for run, result in found.items() if result.status == "open" and run in own}
-            for name, rows in zip(("sweep.csv", "cases.csv"), _rows(sweep, folder, found), strict=True):
+            found |= {
+                run: own[run]
+                for run, result in found.items()
+                if result.status == "open" and run in own
+            }
+            for name, rows in zip(
+                ("sweep.csv", "cases.csv"), _rows(sweep, folder, found), strict=True
+            ):
                 text = io.StringIO(newline="")
                 csv.writer(text).writerows(rows)
                 replace_file(folder / name, text.getvalue())
-            (folder / "sweep.h5").unlink(missing_ok=True)  # version 0.1 had a third table: it would be out of date
+            (folder / "sweep.h5").unlink(
+                missing_ok=True
+            )  # version 0.1 had a third table: it would be out of date
     except OSError as error:
         raise InputError(f"{error.filename} cannot be written: {error.strerror}.") from None
     return found
@@ -149,7 +172,9 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
     """Headings and rows of both tables."""
     histories = {run: [] if found[run].damaged else _history(folder / CASES / run) for run in found}
     headings = sorted((rows[0] for rows in histories.values() if rows), key=len, reverse=True)
-    history = list(dict.fromkeys(name for names in headings for name in names))  # of all: some bodies cannot yield
+    history = list(
+        dict.fromkeys(name for names in headings for name in names)
+    )  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
     head = ["case", "run", "status", *(heading(key, sweep.cases[0].scene) for key in sweep.keys)]
     steps, cases = [[*head, *history]], [[*head, *_COST, *(history[i] for i in last)]]
@@ -157,11 +182,21 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
         result, (own, *rows) = found[case.run], histories[case.run] or [[]]
         named = (dict(zip(own, row, strict=False)) for row in rows)
         rows = [[values.get(name, "") for name in history] for values in named]
-        first = [str(case.number), case.run, result.status, *(shown(case.value(key)) for key in sweep.keys)]
+        first = [
+            str(case.number),
+            case.run,
+            result.status,
+            *(shown(case.value(key)) for key in sweep.keys),
+        ]
         steps += [[*first, *row] for row in rows]
         report = report_of(of_case(case, folder))
         totals, mesh, seconds = (report.get(name, {}) for name in ("totals", "mesh", "seconds"))
-        costs = [result.steps, seconds.get("total"), totals.get("newton_iterations"), totals.get("cutbacks")]
+        costs = [
+            result.steps,
+            seconds.get("total"),
+            totals.get("newton_iterations"),
+            totals.get("cutbacks"),
+        ]
         costs += [mesh.get("cells"), mesh.get("dofs")]
         final = [rows[-1][i] if rows else "" for i in last]
         cases.append([*first, result.message, *map(shown, costs), *final])
@@ -170,7 +205,10 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
 
 def _history(run: Path) -> list[Row]:
     """Heading and rows of history.csv; none if there is none."""
-    with suppress(OSError), require_file(run / "history.csv").open(encoding="utf-8", newline="") as file:
+    with (
+        suppress(OSError),
+        require_file(run / "history.csv").open(encoding="utf-8", newline="") as file,
+    ):
         return list(csv.reader(file))
     return []
 

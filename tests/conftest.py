@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 
 import pytest
 from hypothesis import settings
@@ -17,21 +18,29 @@ def pytest_addoption(parser):
     parser.addoption("--cases", type=int, default=12, help="how many scenes tests/fuzz solves (12)")
 
 
+def pytest_xdist_auto_num_workers(config):
+    """One worker a core; none on several ranks, which run the same tests together."""
+    return 0 if MPI.COMM_WORLD.size > 1 else os.cpu_count()
+
+
 def pytest_collection_modifyitems(items):
-    """On several ranks only tests that are made for them: the others would start processes or write the same files."""
+    """On several ranks only tests that are made for them: the others would start processes or write
+    the same files."""
     if MPI.COMM_WORLD.size > 1:
         items[:] = [item for item in items if item.get_closest_marker("mpi")]
 
 
 def pytest_collection_finish():
-    """Leave what the imports made out of the collections below: they take a tenth of a second otherwise."""
+    """Leave what the imports made out of the collections below: they take a tenth of a second
+    otherwise."""
     gc.collect()
     gc.freeze()
 
 
 @pytest.fixture(autouse=True)
 def _destroy_together():
-    """Destructors of PETSc and dolfinx objects are collective: run them on all ranks at the same place."""
+    """Destructors of PETSc and dolfinx objects are collective: run them on all ranks at the same
+    place."""
     yield
     if MPI.COMM_WORLD.size > 1:
         gc.collect()
@@ -45,8 +54,8 @@ def comm() -> MPI.Comm:
 
 @pytest.fixture
 def refused(capsys):
-    """``refused(arguments)`` is what the command line says when it refuses them: one sentence, exit code 2, and nothing
-    on stdout."""
+    """``refused(arguments)`` is what the command line says when it refuses them: one sentence, exit
+    code 2, and nothing on stdout."""
 
     def sentence(arguments) -> str:
         from archord.cli import run
@@ -61,7 +70,8 @@ def refused(capsys):
 
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory):
-    """Folders of small runs, solved once, by name: an elastic joint on two meshes, one of plane stress that yields."""
+    """Folders of small runs, solved once, by name: an elastic joint on two meshes, one of plane
+    stress that yields."""
     from archord.benchmarks.case import paper_joint
     from tests.output.run_files import solved
 

@@ -1,6 +1,8 @@
-"""``archord`` in processes of its own that start in no time: forked from one that has the solver loaded.
+"""``archord`` in processes of its own that start in no time: forked from one that has the solver
+loaded.
 
-Exit code, signals, open files and what is printed are those of a process; the start-up, a second, is not repeated.
+Exit code, signals, open files and what is printed are those of a process; the start-up, a second,
+is not repeated.
 """
 
 from __future__ import annotations
@@ -15,16 +17,29 @@ from pathlib import Path
 
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
-    ["gmsh", "archord.cli", "archord.materials.j2", "archord.progress", "archord.output.restart", "archord.output.run"]
+    [
+        "gmsh",
+        "archord.cli",
+        "archord.materials.j2",
+        "archord.progress",
+        "archord.output.restart",
+        "archord.output.run",
+    ]
 )
 
 
 def start(
-    arguments: list[str], folder: Path, out: Path, err: Path, before: Callable[[], None] | None = None
+    arguments: list[str],
+    folder: Path,
+    out: Path,
+    err: Path,
+    before: Callable[[], None] | None = None,
 ) -> multiprocessing.process.BaseProcess:
-    """``archord`` with these ``arguments`` in ``folder``, told to write to the files ``out`` and ``err``, after a call
-    of ``before``."""
-    process = _FORKS.Process(target=_run, args=(arguments, str(folder), str(out), str(err), before), daemon=True)
+    """``archord`` with these ``arguments`` in ``folder``, told to write to the files ``out`` and
+    ``err``, after a call of ``before``."""
+    process = _FORKS.Process(
+        target=_run, args=(arguments, str(folder), str(out), str(err), before), daemon=True
+    )
     process.start()
     return process
 
@@ -36,10 +51,14 @@ def archord(*arguments: str, cwd: Path) -> subprocess.CompletedProcess:
         process = start(list(arguments), cwd, out, err)
         process.join(300)
         assert process.exitcode is not None
-        return subprocess.CompletedProcess(arguments, process.exitcode, out.read_text(), err.read_text())
+        return subprocess.CompletedProcess(
+            arguments, process.exitcode, out.read_text(), err.read_text()
+        )
 
 
-def _run(arguments: list[str], folder: str, out: str, err: str, before: Callable[[], None] | None) -> None:
+def _run(
+    arguments: list[str], folder: str, out: str, err: str, before: Callable[[], None] | None
+) -> None:
     if before is not None:
         before()
     for stream, name in ((1, out), (2, err)):

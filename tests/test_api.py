@@ -30,7 +30,9 @@ def test_importing_archord_imports_nothing():
         "{'numpy', 'pydantic', 'mpi4py', 'pandas', 'h5py'} & {*sys.modules}); "
         "archord.load; print({'pandas', 'mpi4py', 'dolfinx', 'scipy', 'matplotlib'} & {*sys.modules})"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60
+    )
     assert result.stdout == "True set()\nset()\n", result.stderr
     with pytest.raises(AttributeError, match="has no attribute 'slove'"):
         archord.slove  # noqa: B018
@@ -38,7 +40,9 @@ def test_importing_archord_imports_nothing():
 
 def test_a_scene_from_python_is_that_of_the_file():
     """Tables, classes of other scenes, numbers and arrays of numpy."""
-    scene = archord.load_scene(SCENE, {"load.displacement": np.linspace(0.5, 2, 4), "load.steps": None})
+    scene = archord.load_scene(
+        SCENE, {"load.displacement": np.linspace(0.5, 2, 4), "load.steps": None}
+    )
     made = archord.Scene(
         units={"length": "R", "stress": "E*"},
         joint={"radius": np.float64(1.0), "clearance": 0.005, "relative_element_size": 0.04},
@@ -57,8 +61,14 @@ def test_a_scene_from_python_is_that_of_the_file():
         ({"joint": 3}, "scene: joint = 3 must be a section, [joint]."),
         ({"blok": {}}, "scene: blok is not a known key; did you mean block? Sections are "),
         ({"block": None}, "scene: block is missing."),
-        ({"load": {"displacement": (1.0, "x")}}, 'scene: load.displacement = [1.0, "x"]: entry 2 must be a number.'),
-        ({"load": {"path": "cycle.csv"}}, 'scene: load.path = "cycle.csv" is for scene files alone; give the list '),
+        (
+            {"load": {"displacement": (1.0, "x")}},
+            'scene: load.displacement = [1.0, "x"]: entry 2 must be a number.',
+        ),
+        (
+            {"load": {"path": "cycle.csv"}},
+            'scene: load.path = "cycle.csv" is for scene files alone; give the list ',
+        ),
     ],
 )
 def test_faults_are_the_sentences_of_scene_files(change, said):
@@ -72,14 +82,23 @@ def test_faults_are_the_sentences_of_scene_files(change, said):
 def test_a_mesh_file_is_found_from_anywhere(tmp_path, monkeypatch):
     """Whatever names it, and whatever the working directory is later."""
     monkeypatch.chdir(tmp_path)
-    parts = {"bodies": [{"name": "lug", "E": 1.0, "nu": 0.3}], "loads": [{"name": "oil", "on": "edge", "pressure": 1}]}
-    for mesh in ("meshes/lug.msh", Path("meshes/lug.msh"), {"file": "meshes/lug.msh"}, Mesh(file="meshes/lug.msh")):
+    parts = {
+        "bodies": [{"name": "lug", "E": 1.0, "nu": 0.3}],
+        "loads": [{"name": "oil", "on": "edge", "pressure": 1}],
+    }
+    for mesh in (
+        "meshes/lug.msh",
+        Path("meshes/lug.msh"),
+        {"file": "meshes/lug.msh"},
+        Mesh(file="meshes/lug.msh"),
+    ):
         assert archord.Problem(mesh, **parts).mesh.file == str(tmp_path / "meshes" / "lug.msh")
 
 
 @pytest.mark.mpi
 def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
-    """The same object as load gives; an occupied folder is refused on all ranks, and so is one without results."""
+    """The same object as load gives; an occupied folder is refused on all ranks, and so is one
+    without results."""
     folder = comm.bcast(tmp_path / "run")
     run = archord.solve(archord.load_scene(SCENE, COARSE), folder)
     assert (run.status, run.steps) == ("done", 2)
@@ -87,7 +106,9 @@ def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
     assert run.fields().delta == pytest.approx(2 * 0.005, rel=1e-12)
     with pytest.raises(archord.InputError, match="is not empty; choose another folder"):
         archord.solve(SCENE, folder)
-    with pytest.raises(archord.InputError, match=r"x: is not a folder; give the folder of a run or of a sweep\."):
+    with pytest.raises(
+        archord.InputError, match=r"x: is not a folder; give the folder of a run or of a sweep\."
+    ):
         archord.load(folder / "x")
     with pytest.raises(archord.InputError, match=r"is not a run folder: scene\.toml is missing\."):
         archord.load(folder.parent)
@@ -96,11 +117,19 @@ def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
 def test_solve_takes_the_table_of_a_scene_and_refuses_what_is_none(tmp_path):
     joint = {"radius": 10.0, "relative_clearance": 0.01, "relative_element_size": 0.2}
     metal = {"E": 210000.0, "nu": 0.3}
-    table = {"joint": joint, "pin": metal, "block": metal, "load": {"displacement": 0.2, "steps": 1}}
+    table = {
+        "joint": joint,
+        "pin": metal,
+        "block": metal,
+        "load": {"displacement": 0.2, "steps": 1},
+    }
     assert archord.solve(table, tmp_path / "run").status == "done"
     with pytest.raises(InputError, match=r"joint\.radius = -1"):
         archord.solve(table | {"joint": joint | {"radius": -1.0}}, tmp_path / "bad")
-    with pytest.raises(InputError, match=r"archord.solve: scene must be a scene, a scene file or its table, not \[1\]"):
+    with pytest.raises(
+        InputError,
+        match=r"archord.solve: scene must be a scene, a scene file or its table, not \[1\]",
+    ):
         archord.solve([1], tmp_path / "bad")
     assert not (tmp_path / "bad").exists()
 
@@ -127,9 +156,15 @@ def test_ctrl_c_ends_the_program_too(tmp_path, monkeypatch):
 
 def test_a_mesh_of_another_process_is_said_to_be_gone(tmp_path):
     """As its run folder's scene.toml names it."""
-    parts = {"body": [{"name": "plate", "E": 1.0, "nu": 0.3}], "load": [{"name": "p", "on": "edge", "pressure": 1.0}]}
+    parts = {
+        "body": [{"name": "plate", "E": 1.0, "nu": 0.3}],
+        "load": [{"name": "p", "on": "edge", "pressure": 1.0}],
+    }
     scene = archord.ProblemScene(mesh={"file": "mesh 700 given from Python"}, **parts)
-    with pytest.raises(archord.InputError, match="mesh 700 given from Python: is gone with the process that gave it"):
+    with pytest.raises(
+        archord.InputError,
+        match="mesh 700 given from Python: is gone with the process that gave it",
+    ):
         archord.solve(scene, tmp_path / "run")
 
 
@@ -182,7 +217,9 @@ def test_a_part_from_python_is_refused_in_a_sentence(make, change, said):
 
 
 def test_parts_take_keys_and_numbers_of_numpy():
-    with pytest.raises(archord.InputError, match=r"archord\.Body: takes its keys by name, as name=value; they are "):
+    with pytest.raises(
+        archord.InputError, match=r"archord\.Body: takes its keys by name, as name=value; they are "
+    ):
         archord.Body("lug")
     body = archord.Body(name="lug", E=np.float32(2.0), nu=np.float64(0.25), yield_stress=None)
     assert (body.E, body.nu, body.model_fields_set) == (2.0, 0.25, {"name", "E", "nu"})

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-# A room a line, from the ground up: a room imports from those above its line in this list, and from itself.
+# A room a line, from the ground up: a room imports from those above its line in this list, and from
+# itself.
 ROOMS = [
     "report",
     "kernels",
@@ -60,7 +61,8 @@ BANNED = {
 
 
 def room_of(module: str) -> str:
-    """The room of a module's dotted name (without ``archord.``): the longest name in the list that it begins with."""
+    """The room of a module's dotted name (without ``archord.``): the longest name in the list that
+    it begins with."""
     fitting = [r for r in ROOMS if module == r or module.startswith(f"{r}.")]
     return max(fitting, key=len, default="archord")
 
@@ -70,8 +72,8 @@ def files_of(room: str) -> list[Path]:
 
 
 def imported(file: Path) -> set[str]:
-    """The rooms that a file imports from, wherever in the file but for type checking; ``import archord`` alone, for the
-    version, is none."""
+    """The rooms that a file imports from, wherever in the file but for type checking; ``import
+    archord`` alone, for the version, is none."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
     for node in ast.walk(tree):
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
@@ -97,19 +99,30 @@ def test_a_room_imports_nothing_that_it_must_do_without(room):
     for file in files_of(room):
         nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
         names = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
-        names |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-        banned = {name for name in names for ban in BANNED[room] if f"{name}.".startswith(f"{ban}.")}
+        names |= {
+            alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
+        }
+        banned = {
+            name for name in names for ban in BANNED[room] if f"{name}.".startswith(f"{ban}.")
+        }
         assert not banned, file
 
 
 def test_rooms_that_use_dolfinx_import_what_must_come_before_it():
-    """PyPI's dolfinx finds no MPI unless the package that `archord.kernels.compat` imports came first."""
+    """PyPI's dolfinx finds no MPI unless the package that `archord.kernels.compat` imports came
+    first."""
     for room in ROOMS[:-1]:
         names = {node.module for file in files_of(room) for node in ast.parse(file.read_text(encoding="utf-8")).body
                  if isinstance(node, ast.ImportFrom) and node.module}  # fmt: skip
-        if room != "kernels" and {name.partition(".")[0] for name in names} & {"dolfinx", "petsc4py"}:
+        if room != "kernels" and {name.partition(".")[0] for name in names} & {
+            "dolfinx",
+            "petsc4py",
+        }:
             parents = [ROOT / room.replace(".", "/"), ROOT / room.partition(".")[0]]
-            assert any("import archord.kernels.compat" in (path / "__init__.py").read_text() for path in parents), room
+            assert any(
+                "import archord.kernels.compat" in (path / "__init__.py").read_text()
+                for path in parents
+            ), room
 
 
 def test_no_imports_at_the_top_of_files_make_a_circle():
@@ -120,9 +133,15 @@ def test_no_imports_at_the_top_of_files_make_a_circle():
     }
     graph = {}
     for name in known:
-        tree = ast.parse((ROOT / f"{name.removeprefix('archord.').replace('.', '/')}.py").read_text(encoding="utf-8"))
+        tree = ast.parse(
+            (ROOT / f"{name.removeprefix('archord.').replace('.', '/')}.py").read_text(
+                encoding="utf-8"
+            )
+        )
         froms = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
-        graph[name] = {f"{f.module}.{a.name}" for f in froms for a in f.names} | {f.module for f in froms}
+        graph[name] = {f"{f.module}.{a.name}" for f in froms for a in f.names} | {
+            f.module for f in froms
+        }
         graph[name] &= known
     TopologicalSorter(graph).prepare()  # raises CycleError
 
@@ -130,7 +149,10 @@ def test_no_imports_at_the_top_of_files_make_a_circle():
 def test_the_plan_of_the_house_names_every_file():
     plan = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     parts = dict(re.findall(r"\*\*`([\w/]+)/`\*\*\n\n((?:- .*\n)+)", plan))
-    said = {room.replace("/", "."): set(re.findall(r"^- `(\w+\.py)`", lines, re.M)) for room, lines in parts.items()}
+    said = {
+        room.replace("/", "."): set(re.findall(r"^- `(\w+\.py)`", lines, re.M))
+        for room, lines in parts.items()
+    }
     there = {room: {file.name for file in files_of(room)} - {"__init__.py"} for room in ROOMS}
     assert said == there
 
@@ -153,7 +175,10 @@ def test_every_file_that_names_the_version_names_the_same():
         "conda/recipe.yaml": r'^  version: "(.*)"',
         "CHANGELOG.md": r"^## (\d.*)",
     }
-    found = {file: re.search(regex, (ROOT / file).read_text(encoding="utf-8"), re.M) for file, regex in said.items()}
+    found = {
+        file: re.search(regex, (ROOT / file).read_text(encoding="utf-8"), re.M)
+        for file, regex in said.items()
+    }
     assert len({match and match[1] for match in found.values()}) == 1, found
 
 
@@ -163,8 +188,12 @@ def test_the_requirements_name_all_that_is_imported():
     extras = project["optional-dependencies"]
     named = {re.split(r"[^\w-]", word)[0].removeprefix("fenics-").replace("-", "_")
              for word in [*project["dependencies"], *extras["solve"]]}  # fmt: skip
-    rooms = [room for room in ROOMS if not room.startswith("benchmarks")]  # peers have environments of their own
-    trees = [ast.parse(file.read_text(encoding="utf-8")) for room in rooms for file in files_of(room)]
+    rooms = [
+        room for room in ROOMS if not room.startswith("benchmarks")
+    ]  # peers have environments of their own
+    trees = [
+        ast.parse(file.read_text(encoding="utf-8")) for room in rooms for file in files_of(room)
+    ]
     nodes = [node for tree in trees for node in ast.walk(tree)]
     names = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
     names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
@@ -173,13 +202,26 @@ def test_the_requirements_name_all_that_is_imported():
 
 
 def test_an_installation_has_all_data_and_tells_type_checkers_that_archord_is_typed(tmp_path):
-    """Kernels, tables, scenes and the marker py.typed (PEP 561) of the checkout, each in its package."""
+    """Kernels, tables, scenes and the marker py.typed (PEP 561) of the checkout, each in its
+    package."""
     build = ["build", "--build-base", f"{tmp_path}/build", "--build-lib", f"{tmp_path}/lib"]
-    command = [sys.executable, "-c", "import setuptools; setuptools.setup()", "-q", "egg_info", "--egg-base", tmp_path]
+    command = [
+        sys.executable,
+        "-c",
+        "import setuptools; setuptools.setup()",
+        "-q",
+        "egg_info",
+        "--egg-base",
+        tmp_path,
+    ]
     subprocess.run([*command, *build], cwd=ROOT, check=True, capture_output=True)
     for room in ROOMS:
         folder = ROOT / room.replace(".", "/")
-        wanted = {path for path in folder.iterdir() if path.suffix in (".py", ".c", ".h", ".toml", ".json", ".csv")}
+        wanted = {
+            path
+            for path in folder.iterdir()
+            if path.suffix in (".py", ".c", ".h", ".toml", ".json", ".csv")
+        }
         place = tmp_path / "lib" / "archord" / ("" if room == "archord" else room.replace(".", "/"))
         assert not {path.name for path in wanted if not (place / path.name).is_file()}
     assert (tmp_path / "lib" / "archord" / "py.typed").is_file()

@@ -18,19 +18,30 @@ from archord.output.history import read_history
 from tests import forked
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
-COARSE = ["--set", "joint.relative_element_size=0.1", "--set", "joint.growth=1.0", "--set", "load.steps=4"]
+COARSE = [
+    "--set",
+    "joint.relative_element_size=0.1",
+    "--set",
+    "joint.growth=1.0",
+    "--set",
+    "load.steps=4",
+]
 LONG = ["--set", "joint.relative_element_size=0.2", "--set", "load.steps=500"]
 # a launcher inside a launcher: processes started by a test must not inherit the rank of the test
 ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_"))}
 SOLVE = [sys.executable, "-m", "archord", "solve", SCENE]
 
 
-def archord(*arguments: str, cwd: Path, ranks: int = 0, code: int = 0) -> subprocess.CompletedProcess:
-    """The command as it is started by hand under mpirun; without, in a fork of a process that has it loaded. It must
-    end with ``code`` and without a traceback."""
+def archord(
+    *arguments: str, cwd: Path, ranks: int = 0, code: int = 0
+) -> subprocess.CompletedProcess:
+    """The command as it is started by hand under mpirun; without, in a fork of a process that has
+    it loaded. It must end with ``code`` and without a traceback."""
     if ranks:
         command = ["mpirun", "-n", str(ranks), sys.executable, "-m", "archord", *arguments]
-        result = subprocess.run(command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
+        result = subprocess.run(
+            command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=300
+        )
     else:
         result = forked.archord(*arguments, cwd=cwd)
     assert result.returncode == code, result.stderr
@@ -48,12 +59,15 @@ def test_every_command_has_a_help_page(capsys, command):
 
 
 def test_solve_prints_steps_and_writes_the_run(tmp_path):
-    """Plain lines off a terminal, results in runs/<scene name>, refused the second time without --force. With --quiet
-    nothing is printed but by PETSC_OPTIONS: PETSc is finalized, and its output flushed, before the process ends."""
+    """Plain lines off a terminal, results in runs/<scene name>, refused the second time without
+    --force. With --quiet nothing is printed but by PETSC_OPTIONS: PETSc is finalized, and its
+    output flushed, before the process ends."""
     first = archord("solve", SCENE, *COARSE, cwd=tmp_path)
     assert first.stderr == ""
     lines = first.stdout.splitlines()
-    assert lines[1:3] == [f"{body} yields at 230.769 MPa, perfectly plastic" for body in ("pin", "block")]
+    assert lines[1:3] == [
+        f"{body} yields at 230.769 MPa, perfectly plastic" for body in ("pin", "block")
+    ]
     assert [line.split()[0] for line in lines[4:]] == ["1", "2", "3", "4", "4"]
     history = (tmp_path / "runs" / "steel_pin" / "history.csv").read_text()
     said = "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it with --force.\n"
@@ -61,7 +75,9 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
     assert (tmp_path / "runs" / "steel_pin" / "history.csv").read_text() == history
     for options, printed in (({}, ""), ({"PETSC_OPTIONS": "-log_view"}, "SNESSolve")):
         command, environment = [*SOLVE, *COARSE, "--force", "--quiet"], ENVIRONMENT | options
-        quiet = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+        quiet = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
+        )
         assert (quiet.returncode, quiet.stderr) == (0, "")
         assert printed in quiet.stdout
         assert bool(printed) == bool(quiet.stdout)
@@ -71,10 +87,16 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
 def test_a_terminal_shows_how_far_a_solve_is(tmp_path, quiet):
     """Between two lines of steps, in one line that moves; nothing of it with -q."""
     ours, theirs = pty.openpty()
-    command, environment = [*SOLVE, *COARSE, *quiet], ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "120"}
+    command, environment = (
+        [*SOLVE, *COARSE, *quiet],
+        ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "120"},
+    )
     process, said = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=theirs), b""
     os.close(theirs)
-    with contextlib.suppress(OSError), open(ours, "rb", buffering=0) as terminal:  # Linux' word for its end
+    with (
+        contextlib.suppress(OSError),
+        open(ours, "rb", buffering=0) as terminal,
+    ):  # Linux' word for its end
         while read := terminal.read(1024):
             said += read
     assert process.wait() == 0
@@ -95,15 +117,22 @@ def test_ranks_print_once_and_give_the_same_history(tmp_path):
 
 
 def test_an_accuracy_is_reached_mesh_by_mesh(tmp_path):
-    """One line a mesh, then the steps of the last one and the estimate; the run goes on from its folder alone."""
+    """One line a mesh, then the steps of the last one and the estimate; the run goes on from its
+    folder alone."""
     asked = ["--set", "analysis.accuracy=0.05", "--set", "load.steps=4"]
     result = archord("solve", SCENE, *asked, cwd=tmp_path)
     assert result.stderr == ""
-    levels = json.loads((tmp_path / "runs" / "steel_pin" / "run.json").read_text())["accuracy"]["levels"]
+    levels = json.loads((tmp_path / "runs" / "steel_pin" / "run.json").read_text())["accuracy"][
+        "levels"
+    ]
     lines = result.stdout.splitlines()
     assert "P to 0.05 of its largest value" in lines[0]
-    assert lines[1:3] == [f"{body} yields at 230.769 MPa, perfectly plastic" for body in ("pin", "block")]
-    assert [line.split()[4] for line in lines[4 : 4 + len(levels)]] == [str(level["dofs"]) for level in levels]
+    assert lines[1:3] == [
+        f"{body} yields at 230.769 MPa, perfectly plastic" for body in ("pin", "block")
+    ]
+    assert [line.split()[4] for line in lines[4 : 4 + len(levels)]] == [
+        str(level["dofs"]) for level in levels
+    ]
     assert [line.split()[0] for line in lines[-5:-1]] == ["1", "2", "3", "4"]
     assert "estimated error of P" in lines[-1]
     again = archord("solve", SCENE, *asked, "--restart", cwd=tmp_path, code=2)
@@ -114,8 +143,17 @@ def test_an_accuracy_is_reached_mesh_by_mesh(tmp_path):
 
 def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     """The reason on stderr, accepted steps on disk."""
-    limits = ["--set", "analysis.max_iterations=6", "--set", "stepping.minimum=1.0", "--set", "load.steps=10"]
-    result = archord("solve", SCENE, "--set", "joint.relative_element_size=0.08", *limits, cwd=tmp_path, code=3)
+    limits = [
+        "--set",
+        "analysis.max_iterations=6",
+        "--set",
+        "stepping.minimum=1.0",
+        "--set",
+        "load.steps=10",
+    ]
+    result = archord(
+        "solve", SCENE, "--set", "joint.relative_element_size=0.08", *limits, cwd=tmp_path, code=3
+    )
     assert "no equilibrium at delta" in result.stderr
     assert "4 accepted steps are in runs/steel_pin" in result.stderr
     assert len(read_history(tmp_path / "runs" / "steel_pin" / "history.csv")["P"]) == 4
@@ -123,8 +161,22 @@ def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
 
 def test_a_load_beyond_small_strains_is_doubted_before_it_is_solved(tmp_path):
     """Once, and in run.json; other warnings of the kind follow with the steps."""
-    elastic = ["--set", "pin.yield_stress=none", "--set", "block.yield_stress=none", "--set", "joint.growth=1.0"]
-    far = ["--set", "load.displacement=30", "--set", "load.steps=1", "--set", "joint.relative_element_size=0.2"]
+    elastic = [
+        "--set",
+        "pin.yield_stress=none",
+        "--set",
+        "block.yield_stress=none",
+        "--set",
+        "joint.growth=1.0",
+    ]
+    far = [
+        "--set",
+        "load.displacement=30",
+        "--set",
+        "load.steps=1",
+        "--set",
+        "joint.relative_element_size=0.2",
+    ]
     result = archord("solve", SCENE, *elastic, *far, "-o", "run", cwd=tmp_path)
     said = "load.displacement moves the pin by 0.15 R: small-strain theory makes P about 2.4 % too low there"
     assert result.stderr.startswith(f"archord: warning: {said}")
@@ -133,13 +185,16 @@ def test_a_load_beyond_small_strains_is_doubted_before_it_is_solved(tmp_path):
 
 
 def kill_after(steps: int, command: list[str], kill: int, folder: Path) -> tuple[int, bytes]:
-    """Run ``command``, which writes to ``run``, send it the signal once the steps are there; exit code and stderr."""
+    """Run ``command``, which writes to ``run``, send it the signal once the steps are there; exit
+    code and stderr."""
     history = folder / "run" / "history.csv"
     with subprocess.Popen(
         command, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     ) as process:
         deadline = time.monotonic() + 120
-        while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > steps):
+        while time.monotonic() < deadline and not (
+            history.exists() and len(history.read_text().splitlines()) > steps
+        ):
             time.sleep(0.01)
         process.send_signal(kill)
         errors = process.communicate(timeout=60)[1]
@@ -148,11 +203,17 @@ def kill_after(steps: int, command: list[str], kill: int, folder: Path) -> tuple
 
 @pytest.mark.parametrize(
     ("ranks", "kill", "code"),
-    [(0, signal.SIGINT, 130), (0, signal.SIGTERM, 143), (0, signal.SIGKILL, -9), (2, signal.SIGINT, None)],
+    [
+        (0, signal.SIGINT, 130),
+        (0, signal.SIGTERM, 143),
+        (0, signal.SIGKILL, -9),
+        (2, signal.SIGINT, None),
+    ],
 )
 def test_a_killed_run_leaves_its_steps_readable(tmp_path, ranks, kill, code):
-    """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line. mpirun hands it on as
-    SIGTERM: the run notes it before all ranks end, but for that of Open MPI 6, which kills them at once."""
+    """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line.
+    mpirun hands it on as SIGTERM: the run notes it before all ranks end, but for that of Open MPI
+    6, which kills them at once."""
     launcher = ["mpirun", "-n", str(ranks)] if ranks else []
     returned, errors = kill_after(3, [*launcher, *SOLVE, *LONG, "-o", "run"], kill, tmp_path)
     assert returned == code or (ranks and returned != 0)
@@ -168,14 +229,21 @@ def test_a_killed_run_leaves_its_steps_readable(tmp_path, ranks, kill, code):
     assert b"Traceback" not in errors
     if kill != signal.SIGKILL:
         assert ranks or f"interrupted by {kill.name} after step {rows}".encode() in errors
-        kills_at_once = ranks and "(Open MPI) 6" in subprocess.check_output(["mpirun", "--version"], text=True)
-        assert report["status"] == "interrupted" or (kills_at_once and report["status"] == "running")
+        kills_at_once = ranks and "(Open MPI) 6" in subprocess.check_output(
+            ["mpirun", "--version"], text=True
+        )
+        assert report["status"] == "interrupted" or (
+            kills_at_once and report["status"] == "running"
+        )
         assert report["totals"]["accepted_steps"] == rows or kills_at_once
 
 
-@pytest.mark.parametrize(("command", "code"), [(SOLVE, 141), ([*SOLVE[:3], "scene", "--reference"], 0)])
+@pytest.mark.parametrize(
+    ("command", "code"), [(SOLVE, 141), ([*SOLVE[:3], "scene", "--reference"], 0)]
+)
 def test_a_reader_that_has_seen_enough_ends_the_command_without_a_word(tmp_path, command, code):
-    """As ``archord solve SCENE | head -1`` does: no trace of PETSc or Python; a solve says that it is not done."""
+    """As ``archord solve SCENE | head -1`` does: no trace of PETSc or Python; a solve says that it
+    is not done."""
     with subprocess.Popen(
         command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:

@@ -1,4 +1,5 @@
-"""kill -9 at random moments: whatever is on disk opens, no accepted step is lost, and the run ends as if never killed.
+"""kill -9 at random moments: whatever is on disk opens, no accepted step is lost, and the run ends
+as if never killed.
 
 ``pytest tests/test_kill.py --kills 50`` kills more often.
 """
@@ -15,7 +16,8 @@ OPTIONS = ["--set", "joint.relative_element_size=0.3", "--set", "load.steps=15"]
 
 
 class Run:
-    """An ``archord solve`` in a process of its own; ``printed`` is the last step that it reported."""
+    """An ``archord solve`` in a process of its own; ``printed`` is the last step that it
+    reported."""
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.out, self.err = folder / "out", folder / "err"
@@ -44,7 +46,8 @@ class Run:
 
 
 def test_a_run_survives_any_number_of_kills(tmp_path, request):
-    """Killed at random and restarted until the kills are used up; finished runs are compared, and the next begins."""
+    """Killed at random and restarted until the kills are used up; finished runs are compared, and
+    the next begins."""
     kills, chance = request.config.getoption("--kills"), random.Random(1)
     whole = Run(tmp_path, SCENE, *OPTIONS, "-o", "whole")
     assert whole.end() == 0
@@ -54,7 +57,14 @@ def test_a_run_survives_any_number_of_kills(tmp_path, request):
     caught_at: list[int] = []
     while len(caught_at) < kills or steps:
         folder = tmp_path / f"run{finished}"
-        run = Run(tmp_path, SCENE, *OPTIONS, "-o", folder.name, *(["--restart"] if folder.exists() else []))
+        run = Run(
+            tmp_path,
+            SCENE,
+            *OPTIONS,
+            "-o",
+            folder.name,
+            *(["--restart"] if folder.exists() else []),
+        )
         code = run.end(chance.uniform(0, 0.7 * seconds) if len(caught_at) < kills else None)
         before, steps = steps, accepted_steps(folder) if folder.exists() else 0
         assert steps >= max(before, run.printed)
@@ -65,4 +75,6 @@ def test_a_run_survives_any_number_of_kills(tmp_path, request):
         same_run(tmp_path / "whole", folder, 1e-12)
         finished, steps = finished + 1, 0
     assert finished > 0
-    assert len(set(caught_at)) > min(kills, 10) / 3  # at steps all over the path, on a busy machine at fewer of them
+    assert (
+        len(set(caught_at)) > min(kills, 10) / 3
+    )  # at steps all over the path, on a busy machine at fewer of them

@@ -23,14 +23,18 @@ def table(text: str) -> dict[str, np.ndarray]:
 def test_laws_lists_every_law(capsys):
     assert run(["laws"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if line[0] != " "] == [f"{law.name}: {law.title}" for law in LAWS.values()]
+    assert [line for line in lines if line[0] != " "] == [
+        f"{law.name}: {law.title}" for law in LAWS.values()
+    ]
 
 
 def test_law_prints_its_numbers(capsys):
     numbers = ["--yield-stress", "230", "--c", "1.5", "--points", "4", "--to", "1"]
     assert run(["law", "paper-plastic", *JOINT, *numbers]) == 0
     columns = table(capsys.readouterr().out)
-    state = LAWS["paper-plastic"].at_displacement(LawJoint(10, 0.05, 115385, block_yield=230, c=1.5), columns["delta"])
+    state = LAWS["paper-plastic"].at_displacement(
+        LawJoint(10, 0.05, 115385, block_yield=230, c=1.5), columns["delta"]
+    )
     assert columns["delta/dR"] == pytest.approx([0.25, 0.5, 0.75, 1])
     assert columns["P"] == pytest.approx(state.load, rel=1e-5)
     assert columns["P/E*R"] == pytest.approx(columns["P"] / 1153850, rel=1e-5)
@@ -75,14 +79,21 @@ def test_outside_the_range_rows_are_nan_and_one_warning(capsys):
 def test_a_ring_has_no_law_with_displacements(tmp_path, capsys, refused):
     """One sentence that says how wrong it would be; p0 and eps of a load are a ring's as well."""
     ring = str(Path(SCENE).with_name("persson.toml"))
-    for words in ([], ["paper", "persson"], ["johnson", "--by-load"], ["paper", "--plot", str(tmp_path / "x.png")]):
+    for words in (
+        [],
+        ["paper", "persson"],
+        ["johnson", "--by-load"],
+        ["paper", "--plot", str(tmp_path / "x.png")],
+    ):
         said = refused(["law", *words, "--scene", ring])
         assert 'of joint.model = "ring" its P would be about twice too high' in said
     assert run(["law", "persson", "hertz", "--scene", ring, "--to", "0.1"]) == 0
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize(("width", "share"), [("25", "22.4%"), ("100", "1.4%"), ("300", "0.2%"), ("1000", None)])
+@pytest.mark.parametrize(
+    ("width", "share"), [("25", "22.4%"), ("100", "1.4%"), ("300", "0.2%"), ("1000", None)]
+)
 def test_a_small_block_is_told_with_the_size_of_its_effect(capsys, width, share):
     """Once, and the numbers stay those of the law."""
     words = ["law", "paper", "--scene", SCENE, "--points", "3"]
@@ -98,7 +109,11 @@ def test_a_small_block_is_told_with_the_size_of_its_effect(capsys, width, share)
 
 @pytest.mark.parametrize(
     "sets",
-    ["hardening=1000.0", "hardening=[[0, 230.76923076923077], [1, 400.0]]", "back_stresses=[[20000.0, 100.0]]"],
+    [
+        "hardening=1000.0",
+        "hardening=[[0, 230.76923076923077], [1, 400.0]]",
+        "back_stresses=[[20000.0, 100.0]]",
+    ],
 )
 def test_hardening_is_told_by_the_laws_that_yield(capsys, sets):
     """Once each; the numbers stay those of perfect plasticity."""
@@ -113,23 +128,47 @@ def test_hardening_is_told_by_the_laws_that_yield(capsys, sets):
     told = [line.split(":")[2:] for line in after if line not in before]
     assert len(after) == len(before) + 1
     assert [name for name, _ in told] == [" paper-plastic"]
-    assert all("is a law of perfect plasticity" in said and "too low beyond yield" in said for _, said in told)
+    assert all(
+        "is a law of perfect plasticity" in said and "too low beyond yield" in said
+        for _, said in told
+    )
 
 
 def test_elastic_laws_beyond_yield_are_told(capsys):
     """With how far beyond; those that know yielding are silent."""
-    assert run(["law", "paper", "paper-plastic", "archord", "--scene", SCENE, "--points", "3", "--to", "2"]) == 0
+    assert (
+        run(
+            [
+                "law",
+                "paper",
+                "paper-plastic",
+                "archord",
+                "--scene",
+                SCENE,
+                "--points",
+                "3",
+                "--to",
+                "2",
+            ]
+        )
+        == 0
+    )
     (line,) = capsys.readouterr().err.splitlines()
     assert ": paper: knows no yielding, and its p0 reaches 4.25 times the yield stress" in line
 
 
 def test_a_whole_pin_is_told_by_the_laws_that_give_a_displacement(capsys):
-    """Their numbers are those of half a pin. The thickness is the length of the laws that need one."""
+    """Their numbers are those of half a pin. The thickness is the length of the laws that need
+    one."""
     laws = ["paper", "persson", "esdu-78035", "lankarani-nikravesh"]
     words = ["law", *laws, "--scene", SCENE, "--points", "3", "--to", "0.1"]
     assert run([*words, "--set", "pin.whole=true", "--set", "analysis.thickness=40"]) == 0
     told = [line for line in capsys.readouterr().err.splitlines() if "half a pin" in line]
-    assert [line.split(":")[2] for line in told] == [" paper", " esdu-78035", " lankarani-nikravesh"]
+    assert [line.split(":")[2] for line in told] == [
+        " paper",
+        " esdu-78035",
+        " lankarani-nikravesh",
+    ]
     assert all("of a whole one P is higher" in line for line in told)
 
 
@@ -144,7 +183,10 @@ def test_a_law_is_not_drawn_over_its_scene(tmp_path, capsys):
     assert scene.read_text() == text
     assert run(["law", "paper", "--scene", str(scene), "--plot", str(picture)]) == 0
     assert picture.read_bytes()[1:4] == b"PNG"
-    assert run(["law", "paper", "johnson", "persson", *JOINT, "--plot", str(tmp_path / "laws.svg")]) == 0
+    assert (
+        run(["law", "paper", "johnson", "persson", *JOINT, "--plot", str(tmp_path / "laws.svg")])
+        == 0
+    )
     assert capsys.readouterr().out == f"{picture}\n{tmp_path / 'laws.svg'}\n"
     assert (tmp_path / "laws.svg").read_text().count("<svg") == 1
 
@@ -165,7 +207,16 @@ def test_a_yield_stress_is_that_of_the_bodies_that_yield(capsys):
     for scene, keys in (SCENE, ("pin", "block")), (rigid, ("block",)):
         assert run([*words, scene, "--yield-stress", "400"]) == 0
         said = capsys.readouterr().out
-        assert run([*words, scene, *(word for key in keys for word in ("--set", f"{key}.yield_stress=400"))]) == 0
+        assert (
+            run(
+                [
+                    *words,
+                    scene,
+                    *(word for key in keys for word in ("--set", f"{key}.yield_stress=400")),
+                ]
+            )
+            == 0
+        )
         assert capsys.readouterr().out == said
 
 
@@ -179,7 +230,16 @@ def test_a_law_with_nothing_to_say_is_one_sentence(tmp_path, capsys, refused):
     assert "nan" not in out
     assert "johnson" not in out
     assert err.startswith(f"archord: warning: {said}")
-    wide = ["law", "paper", "winkler", *JOINT, "--clearance", "2", "--plot", str(tmp_path / "laws.png")]
+    wide = [
+        "law",
+        "paper",
+        "winkler",
+        *JOINT,
+        "--clearance",
+        "2",
+        "--plot",
+        str(tmp_path / "laws.png"),
+    ]
     assert "paper: dR/R = 0.2 is no small clearance" in refused(wide)
     assert not (tmp_path / "laws.png").exists()
 
@@ -205,7 +265,9 @@ def test_laws_fit_the_terminal(monkeypatch, capsys, columns, width):
         (["paper", "--deepest", "1"], "is for the law archord alone"),
     ],
 )  # fmt: skip
-def test_what_the_law_of_solved_joints_cannot_say_is_refused(options, said, tmp_path, monkeypatch, capsys):
+def test_what_the_law_of_solved_joints_cannot_say_is_refused(
+    options, said, tmp_path, monkeypatch, capsys
+):
     """Exit code 2, one sentence, and no file."""
     monkeypatch.chdir(tmp_path)
     assert run(["law", *options, "--scene", SCENE]) == 2
@@ -216,7 +278,10 @@ def test_what_the_law_of_solved_joints_cannot_say_is_refused(options, said, tmp_
 def test_an_export_of_a_small_block_warns(tmp_path, capsys):
     """The law is of a wide block: the export is written, and the size of the error said."""
     target = tmp_path / "joint.py"
-    assert run(["law", "--scene", SCENE, "--set", "joint.block_size=100", "--export", str(target)]) == 0
+    assert (
+        run(["law", "--scene", SCENE, "--set", "joint.block_size=100", "--export", str(target)])
+        == 0
+    )
     assert "the joint is softer" in capsys.readouterr().err
     assert target.exists()
 
@@ -258,7 +323,9 @@ def test_fixed_pairs_of_points_are_told(capsys):
     assert run([*words, "--set", "analysis.kinematics=reference"]) == 0
     told = [line for line in capsys.readouterr().err.splitlines() if "kinematics" in line]
     assert len(told) == 1
-    assert told[0].startswith("archord: warning: archord: is a law of closest points on the deformed curves; with")
+    assert told[0].startswith(
+        "archord: warning: archord: is a law of closest points on the deformed curves; with"
+    )
 
 
 def test_a_rigid_pin_keeps_its_nu(capsys):
@@ -273,20 +340,43 @@ def test_a_rigid_pin_keeps_its_nu(capsys):
     ("words", "said"),
     [
         (["--scene", ELASTIC, "--E-star", "2"], "--E-star 2: does not go with --scene"),
-        (["--scene", ELASTIC, "--nu", "0.2", "--set", "pin.nu=0.3"], "--nu 0.2: does not go with --set pin.nu=0.3"),
-        (["--scene", ELASTIC, "--clearance", "1", "--set", "joint.relative_clearance=0.1"], "does not go with"),
-        (["--scene", ELASTIC, "--radius", "-1"], "--radius -1.0: joint.radius must be greater than 0"),
+        (
+            ["--scene", ELASTIC, "--nu", "0.2", "--set", "pin.nu=0.3"],
+            "--nu 0.2: does not go with --set pin.nu=0.3",
+        ),
+        (
+            ["--scene", ELASTIC, "--clearance", "1", "--set", "joint.relative_clearance=0.1"],
+            "does not go with",
+        ),
+        (
+            ["--scene", ELASTIC, "--radius", "-1"],
+            "--radius -1.0: joint.radius must be greater than 0",
+        ),
         (["--scene", ELASTIC, "--k", "0.9"], "--k 0.9: is for paper, paper-plastic, winkler alone"),
-        (["paper", *JOINT, "--c", "2"], "--c 2: is for paper-plastic alone; paper has no such coefficient"),
+        (
+            ["paper", *JOINT, "--c", "2"],
+            "--c 2: is for paper-plastic alone; paper has no such coefficient",
+        ),
         (["--scene", ELASTIC, "--export", "x.h", "--to", "3"], "--export: does not go with --to"),
-        (["--scene", ELASTIC, "--export", "x.h", "--extrapolate"], "--export: does not go with --extrapolate"),
-        (["--scene", ELASTIC, "--plot", "x.png", "--points", "3"], "--plot: does not go with --points"),
+        (
+            ["--scene", ELASTIC, "--export", "x.h", "--extrapolate"],
+            "--export: does not go with --extrapolate",
+        ),
+        (
+            ["--scene", ELASTIC, "--plot", "x.png", "--points", "3"],
+            "--plot: does not go with --points",
+        ),
         (["--scene", ELASTIC, "--force"], "--force: overwrites exports, and there is no --export"),
-        (["lankarani-nikravesh", "--scene", ELASTIC], "lankarani-nikravesh: this law needs length. Give --length"),
+        (
+            ["lankarani-nikravesh", "--scene", ELASTIC],
+            "lankarani-nikravesh: this law needs length. Give --length",
+        ),
         ([*JOINT, "--nu", "0.3"], "--nu: says nothing without --plane"),
     ],
 )
-def test_options_that_contradict_each_other_are_refused(words, said, tmp_path, monkeypatch, refused):
+def test_options_that_contradict_each_other_are_refused(
+    words, said, tmp_path, monkeypatch, refused
+):
     """None comes silently before another."""
     monkeypatch.chdir(tmp_path)
     assert said in refused(["law", *words])
@@ -304,7 +394,10 @@ def test_all_that_is_missing_is_asked_for_at_once(refused):
             f"{every}, --yield-stress, --length: missing; paper-plastic needs --yield-stress; dubowsky-freudenstein "
             f"needs --length; give all, {scene}",
         ),
-        (["--export", "x.h"], f"{every}, --plane, --nu: missing; archord needs --plane and --nu; give all, {scene}"),
+        (
+            ["--export", "x.h"],
+            f"{every}, --plane, --nu: missing; archord needs --plane and --nu; give all, {scene}",
+        ),
         (["archord", *JOINT], f"archord: this law needs plane and nu. Give --plane, --nu, {scene}"),
     ):
         assert refused(["law", *words]) == said

@@ -26,7 +26,9 @@ def clock(monkeypatch):
 def reporting(**options) -> Progress:
     press = {"name": "press", "on": "flat", "direction": "x", "displacement": 0.1}
     body = {"name": "lug", "E": 1.0, "nu": 0.3}
-    return Progress(parse_any({"mesh": {"file": "x.msh"}, "body": [body], "load": [press]}), False, **options)
+    return Progress(
+        parse_any({"mesh": {"file": "x.msh"}, "body": [body], "load": [press]}), False, **options
+    )
 
 
 def test_verbose_tells_every_iteration(clock, capsys):
@@ -45,7 +47,9 @@ def test_a_long_silence_is_broken_once(clock, capsys):
 
 
 @pytest.mark.parametrize(("seconds", "warned"), [(4.0, False), (5.0, False), (21.0, True)])
-def test_a_step_much_longer_than_those_before_it_is_warned_of(clock, capsys, monkeypatch, seconds, warned):
+def test_a_step_much_longer_than_those_before_it_is_warned_of(
+    clock, capsys, monkeypatch, seconds, warned
+):
     """Twenty times their median, and five seconds."""
     report = reporting()
     monkeypatch.setattr(report, "columns", [])

@@ -1,4 +1,5 @@
-"""Commands under a launcher: one report, one file, one exit code, and no MPI where there is nothing to share."""
+"""Commands under a launcher: one report, one file, one exit code, and no MPI where there is nothing
+to share."""
 
 import os
 from pathlib import Path
@@ -26,7 +27,9 @@ def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, writte
     for n in (0, 2):
         file = tmp_path / f"{n}" / (written or "none")
         file.parent.mkdir(exist_ok=True)
-        result = archord(*(a.replace("FILE", str(file)).format(**runs) for a in arguments), cwd=tmp_path, ranks=n)
+        result = archord(
+            *(a.replace("FILE", str(file)).format(**runs) for a in arguments), cwd=tmp_path, ranks=n
+        )
         said = result.stdout.replace("\r\n", "\n").replace(str(file), "FILE")
         found.append((said, result.stderr, file.read_bytes() if written else None))
     assert found[0] == found[1]
@@ -41,7 +44,11 @@ def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, writte
         ({"PMI_RANK": "1", "PMI_SIZE": "2"}, 1, True),
         ({"PMIX_RANK": "1"}, 1, True),
         ({"SLURM_PROCID": "3", "SLURM_STEP_NUM_TASKS": "4"}, 3, True),
-        ({"SLURM_PROCID": "0", "SLURM_NTASKS": "4"}, 0, False),  # the script of a batch job, which is one process
+        (
+            {"SLURM_PROCID": "0", "SLURM_NTASKS": "4"},
+            0,
+            False,
+        ),  # the script of a batch job, which is one process
     ],
 )
 def test_launchers_are_known_by_their_variables(monkeypatch, variables, rank, others):
@@ -51,9 +58,14 @@ def test_launchers_are_known_by_their_variables(monkeypatch, variables, rank, ot
 
 def test_ranks_take_turns_in_the_stability_benchmark(tmp_path):
     """All ranks work on it, and on no other benchmark; one table comes of it."""
-    commands = [cli._command(words) for words in (["benchmark", "stability"], ["benchmark", "scaling", "-q"], [])]
+    commands = [
+        cli._command(words)
+        for words in (["benchmark", "stability"], ["benchmark", "scaling", "-q"], [])
+    ]
     assert [command in ranks.COLLECTIVE for command in commands] == [True, False, False]
-    result = archord("benchmark", "stability", "--only", "zero*", "-o", str(tmp_path), cwd=tmp_path, ranks=2)
+    result = archord(
+        "benchmark", "stability", "--only", "zero*", "-o", str(tmp_path), cwd=tmp_path, ranks=2
+    )
     assert result.stdout.count("2 scenes in") == 1
     assert result.stderr.count("done, 4 steps") == 2
 

@@ -1,4 +1,5 @@
-"""What commands refuse: one sentence, exit code 2, nothing written, and runs that stay as they are."""
+"""What commands refuse: one sentence, exit code 2, nothing written, and runs that stay as they
+are."""
 
 import shutil
 from pathlib import Path
@@ -18,21 +19,51 @@ RUN, OTHER = "{coarse}", "{elastic}"
     ("arguments", "said"),
     [
         (["picture", "empty"], "empty: is not a run folder: scene.toml is missing."),
-        (["picture", RUN, "-o", "nowhere/x.png"], "nowhere/x.png: cannot be written: nowhere is not a folder."),
+        (
+            ["picture", RUN, "-o", "nowhere/x.png"],
+            "nowhere/x.png: cannot be written: nowhere is not a folder.",
+        ),
         (["picture", RUN, "-o", "picture.xyz"], "picture.xyz: must end in one of "),
-        (["picture", RUN, "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
+        (
+            ["picture", RUN, "-o", f"{RUN}/history.csv"],
+            f"{RUN}/history.csv: cannot be written: it belongs to ",
+        ),
         (["compare", RUN], "compare: needs two runs or more."),
         (["export", RUN], "export: give --vtk DIR, --csv DIR or both."),
-        (["export", RUN, "--vtk", "new", "--step", "7"], f"{RUN}: has no step 7; its accepted steps are 1 to 6."),
-        (["export", RUN, "--csv", RUN, "--force"], f"{RUN}/history.csv: cannot be written: it belongs to the run"),
-        (["export", RUN, "--csv", f"{RUN}/run.json"], f"{RUN}/run.json: cannot be used for results: File exists."),
-        (["fit", RUN, "--json", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
-        (["fit", RUN, "--json", "x", "--python", "./x"], "x: is named for two files; choose different ones."),
-        (["fit", RUN, "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
-        (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used for results: File"),
+        (
+            ["export", RUN, "--vtk", "new", "--step", "7"],
+            f"{RUN}: has no step 7; its accepted steps are 1 to 6.",
+        ),
+        (
+            ["export", RUN, "--csv", RUN, "--force"],
+            f"{RUN}/history.csv: cannot be written: it belongs to the run",
+        ),
+        (
+            ["export", RUN, "--csv", f"{RUN}/run.json"],
+            f"{RUN}/run.json: cannot be used for results: File exists.",
+        ),
+        (
+            ["fit", RUN, "--json", f"{RUN}/history.csv"],
+            f"{RUN}/history.csv: cannot be written: it belongs to ",
+        ),
+        (
+            ["fit", RUN, "--json", "x", "--python", "./x"],
+            "x: is named for two files; choose different ones.",
+        ),
+        (
+            ["fit", RUN, "--json", "/dev/full"],
+            "/dev/full: cannot be written: No space left on device.",
+        ),
+        (
+            ["reproduce", "fig2", "-o", f"{RUN}/history.csv"],
+            f"{RUN}/history.csv: cannot be used for results: File",
+        ),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
         (["mesh", "nowhere.msh"], "nowhere.msh: No such file or directory."),
-        (["mesh", "empty"], "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf, .npz."),
+        (
+            ["mesh", "empty"],
+            "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf, .npz.",
+        ),
         (
             ["mesh", "x.msh", "--set", "mesh.scal=2"],
             "--set mesh.scal=2: mesh.scal is not a known key; did you mean ",
@@ -41,16 +72,25 @@ RUN, OTHER = "{coarse}", "{elastic}"
             ["solve", SCENE, "--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"],
             "--set joint.growth=0.5: joint.growth must not be given together with analysis.accuracy, which chooses it.",
         ),
-        (["solve", RUN], f"{RUN}: is a run; --restart or --extend continues it, and its scene is {RUN}/scene.toml."),
+        (
+            ["solve", RUN],
+            f"{RUN}: is a run; --restart or --extend continues it, and its scene is {RUN}/scene.toml.",
+        ),
         (["solve", "empty"], "empty: is no scene but a folder, and no run is in it."),
         (
             ["solve", SCENE, "--set", "load.force=1", "--set", "load.displacement=1"],
             "--set load.displacement=1: does not go with load.force=1; give one of them.",
         ),
-        (["solve", SCENE, "--set", "pin.E="], "--set 'pin.E=': must have a value; none drops the key."),
+        (
+            ["solve", SCENE, "--set", "pin.E="],
+            "--set 'pin.E=': must have a value; none drops the key.",
+        ),
         (["law", "jonson", *JOINT], "jonson: is not a known law; did you mean johnson?"),
         (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
-        (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
+        (
+            ["law", "johnson", *JOINT, "--clearance", "-1"],
+            "clearance = -1 must be a positive number.",
+        ),
         (["law", "paper-plastic", *JOINT], "paper-plastic: this law needs yield_stress."),
         (["law", "paper", *JOINT, "--to", "-2"], "--to -2: must be a positive number."),
         (["law", "paper", *JOINT, "--points", "0"], "--points 0: must be between 1 and 100000."),
@@ -63,7 +103,9 @@ def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, argumen
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     before = {path: path.stat().st_mtime_ns for path in runs["coarse"].rglob("*")}
-    assert refused([argument.format(**runs) for argument in arguments]).startswith(said.format(**runs))
+    assert refused([argument.format(**runs) for argument in arguments]).startswith(
+        said.format(**runs)
+    )
     assert {path: path.stat().st_mtime_ns for path in runs["coarse"].rglob("*")} == before
     assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
 
@@ -117,11 +159,15 @@ REPORT = "run/run.json: cannot be read as the report of a run."
         ("scene.toml", 25, "run/scene.toml: is not valid TOML: "),
     ],
 )
-def test_a_broken_run_is_one_sentence(runs, tmp_path, monkeypatch, refused, command, name, content, said):
+def test_a_broken_run_is_one_sentence(
+    runs, tmp_path, monkeypatch, refused, command, name, content, said
+):
     """A file cut short (to so many bytes), missing or with another text: no table, no picture."""
     monkeypatch.chdir(tmp_path)
     file = shutil.copytree(runs["coarse"], tmp_path / "run") / name
-    rewrite_report(tmp_path / "run", files={})  # of what was sealed less is read before it is refused
+    rewrite_report(
+        tmp_path / "run", files={}
+    )  # of what was sealed less is read before it is refused
     whole = file.read_bytes()
     file.unlink()
     if content is not None:
@@ -149,5 +195,7 @@ def test_a_report_of_other_types_is_one_sentence(runs, tmp_path, key, value):
     """It names the key, wherever in it the fault is."""
     path = shutil.copytree(runs["coarse"], tmp_path / "run") / "run.json"
     rewrite_report(path.parent, **{key: value})
-    with pytest.raises(InputError, match=rf"run\.json: cannot be read as the report of a run: {key}.*\.$"):
+    with pytest.raises(
+        InputError, match=rf"run\.json: cannot be read as the report of a run: {key}.*\.$"
+    ):
         Run(path.parent)

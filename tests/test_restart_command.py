@@ -1,4 +1,5 @@
-"""``archord solve --restart`` and ``--extend`` as a user runs them: exit codes, sentences, ranks; and a full disk."""
+"""``archord solve --restart`` and ``--extend`` as a user runs them: exit codes, sentences, ranks;
+and a full disk."""
 
 import json
 import os
@@ -20,7 +21,8 @@ COARSE = ["--set", "joint.relative_element_size=0.2", "--set", "load.steps=12"]
 
 
 def killed(folder, after: int, ranks: int = 0) -> int:
-    """Start a run, kill all its ranks once ``after`` steps are there; the number of accepted steps."""
+    """Start a run, kill all its ranks once ``after`` steps are there; the number of accepted
+    steps."""
     launcher = ["mpirun", "-n", str(ranks)] if ranks else []
     command = [*launcher, sys.executable, "-m", "archord", "solve", SCENE, *COARSE, "-o", "run"]
     kill_after(after, command, signal.SIGKILL, folder)
@@ -64,23 +66,32 @@ def test_two_ranks_are_continued_by_three(tmp_path, whole):
 
 
 REFUSED = [
-    (["run", "--restart", "--set", "pin.nu=0.31"], "run: was solved with pin.nu = 0.3, the scene says 0.31;"),
+    (
+        ["run", "--restart", "--set", "pin.nu=0.31"],
+        "run: was solved with pin.nu = 0.3, the scene says 0.31;",
+    ),
     (["run", "--restart", "-o", "other"], "-o does not go with a run folder"),
     (["run", "--restart", "--extend"], "choose one of --force, --restart and --extend"),
     (["run", "--extend"], "run: ends at 0.1 already;"),
     (["nothing", "--restart"], "nothing: cannot be read: No such file or directory."),
-    ([SCENE, "-o", "nothing", "--extend"], "nothing/checkpoint.h5: cannot be read, so that the run cannot be"),
+    (
+        [SCENE, "-o", "nothing", "--extend"],
+        "nothing/checkpoint.h5: cannot be read, so that the run cannot be",
+    ),
 ]
 
 
 def test_what_cannot_be_continued_is_refused_once(tmp_path, whole):
-    """All of these under one launcher: exit code 2 of each on every rank, each sentence told once, nothing changed."""
+    """All of these under one launcher: exit code 2 of each on every rank, each sentence told once,
+    nothing changed."""
     (tmp_path / "run").symlink_to(whole)
     before = {path.name: path.stat().st_mtime_ns for path in whole.iterdir()}
     lists = [["solve", *arguments] for arguments, _ in REFUSED]
     code = f"import sys; from archord.cli import run; sys.exit(2 if {{*map(run, {lists})}} == {{2}} else 1)"
     command = ["mpirun", "-n", "2", sys.executable, "-c", code]
-    result = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(
+        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
     assert result.returncode == 2
     assert [result.stderr.count(said) for _, said in REFUSED] == [1] * len(REFUSED)
     assert "Traceback" not in result.stderr
@@ -90,21 +101,35 @@ def test_what_cannot_be_continued_is_refused_once(tmp_path, whole):
 
 def test_a_finished_run_is_extended(tmp_path):
     """Two steps become four; the resolved scene is the whole path."""
-    short = ["--set", "joint.relative_element_size=0.25", "--set", "load.displacement=1", "--set", "load.steps=2"]
+    short = [
+        "--set",
+        "joint.relative_element_size=0.25",
+        "--set",
+        "load.displacement=1",
+        "--set",
+        "load.steps=2",
+    ]
     archord("solve", SCENE, *short, "-o", "run", "-q", cwd=tmp_path)
     longer = ["--set", "load.displacement=2", "--set", "load.steps=4"]
     result = archord("solve", "run", "--extend", *longer, cwd=tmp_path)
     assert result.stdout.splitlines()[0] == "extending run after step 2 of 4."
-    assert read_history(tmp_path / "run" / "history.csv")["delta/dR"] == pytest.approx([0.5, 1.0, 1.5, 2.0])
+    assert read_history(tmp_path / "run" / "history.csv")["delta/dR"] == pytest.approx(
+        [0.5, 1.0, 1.5, 2.0]
+    )
     archord("solve", "run/scene.toml", "-o", "again", "-q", cwd=tmp_path)
     same_run(tmp_path / "again", tmp_path / "run", 1e-12)
 
 
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_full_disk_is_one_sentence_and_the_run_can_go_on(tmp_path, whole, ranks):
-    """Exit code 3 on all ranks when a file reaches the limit; with room again the run is finished by --restart."""
-    limit = (whole / "fields" / "0001.h5").stat().st_size  # less than the first checkpoint has, which comes before it
-    assert limit > max(path.stat().st_size for path in whole.iterdir() if path.suffix in (".toml", ".csv", ".json"))
+    """Exit code 3 on all ranks when a file reaches the limit; with room again the run is finished
+    by --restart."""
+    limit = (
+        (whole / "fields" / "0001.h5").stat().st_size
+    )  # less than the first checkpoint has, which comes before it
+    assert limit > max(
+        path.stat().st_size for path in whole.iterdir() if path.suffix in (".toml", ".csv", ".json")
+    )
     launcher = ["mpirun", "-n", str(ranks)] if ranks else []
     # Open MPI has large files of its own: the limit comes after its start
     code = (
@@ -113,12 +138,16 @@ def test_a_full_disk_is_one_sentence_and_the_run_can_go_on(tmp_path, whole, rank
         "from archord.cli import run; sys.exit(run(sys.argv[1:]))"
     )
     command = [*launcher, sys.executable, "-c", code, "solve", SCENE, *COARSE, "-o", "run"]
-    result = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(
+        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
     assert result.returncode == 3
     assert result.stderr.count("archord: run/checkpoint.h5 cannot be written: File too large.") == 1
     assert "Traceback" not in result.stderr
     assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "stopped"
     assert accepted_steps(tmp_path / "run") == 0
     again = archord("solve", "run", "--restart", cwd=tmp_path)
-    assert again.stdout.splitlines()[0] == "run holds no accepted step: starting from the beginning."
+    assert (
+        again.stdout.splitlines()[0] == "run holds no accepted step: starting from the beginning."
+    )
     same_run(whole, tmp_path / "run", 1e-12)

@@ -25,7 +25,9 @@ def code(page: str, language: str) -> list[str]:
 def anchors(page: Path) -> set[str]:
     """What GitHub calls a page's headings."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
-    headings = (re.sub(r"[^\w\- ]", "", line.lower()) for line in re.findall(r"^#+ (.*)$", text, re.M))
+    headings = (
+        re.sub(r"[^\w\- ]", "", line.lower()) for line in re.findall(r"^#+ (.*)$", text, re.M)
+    )
     return {heading.strip().replace(" ", "-") for heading in headings}
 
 
@@ -64,7 +66,9 @@ def test_readme_lists_the_file_that_it_names_and_its_law_can_be_exported(tmp_pat
     assert "hardens" in done.stderr
 
 
-@pytest.mark.parametrize(("page", "displacement"), [("README.md", 2.0), ("docs/tutorial.md", (2.0, 0.0))])
+@pytest.mark.parametrize(
+    ("page", "displacement"), [("README.md", 2.0), ("docs/tutorial.md", (2.0, 0.0))]
+)
 def test_the_scene_of_a_page_is_a_scene(page, displacement, tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text("\n".join(code(page, "toml")), encoding="utf-8")
@@ -72,13 +76,16 @@ def test_the_scene_of_a_page_is_a_scene(page, displacement, tmp_path):
 
 
 def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
-    """Each number of the last line of the program to 5 %, as the law may be fitted to more joints."""
+    """Each number of the last line of the program to 5 %, as the law may be fitted to more
+    joints."""
     [scene], [program] = code("docs/tutorial.md", "toml"), code("docs/tutorial.md", "c")
     (tmp_path / "bolt.toml").write_text(scene, encoding="utf-8")
     (tmp_path / "impact.c").write_text(program, encoding="utf-8")
     law = [sys.executable, "-m", "archord", "law", "--scene", "bolt.toml", "--export", "bolt_pin.h"]
     for command in (law, ["gcc", "-O2", "impact.c", "-lm", "-o", "impact"], ["./impact"]):
-        said = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+        said = subprocess.run(
+            command, cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout
     text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
     number = r"\d+\.?\d*"
     [printed] = re.findall(r"^    (largest force \d.*)$", text, re.M)
@@ -88,7 +95,11 @@ def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
 
 
 def test_every_public_name_is_in_the_reference():
-    shown = re.findall(r"^\.\. auto\w+:: archord\.(\w+)$", (ROOT / "docs" / "api.md").read_text(encoding="utf-8"), re.M)
+    shown = re.findall(
+        r"^\.\. auto\w+:: archord\.(\w+)$",
+        (ROOT / "docs" / "api.md").read_text(encoding="utf-8"),
+        re.M,
+    )
     assert set(shown) == set(archord.__all__)
 
 
@@ -133,4 +144,6 @@ def test_commands_and_programs_fit_in_the_column_of_the_site(page):
     text = page.read_text(encoding="utf-8")
     fenced = "\n".join(re.findall(r"```(?:python|toml|sh|c)\n(.*?)```", text, re.S)).splitlines()
     typed = re.findall(r"^    ((?:docker/run|archord|mpirun|ARCHORD_\w+=\S+) .*)$", text, re.M)
-    assert [line for line in [*fenced, *typed] if len(line) > 92 and not line.startswith("archord: ")] == []
+    assert [
+        line for line in [*fenced, *typed] if len(line) > 92 and not line.startswith("archord: ")
+    ] == []

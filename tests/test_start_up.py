@@ -21,18 +21,27 @@ LAUNCHER = {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK
         (["laws"], LAUNCHER, {*SOLVER, *PLOTTING}),
         (["law", "paper", *JOINT], {}, {*SOLVER, *PLOTTING}),
         (["fit", "{elastic}"], {}, {*SOLVER, *PLOTTING}),
-        (["show", "{coarse}", "--no-pictures"], {}, {*SOLVER, *PLOTTING, "pandas", "scipy", "basix", "cffi"}),
+        (
+            ["show", "{coarse}", "--no-pictures"],
+            {},
+            {*SOLVER, *PLOTTING, "pandas", "scipy", "basix", "cffi"},
+        ),
         (["solve", SCENE, *COARSE, *ELASTIC, "-q"], {}, {*PLOTTING, "archord.materials.j2"}),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
 def test_commands_load_only_what_they_need(runs, tmp_path, arguments, environment, needless):
-    """No plotting library without a picture, no solver and no MPI without a solve, not even under a launcher; an
-    elastic scene leaves the return map alone."""
+    """No plotting library without a picture, no solver and no MPI without a solve, not even under a
+    launcher; an elastic scene leaves the return map alone."""
     code = "import sys; from archord.cli import run; print(run(sys.argv[1:]), *sys.modules, file=sys.stderr)"
     command = [sys.executable, "-c", code, *(argument.format(**runs) for argument in arguments)]
     result = subprocess.run(
-        command, cwd=tmp_path, env=ENVIRONMENT | environment, capture_output=True, text=True, timeout=300
+        command,
+        cwd=tmp_path,
+        env=ENVIRONMENT | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     status, *loaded = result.stderr.split()
     assert status == "0", result.stderr

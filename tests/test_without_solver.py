@@ -1,4 +1,5 @@
-"""archord without what solves: laws, fits of run folders, tables and pictures, and a sentence for the rest."""
+"""archord without what solves: laws, fits of run folders, tables and pictures, and a sentence for
+the rest."""
 
 import json
 import subprocess
@@ -30,7 +31,13 @@ SCENE = "scenes/steel_pin.toml"
 
 
 def without_solver(tmp_path, commands, run):
-    program = [sys.executable, "-c", BLOCKED + PROGRAM, json.dumps([[str(word) for word in c] for c in commands]), run]
+    program = [
+        sys.executable,
+        "-c",
+        BLOCKED + PROGRAM,
+        json.dumps([[str(word) for word in c] for c in commands]),
+        run,
+    ]
     return subprocess.run(program, capture_output=True, text=True, check=False)
 
 
@@ -50,10 +57,15 @@ def test_runs_are_read_fitted_drawn_and_exported_and_laws_tell_joints(runs, tmp_
     codes = [line for line in result.stdout.splitlines() if line.startswith("# ")]
     assert codes == ["# 0"] * len(commands), result.stderr
     assert result.stdout.splitlines()[-1] == "8 True 2"
-    assert all((tmp_path / name).stat().st_size > 10_000 for name in ("shown.png", "drawn.png", "compared.png"))
+    assert all(
+        (tmp_path / name).stat().st_size > 10_000
+        for name in ("shown.png", "drawn.png", "compared.png")
+    )
 
 
-@pytest.mark.parametrize("command", [["solve", SCENE], ["mesh", "scenes/lug.toml"], ["export-deck", SCENE]])
+@pytest.mark.parametrize(
+    "command", [["solve", SCENE], ["mesh", "scenes/lug.toml"], ["export-deck", SCENE]]
+)
 def test_what_solves_says_in_one_sentence_what_it_needs(command, runs, tmp_path):
     words = [*command, "-o", str(tmp_path / "out")] if command[0] == "solve" else command
     result = without_solver(tmp_path, [words], runs["elastic"])

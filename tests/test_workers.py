@@ -1,5 +1,5 @@
-"""A scene with a mesh of gmsh solved where programs solve many: in workers of pools, however they start, and in
-threads."""
+"""A scene with a mesh of gmsh solved where programs solve many: in workers of pools, however they
+start, and in threads."""
 
 import subprocess
 import sys
@@ -55,13 +55,17 @@ def test_a_worker_of_a_pool_solves(scene, method):
         f"    with multiprocessing.get_context({method!r}).Pool(2) as pool:\n"
         "        print(pool.map(job, [1, 2]))\n"
     )
-    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, str(program)], capture_output=True, text=True, timeout=120
+    )
     assert done.stdout.strip() == "['done', 'done']", done.stderr
 
 
 def test_a_thread_solves(scene):
     with ThreadPoolExecutor(1) as threads:
-        assert threads.submit(solved, str(scene), "thread").result() == pytest.approx(solved(str(scene), "main"))
+        assert threads.submit(solved, str(scene), "thread").result() == pytest.approx(
+            solved(str(scene), "main")
+        )
 
 
 def test_a_thread_may_load_archord_first(scene):
@@ -71,5 +75,7 @@ def test_a_thread_may_load_archord_first(scene):
         "job.start()\njob.join()\n"
         f"print(archord.load({str(scene.with_name('first'))!r}).status)\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120
+    )
     assert done.stdout.strip() == "done", done.stderr

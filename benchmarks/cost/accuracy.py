@@ -20,8 +20,11 @@ _FINE = 6  # meshes finer than the coarsest
 _STEPS = 8  # of a plastic joint an output step
 
 
-def open_joint(name: str, steps: int = 4, yield_stress: float | None = None, **sections: dict) -> Case:
-    """The paper's joint with other ``sections``, its mesh left open, to be solved to the coarsest accuracy."""
+def open_joint(
+    name: str, steps: int = 4, yield_stress: float | None = None, **sections: dict
+) -> Case:
+    """The paper's joint with other ``sections``, its mesh left open, to be solved to the coarsest
+    accuracy."""
     analysis = {"accuracy": ELASTIC[0], **sections.pop("analysis", {})}
     scene = paper_joint(0.04, steps, yield_stress, output={"fields": False}, **sections)
     return Case(name, varied(scene, joint={"element_size": None}, analysis=analysis))
@@ -43,10 +46,12 @@ CASES = (
 def run(
     folder: Path, cases: Sequence[Case], said: Callable[[str], None], asked: Sequence[float] = ()
 ) -> tuple[list[dict[str, object]], list[str]]:
-    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or those of their material, references first.
+    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or those of their material,
+    references first.
 
-    Returns the entries of each accuracy by heading, with the true error of the curve, over its largest value, and a
-    sentence for every estimate or error that is larger than what was asked. Raises `RuntimeError` if a run fails.
+    Returns the entries of each accuracy by heading, with the true error of the curve, over its
+    largest value, and a sentence for every estimate or error that is larger than what was asked.
+    Raises `RuntimeError` if a run fails.
     """
     rows, faults = list[dict[str, object]](), []
     for case in cases:
@@ -80,8 +85,9 @@ def run(
 
 
 def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarray:
-    """The curve on a much finer mesh, extrapolated with order 3 from it and the one before; of a plastic joint in steps
-    an eighth as long, whose error is extrapolated with order 1 from steps twice as long on the mesh before."""
+    """The curve on a much finer mesh, extrapolated with order 3 from it and the one before; of a
+    plastic joint in steps an eighth as long, whose error is extrapolated with order 1 from steps
+    twice as long on the mesh before."""
     family = MeshFamily(case.scene, 1.0)
 
     def curve(mesh: int, substeps: int) -> np.ndarray:

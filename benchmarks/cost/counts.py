@@ -1,7 +1,7 @@
 """A guard against slow growth of cost: counts that no clock has a part in, kept in counts.json.
 
-``python3 -m archord.benchmarks.cost.counts`` solves the cases, prints their counts as the file keeps them, for a change
-that costs more and is worth it, and compares.
+``python3 -m archord.benchmarks.cost.counts`` solves the cases, prints their counts as the file
+keeps them, for a change that costs more and is worth it, and compares.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from pathlib import Path
 from archord.benchmarks.case import Case, paper_joint
 
 ALLOWED = 1.1  # of what is kept
-KEPT: dict[str, dict[str, int]] = json.loads(Path(__file__).with_name("counts.json").read_text(encoding="utf-8"))
+KEPT: dict[str, dict[str, int]] = json.loads(
+    Path(__file__).with_name("counts.json").read_text(encoding="utf-8")
+)
 # ``elastic 0.12`` is the elastic joint of the paper with elements of 0.12 R on its arcs.
 CASES = [
     Case(f"{kind} {size:g}", paper_joint(size, steps, yield_stress))
@@ -24,7 +26,8 @@ CASES = [
 
 
 def count(case: Case) -> dict[str, int]:
-    """Solve ``case``; its dofs, Newton iterations, factorisations and evaluations of the residual."""
+    """Solve ``case``; its dofs, Newton iterations, factorisations and evaluations of the
+    residual."""
     with tempfile.TemporaryDirectory() as folder:
         case.solve(Path(folder))
         report = json.loads((case.folder(Path(folder)) / "run.json").read_text(encoding="utf-8"))
@@ -38,7 +41,8 @@ def count(case: Case) -> dict[str, int]:
 
 
 def grown(name: str, now: dict[str, int], before: dict[str, int]) -> list[str]:
-    """A sentence for every count of the case ``name`` that exceeds what was kept ``before`` by more than a tenth."""
+    """A sentence for every count of the case ``name`` that exceeds what was kept ``before`` by more
+    than a tenth."""
     large = [what for what in before if now[what] > ALLOWED * before[what]]
     return [f"{name}: {what} grew from {before[what]} to {now[what]}" for what in large]
 
@@ -46,7 +50,11 @@ def grown(name: str, now: dict[str, int], before: dict[str, int]) -> list[str]:
 def main() -> int:
     """Count, print and compare; the exit code is 1 if anything grew."""
     now = {case.name: count(case) for case in CASES}
-    print("{\n" + ",\n".join(f" {json.dumps(name)}: {json.dumps(counts)}" for name, counts in now.items()) + "\n}")
+    print(
+        "{\n"
+        + ",\n".join(f" {json.dumps(name)}: {json.dumps(counts)}" for name, counts in now.items())
+        + "\n}"
+    )
     faults = [fault for name, before in KEPT.items() for fault in grown(name, now[name], before)]
     for fault in faults:
         print(f"archord: {fault}.", file=sys.stderr)

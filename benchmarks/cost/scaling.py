@@ -1,8 +1,9 @@
 """How time and memory grow with the mesh and fall with the ranks: ``archord benchmark scaling``.
 
-The paper's joint, refined everywhere alike, on one rank and on several. A cost is a dict: "name", "material", "dofs",
-"ranks", "iterations", "coarse iterations", "factorisations", "P" (over E* R), "total" (seconds of the whole process
-from outside), "parts" (seconds by part, as rank 0 spent them, which sum up to it), "memory" (peak bytes of each rank).
+The paper's joint, refined everywhere alike, on one rank and on several. A cost is a dict: "name",
+"material", "dofs", "ranks", "iterations", "coarse iterations", "factorisations", "P" (over E* R),
+"total" (seconds of the whole process from outside), "parts" (seconds by part, as rank 0 spent them,
+which sum up to it), "memory" (peak bytes of each rank).
 """
 
 from __future__ import annotations
@@ -24,8 +25,15 @@ from archord.scene.file import resolved
 from archord.scene.scene import Scene
 
 Cost = dict[str, Any]
-# element size on the arcs over R by about how many dofs that gives; the elements grow by 6.25 times that
-SIZES = {5_000: 0.0350518, 30_000: 0.0143099, 100_000: 0.00783783, 300_000: 0.00452517, 1_000_000: 0.00247854}
+# element size on the arcs over R by about how many dofs that gives; the elements grow by 6.25 times
+# that
+SIZES = {
+    5_000: 0.0350518,
+    30_000: 0.0143099,
+    100_000: 0.00783783,
+    300_000: 0.00452517,
+    1_000_000: 0.00247854,
+}
 PLASTIC_LARGEST, YIELD_STRESS = 100_000, 0.002  # dofs; over E*
 ELASTIC_STEPS, PLASTIC_STEPS = 2, 5
 SAME_FORCE = 1e-8  # relative difference of P between numbers of ranks
@@ -58,22 +66,40 @@ class Setting:
         return f"{self.material}_{self.dofs}_on_{self.ranks}"
 
     def process(self, folder: Path) -> Process:
-        """The run as a user would start it, in the existing ``folder``, whose result is its run.json."""
-        steps, strength = (PLASTIC_STEPS, YIELD_STRESS) if self.material == "plastic" else (ELASTIC_STEPS, None)
+        """The run as a user would start it, in the existing ``folder``, whose result is its
+        run.json."""
+        steps, strength = (
+            (PLASTIC_STEPS, YIELD_STRESS) if self.material == "plastic" else (ELASTIC_STEPS, None)
+        )
         scene, read = f"{self.name}.toml", (folder / self.name / "run.json").read_text
-        (folder / scene).write_text(resolved(refined(SIZES[self.dofs], steps, strength)), encoding="utf-8")
-        command = (*launcher(self.ranks), sys.executable, "-m", "archord", "solve", scene, "-o", self.name)
+        (folder / scene).write_text(
+            resolved(refined(SIZES[self.dofs], steps, strength)), encoding="utf-8"
+        )
+        command = (
+            *launcher(self.ranks),
+            sys.executable,
+            "-m",
+            "archord",
+            "solve",
+            scene,
+            "-o",
+            self.name,
+        )
         command = (*command, "--force", "-q")
-        return Process(self.name, command, folder, lambda: json.loads(read()), _A_DAY, kind=self.material)
+        return Process(
+            self.name, command, folder, lambda: json.loads(read()), _A_DAY, kind=self.material
+        )
 
 
 def refined(size: float, steps: int, yield_stress: float | None = None) -> Scene:
-    """The paper's joint with elements of ``size`` on its arcs that grow in proportion: all such meshes are alike."""
+    """The paper's joint with elements of ``size`` on its arcs that grow in proportion: all such
+    meshes are alike."""
     return paper_joint(size, steps, yield_stress, joint={"growth": 6.25 * size})
 
 
 def launcher(ranks: int) -> list[str]:
-    """The words before a command that start it on ``ranks`` ranks. Raises `InputError` if there is no mpirun."""
+    """The words before a command that start it on ``ranks`` ranks. Raises `InputError` if there is
+    no mpirun."""
     if ranks == 1:
         return []
     if shutil.which("mpirun") is None:
@@ -82,7 +108,8 @@ def launcher(ranks: int) -> list[str]:
 
 
 def settings(largest: float, ranks: int) -> list[Setting]:
-    """All runs up to ``largest`` dofs by size: elastic on 1, 2, 4, ... up to ``ranks`` ranks, plastic on one."""
+    """All runs up to ``largest`` dofs by size: elastic on 1, 2, 4, ... up to ``ranks`` ranks,
+    plastic on one."""
     found = []
     for dofs in (dofs for dofs in SIZES if dofs <= largest):
         found += [Setting(dofs, 1 << k) for k in range(ranks.bit_length())]
@@ -90,11 +117,13 @@ def settings(largest: float, ranks: int) -> list[Setting]:
     return found
 
 
-def run(chosen: Sequence[Setting], folder: Path, repeats: int, said: Said) -> tuple[list[Cost], list[str]]:
+def run(
+    chosen: Sequence[Setting], folder: Path, repeats: int, said: Said
+) -> tuple[list[Cost], list[str]]:
     """Solve the ``chosen`` settings ``repeats`` times below ``folder`` (see `time_all`).
 
-    Returns the costs of those that finish, and a sentence for every one that does not, and for every force that depends
-    on the number of ranks. Raises `InputError`.
+    Returns the costs of those that finish, and a sentence for every one that does not, and for
+    every force that depends on the number of ranks. Raises `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     timings = time_all([setting.process(folder) for setting in chosen], repeats, said)
@@ -105,7 +134,10 @@ def run(chosen: Sequence[Setting], folder: Path, repeats: int, said: Said) -> tu
 def cost_of(setting: Setting, timing: Timing) -> Cost:
     """The cost of the run with the median time, as its run.json tells it."""
     report, total = timing.middle.result, timing.middle.seconds
-    parts = {part: sum(report["seconds"].get(name, 0.0) for name in names) for part, names in PARTS.items()}
+    parts = {
+        part: sum(report["seconds"].get(name, 0.0) for name in names)
+        for part, names in PARTS.items()
+    }
     return {
         "name": setting.name,
         "material": setting.material,
@@ -123,8 +155,16 @@ def cost_of(setting: Setting, timing: Timing) -> Cost:
 
 def unlike(costs: Sequence[Cost]) -> list[str]:
     """A sentence for every force that depends on the number of ranks."""
-    found = ((cost["name"], abs(cost["P"] / one["P"] - 1)) for cost in costs if (one := _alone(cost, costs)))
-    return [f"{name}: P differs by {off:.1e} from that on 1 rank" for name, off in found if not off <= SAME_FORCE]
+    found = (
+        (cost["name"], abs(cost["P"] / one["P"] - 1))
+        for cost in costs
+        if (one := _alone(cost, costs))
+    )
+    return [
+        f"{name}: P differs by {off:.1e} from that on 1 rank"
+        for name, off in found
+        if not off <= SAME_FORCE
+    ]
 
 
 def _alone(cost: Cost, costs: Sequence[Cost]) -> Cost | None:
@@ -134,13 +174,17 @@ def _alone(cost: Cost, costs: Sequence[Cost]) -> Cost | None:
 
 
 def exponent(dofs: Sequence[float], values: Sequence[float]) -> float:
-    """The power of ``dofs``, at least two, with which ``values`` grow: least squares of their logarithms."""
+    """The power of ``dofs``, at least two, with which ``values`` grow: least squares of their
+    logarithms."""
     return float(np.polyfit(np.log(dofs), np.log(values), 1)[0])
 
 
 def row(cost: Cost, costs: Sequence[Cost]) -> dict[str, object]:
     """The entries of a run by heading."""
-    one, plain = _alone(cost, costs), ("material", "dofs", "ranks", "iterations", "coarse iterations", "factorisations")
+    one, plain = (
+        _alone(cost, costs),
+        ("material", "dofs", "ranks", "iterations", "coarse iterations", "factorisations"),
+    )
     return {
         **{key: cost[key] for key in plain},
         **{f"{part} [s]": f"{seconds:.2f}" for part, seconds in cost["parts"].items()},
@@ -158,8 +202,13 @@ def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
     for material in ("elastic", "plastic"):
         same = [cost for cost in costs if (cost["material"], cost["ranks"]) == (material, 1)]
         if len(same) > 1:
-            found = [(c["dofs"], c["total"], c["parts"]["linear solve"], max(c["memory"])) for c in same]
+            found = [
+                (c["dofs"], c["total"], c["parts"]["linear solve"], max(c["memory"])) for c in same
+            ]
             dofs, *grown = zip(*found, strict=True)
-            powers = (f"{what} N^{exponent(dofs, values):.2f}" for what, values in zip(_GROWING, grown, strict=True))
+            powers = (
+                f"{what} N^{exponent(dofs, values):.2f}"
+                for what, values in zip(_GROWING, grown, strict=True)
+            )
             text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: {', '.join(powers)}.\n"
     return write_table(folder, "scaling", [row(cost, costs) for cost in costs], text)

@@ -1,8 +1,9 @@
 """Scenes and sweeps with one thing switched, by turns: ``archord benchmark variants``.
 
-Each run is a process of its own, timed from outside; nothing else should run. The sets of variants.toml are in groups:
-"joint" (one scene in variants, each of which should load only what it uses), "sweep" (on one rank and on two) and
-"strategies" (without each linear strategy; docs/development/linear_strategies.md says what was decided by it).
+Each run is a process of its own, timed from outside; nothing else should run. The sets of
+variants.toml are in groups: "joint" (one scene in variants, each of which should load only what it
+uses), "sweep" (on one rank and on two) and "strategies" (without each linear strategy;
+docs/development/linear_strategies.md says what was decided by it).
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ WITHOUT = {
 }
 _SCENES = Path(__file__).resolve().parents[2] / "scenes"
 _A_DAY = 86400.0  # seconds that a run may take
-# Runs the command line after a statement, and leaves a note of what that loaded before the note itself does.
+# Runs the command line after a statement, and leaves a note of what that loaded before the note
+# itself does.
 _PROBE = """
 import sys
 note, change, arguments = sys.argv[1], sys.argv[2], sys.argv[3:]
@@ -55,8 +57,9 @@ sys.exit(code)
 
 @dataclass(frozen=True)
 class Variant:
-    """Of the set ``case``: ``scene`` or a ``sweep`` of scenes/ is solved, or the run of ``picture_of`` drawn, on
-    ``ranks`` ranks, ``without`` a linear strategy; what is ``unused`` must not be loaded."""
+    """Of the set ``case``: ``scene`` or a ``sweep`` of scenes/ is solved, or the run of
+    ``picture_of`` drawn, on ``ranks`` ranks, ``without`` a linear strategy; what is ``unused`` must
+    not be loaded."""
 
     case: str
     name: str
@@ -68,7 +71,8 @@ class Variant:
     unused: Sequence[str] = ()
 
     def process(self, folder: Path) -> Process:
-        """Its process in the existing ``folder``; the result is what it loaded. Raises `InputError` without mpirun."""
+        """Its process in the existing ``folder``; the result is what it loaded. Raises `InputError`
+        without mpirun."""
         place, note = self.folder(folder), folder / "note.json"
         if self.picture_of:
             run = replace(self, name=self.picture_of).folder(folder)
@@ -78,7 +82,15 @@ class Variant:
         else:
             place.with_suffix(".toml").write_text(resolved(self.scene), encoding="utf-8")
             arguments = ["solve", f"{place.name}.toml", "-q", "-o", place.name]
-        command = (*launcher(self.ranks), sys.executable, "-c", _PROBE, note.name, WITHOUT[self.without], *arguments)
+        command = (
+            *launcher(self.ranks),
+            sys.executable,
+            "-c",
+            _PROBE,
+            note.name,
+            WITHOUT[self.without],
+            *arguments,
+        )
         read, name = (lambda: json.loads(note.read_text())), f"{self.case}, {self.name}"
         return Process(name, command, folder, read, _A_DAY, clear=(place.name,), kind=place.name)
 
@@ -89,7 +101,11 @@ class Variant:
     def faults(self, loaded: Sequence[str]) -> list[str]:
         """A sentence for everything ``loaded`` that is not used."""
         unused = {*self.unused, *(ABSENT if self.scene is not None else ())}
-        return [f"{self.case}, {self.name}: loads {name}, which it does not need" for name in loaded if name in unused]
+        return [
+            f"{self.case}, {self.name}: loads {name}, which it does not need"
+            for name in loaded
+            if name in unused
+        ]
 
 
 def variants(group: str) -> list[Variant]:
@@ -99,15 +115,23 @@ def variants(group: str) -> list[Variant]:
         for name, own in given["variants"].items():
             solved = "scene" in given and "picture_of" not in own
             scene = paper_joint(**given["scene"] | own.get("scene", {})) if solved else None
-            found.append(Variant(given["name"], name, **own | {"scene": scene, "sweep": given.get("sweep", "")}))
+            found.append(
+                Variant(
+                    given["name"], name, **own | {"scene": scene, "sweep": given.get("sweep", "")}
+                )
+            )
     return found
 
 
-def run(chosen: Sequence[Variant], folder: Path, repeats: int, said: Said) -> tuple[list[Row], list[str]]:
-    """Run the ``chosen`` variants ``repeats`` times below ``folder`` (see `time_all`), each once before, uncounted.
+def run(
+    chosen: Sequence[Variant], folder: Path, repeats: int, said: Said
+) -> tuple[list[Row], list[str]]:
+    """Run the ``chosen`` variants ``repeats`` times below ``folder`` (see `time_all`), each once
+    before, uncounted.
 
-    Returns a row of entries for each, whose ratios are to the first of its set, run by run, the median; and a sentence
-    for every failure and for everything loaded that is not used. Raises `InputError`.
+    Returns a row of entries for each, whose ratios are to the first of its set, run by run, the
+    median; and a sentence for every failure and for everything loaded that is not used. Raises
+    `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     processes = [variant.process(folder.resolve()) for variant in chosen]
@@ -139,5 +163,8 @@ def run(chosen: Sequence[Variant], folder: Path, repeats: int, said: Said) -> tu
 
 
 def ratio(one: Timing, other: Timing, what: str) -> float:
-    """``what`` ("seconds" or "cpu") of the runs of ``one`` over those of ``other``: the median of the pairs."""
-    return median(getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=False))
+    """``what`` ("seconds" or "cpu") of the runs of ``one`` over those of ``other``: the median of
+    the pairs."""
+    return median(
+        getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=False)
+    )

@@ -1,4 +1,5 @@
-"""Error against run time, archord's beside other codes' in one session: ``archord benchmark work-precision``."""
+"""Error against run time, archord's beside other codes' in one session: ``archord benchmark
+work-precision``."""
 
 from __future__ import annotations
 
@@ -41,21 +42,27 @@ class Line:
         """Relative errors by quantity against the reference of the code's kinematics."""
         case = CASES[self.point.case]
         exact = case[self.found.get("kinematics", "current")]
-        errors = {name: abs(value / exact[name][0] - 1) for name, value in self.found.items() if name in exact}
+        errors = {
+            name: abs(value / exact[name][0] - 1)
+            for name, value in self.found.items()
+            if name in exact
+        }
         if "profile" in self.found:
             errors["profile"] = profile_error(self.found["profile"], np.array(case["profile"]))
         return errors
 
 
 def run(folder: Path, only: Sequence[str], repeats: int, limit: float, said: Said) -> list[Line]:
-    """Time the points that fit ``only`` below ``folder`` (see `time_all`), for ``limit`` seconds each at most."""
+    """Time the points that fit ``only`` below ``folder`` (see `time_all`), for ``limit`` seconds
+    each at most."""
     chosen = points(only)
     timings = time_all([point.process(folder, limit) for point in chosen], repeats, said)
     return [Line(*pair) for pair in zip(chosen, timings, strict=True)]
 
 
 def profile_error(pressure: Array, reference: Array) -> float:
-    """Relative L2 difference over the arc, ``sqrt(int (p - p_ref)^2 / int p_ref^2)``; both ``(401,)`` at `ANGLES`."""
+    """Relative L2 difference over the arc, ``sqrt(int (p - p_ref)^2 / int p_ref^2)``; both
+    ``(401,)`` at `ANGLES`."""
     difference = np.trapezoid((pressure - reference) ** 2, ANGLES)
     return float(np.sqrt(difference / np.trapezoid(reference**2, ANGLES)))
 
@@ -69,31 +76,36 @@ def series_of(lines: Sequence[Line]) -> dict[tuple[str, str], list[Line]]:
 
 
 def envelopes(lines: Sequence[Line]) -> dict[str, Pairs]:
-    """Per code the best of all its series in one case: pairs (seconds, error of P), where an error counts from the mesh
-    on from which its series stays below it."""
+    """Per code the best of all its series in one case: pairs (seconds, error of P), where an error
+    counts from the mesh on from which its series stays below it."""
     found: dict[str, Pairs] = {}
     for (code, _), members in series_of(lines).items():
-        if known := [(line.timing.median, line.errors["P"]) for line in members if "P" in line.errors]:
+        if known := [
+            (line.timing.median, line.errors["P"]) for line in members if "P" in line.errors
+        ]:
             seconds, errors = zip(*known, strict=True)
             found[code] = [*found.get(code, []), *zip(seconds, lasting(errors), strict=True)]
     return {code: envelope(pairs) for code, pairs in found.items()}
 
 
 def lasting(errors: Sequence[float]) -> list[float]:
-    """The errors of a series, coarse to fine, each as large as any on a finer mesh: one that passes through zero on its
-    mesh proves nothing of the method."""
+    """The errors of a series, coarse to fine, each as large as any on a finer mesh: one that passes
+    through zero on its mesh proves nothing of the method."""
     return [max(errors[k:]) for k in range(len(errors))]
 
 
 def envelope(pairs: Iterable[tuple[float, float]]) -> Pairs:
-    """Those of the pairs (seconds, error) that no other beats in both, in the order of their seconds."""
+    """Those of the pairs (seconds, error) that no other beats in both, in the order of their
+    seconds."""
     ordered = sorted(pairs)
-    return [pair for k, pair in enumerate(ordered) if all(pair[1] < error for _, error in ordered[:k])]
+    return [
+        pair for k, pair in enumerate(ordered) if all(pair[1] < error for _, error in ordered[:k])
+    ]
 
 
 def seconds_at(error: float, kept: Pairs) -> float | None:
-    """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there. Errors above that of
-    the cheapest point cost what it costs."""
+    """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there.
+    Errors above that of the cheapest point cost what it costs."""
     if not kept or error < kept[-1][1]:
         return None
     seconds, errors = np.log(np.maximum(kept, 1e-300)).T
@@ -101,15 +113,24 @@ def seconds_at(error: float, kept: Pairs) -> float | None:
 
 
 def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
-    """Write a table of points, as CSV and Markdown, and a diagram for each case; returns the tables and the files."""
+    """Write a table of points, as CSV and Markdown, and a diagram for each case; returns the tables
+    and the files."""
     texts, files = [], []
     for case, given in CASES.items():
         if some := [line for line in lines if line.point.case == case]:
             rows = [row(line) for line in some]
-            codes = ", ".join(dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in some))
-            parts = [f"**{given['title']}**: {codes}\n", Table.of(rows).markdown(), *ratios(envelopes(some))]
+            codes = ", ".join(
+                dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in some)
+            )
+            parts = [
+                f"**{given['title']}**: {codes}\n",
+                Table.of(rows).markdown(),
+                *ratios(envelopes(some)),
+            ]
             texts.append("\n".join(parts))
-            files += write_report(folder, f"work_precision_{case}", rows, texts[-1], partial(draw, case, some))
+            files += write_report(
+                folder, f"work_precision_{case}", rows, texts[-1], partial(draw, case, some)
+            )
     return "\n".join(texts), files
 
 
@@ -130,7 +151,10 @@ def row(line: Line) -> dict[str, object]:
         "from - to": f"{seconds[0]:.4g} - {seconds[-1]:.4g}" if runs else "",
         "MB": f"{max(run.memory for run in runs) / 1e6:.0f}" if runs else "",
         "P/(E* R)": f"{found['P']:.8f}" if "P" in found else "",
-        **{f"error of {name}": f"{errors[name]:.1e}" if name in errors else "" for name in quantities(point.case)},
+        **{
+            f"error of {name}": f"{errors[name]:.1e}" if name in errors else ""
+            for name in quantities(point.case)
+        },
         "failure": line.timing.failure,
     }
 
@@ -151,7 +175,12 @@ def ratios(kept: dict[str, Pairs]) -> list[str]:
         ours, *times = (seconds_at(level, kept[code]) for code in (OURS, *others))
         if ours or any(times):
             told = (
-                f"takes {t / ours:.2g} times as long" if t and ours else f"{t:.1f} s" if t else "never" for t in times
+                f"takes {t / ours:.2g} times as long"
+                if t and ours
+                else f"{t:.1f} s"
+                if t
+                else "never"
+                for t in times
             )
             table.add(f"{level:g}", f"{ours:.2f}" if ours else "never", *told)
     reached = ", ".join(f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others))
@@ -159,13 +188,18 @@ def ratios(kept: dict[str, Pairs]) -> list[str]:
 
 
 def draw(case: str, lines: Sequence[Line], file: Path) -> None:
-    """Draw the errors of ``case`` over seconds (above) and dofs; grey is what the reference does not know."""
+    """Draw the errors of ``case`` over seconds (above) and dofs; grey is what the reference does
+    not know."""
     names, given = quantities(case), CASES[case]
     codes = list(dict.fromkeys((OURS, *(line.point.code for line in lines))))
     figure = new_figure(4.1 * len(names), 9)
     panels = figure.subplots(2, len(names), sharey="col")
     for number, ((code, series), members) in enumerate(series_of(lines).items()):
-        style = {"color": f"C{codes.index(code)}", "marker": "os^Dvph*"[number % 8], "label": f"{code}, {series}"}
+        style = {
+            "color": f"C{codes.index(code)}",
+            "marker": "os^Dvph*"[number % 8],
+            "label": f"{code}, {series}",
+        }
         for k, name in enumerate(names):
             known = [line for line in members if name in line.errors]
             errors = [max(line.errors[name], _FLOOR) for line in known]
@@ -173,13 +207,20 @@ def draw(case: str, lines: Sequence[Line], file: Path) -> None:
             panels[1, k].loglog([line.found["dofs"] for line in known], errors, **style)
     for k, name in enumerate(names):
         unknown = given["profile_error"] if name == "profile" else given["current"][name][1]
-        panels[0, k].set(xlabel="wall time of the whole process [s]", title=f"relative error of {NAMES[name]}")
+        panels[0, k].set(
+            xlabel="wall time of the whole process [s]", title=f"relative error of {NAMES[name]}"
+        )
         panels[1, k].set(xlabel="degrees of freedom")
         bottom = min(panels[0, k].get_ylim()[0], unknown / 2)
         for ax in panels[:, k]:
             ax.axhspan(bottom, unknown, color="0.9", zorder=0)
             ax.set_ylim(bottom=bottom)
             ax.grid(True, linewidth=0.4)
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, title=given["title"])
+    figure.legend(
+        *panels[0, 0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=4,
+        title=given["title"],
+    )
     with replacing(file) as new:
         save(figure, new, dots=80)

@@ -1,8 +1,10 @@
-"""The points of the work-precision benchmark: archord, CalculiX and peers on series of meshes, as timed processes.
+"""The points of the work-precision benchmark: archord, CalculiX and peers on series of meshes, as
+timed processes.
 
-What is solved is in work_precision.toml. The result of a process is a dict of what the code found at the last step: "P"
-(over E* R), "p0" (over E*), "eps" [rad], "dissipation" (over E* R^2), "profile" (pressure over E* at `ANGLES`), "dofs",
-"iterations", "factorisations", and "kinematics" where the pairs are fixed; without what it does not tell.
+What is solved is in work_precision.toml. The result of a process is a dict of what the code found
+at the last step: "P" (over E* R), "p0" (over E*), "eps" [rad], "dissipation" (over E* R^2),
+"profile" (pressure over E* at `ANGLES`), "dofs", "iterations", "factorisations", and "kinematics"
+where the pairs are fixed; without what it does not tell.
 """
 
 from __future__ import annotations
@@ -38,13 +40,19 @@ CASES: dict[str, dict[str, Any]] = DATA["cases"]
 OURS, CALCULIX = "archord", "CalculiX"
 ANGLES = np.linspace(0.0, np.pi / 2, 401)  # of pressure profiles, from the contact axis
 # of history.csv
-_COLUMNS = {"P": "P/(E* R)", "p0": "p0/E*", "eps": "eps", "dissipation": "plastic_dissipation/(E* R2)"}
+_COLUMNS = {
+    "P": "P/(E* R)",
+    "p0": "p0/E*",
+    "eps": "eps",
+    "dissipation": "plastic_dissipation/(E* R2)",
+}
 
 
 @dataclass(frozen=True)
 class Point:
-    """``code`` on the mesh of element size ``size`` (over R) of a ``series`` of ``case``, in ``steps`` steps;
-    ``prepare`` writes what it needs into a folder, and returns the process that solves there."""
+    """``code`` on the mesh of element size ``size`` (over R) of a ``series`` of ``case``, in
+    ``steps`` steps; ``prepare`` writes what it needs into a folder, and returns the process that
+    solves there."""
 
     case: str
     code: str
@@ -60,7 +68,8 @@ class Point:
         return f"{self.case}: {self.code}, {self.series}, {self.size:g} R"
 
     def process(self, folder: Path, limit: float) -> Process:
-        """The process, for ``limit`` seconds at most, in a folder of its own below ``folder``, which is made."""
+        """The process, for ``limit`` seconds at most, in a folder of its own below ``folder``,
+        which is made."""
         place = (folder / slug(self.name)).resolve()
         place.mkdir(parents=True, exist_ok=True)
         process, kind = self.prepare(place), (self.case, self.code, self.series)
@@ -68,34 +77,57 @@ class Point:
 
 
 def points(patterns: Sequence[str] = ()) -> list[Point]:
-    """All points, or those whose name fits one of ``patterns``; CalculiX's and peers' where they are installed. Raises
-    `InputError` for a pattern that fits none."""
+    """All points, or those whose name fits one of ``patterns``; CalculiX's and peers' where they
+    are installed. Raises `InputError` for a pattern that fits none."""
     versions, peers = {OURS: VERSION} | _calculix_version(), installed()
     found = []
     for case, given in CASES.items():
         for series in DATA["series"]:
             if series["code"] in versions and case in series.get("cases", CASES):
                 steps = series.get("steps", given["steps"])
-                start = partial(Point, case, series["code"], versions[series["code"]], series["name"])
+                start = partial(
+                    Point, case, series["code"], versions[series["code"]], series["name"]
+                )
                 for size, growth in zip(series["element_size"], series["growth"], strict=True):
-                    joint = {"growth": growth} | ({"edge_angle": given["edge_angle"]} if series.get("edge") else {})
+                    joint = {"growth": growth} | (
+                        {"edge_angle": given["edge_angle"]} if series.get("edge") else {}
+                    )
                     analysis = {"degree": series.get("degree", 2)}
-                    scene = paper_joint(size, steps, given.get("yield_stress"), joint=joint, analysis=analysis)
+                    scene = paper_joint(
+                        size, steps, given.get("yield_stress"), joint=joint, analysis=analysis
+                    )
                     prepare = _calculix if series["code"] == "CalculiX" else _archord
                     found.append(start(size, steps, partial(prepare, scene)))
         for peer in peers:
             for size, order in peer.series.get(case, ()):
                 prepare = partial(_peer, peer, case, size, order, given["steps"])
-                found.append(Point(case, peer.label, peer.version, f"order {order}", size, given["steps"], prepare))
+                found.append(
+                    Point(
+                        case,
+                        peer.label,
+                        peer.version,
+                        f"order {order}",
+                        size,
+                        given["steps"],
+                        prepare,
+                    )
+                )
     for pattern in patterns:
         if not any(matches(pattern, point.name) for point in found):
-            known = ", ".join(dict.fromkeys(f"{point.case}: {point.code}, {point.series}" for point in found))
+            known = ", ".join(
+                dict.fromkeys(f"{point.case}: {point.code}, {point.series}" for point in found)
+            )
             raise InputError(f"--only {pattern}: no point has such a name; there are {known}.")
-    return [point for point in found if not patterns or any(matches(pattern, point.name) for pattern in patterns)]
+    return [
+        point
+        for point in found
+        if not patterns or any(matches(pattern, point.name) for pattern in patterns)
+    ]
 
 
 def profile(angle: Array, pressure: Array) -> Array:
-    """Pressure ``(401,)`` at `ANGLES` of one known at the angles ``(n,)``: linear, constant beyond the ends."""
+    """Pressure ``(401,)`` at `ANGLES` of one known at the angles ``(n,)``: linear, constant beyond
+    the ends."""
     order = np.argsort(angle)
     return np.interp(ANGLES, angle[order], pressure[order])
 
@@ -115,7 +147,17 @@ def _archord(scene: Scene, folder: Path) -> Process:
             "factorisations": run.summary["totals"]["factorisations"],
         }
 
-    command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")
+    command = (
+        sys.executable,
+        "-m",
+        "archord",
+        "solve",
+        "input.toml",
+        "-o",
+        "run",
+        "--force",
+        "--quiet",
+    )
     return Process(OURS, command, folder, read)
 
 
@@ -125,11 +167,20 @@ def _calculix(scene: Scene, folder: Path) -> Process:
     def read() -> dict[str, Any]:
         opinion = process.read()
         # neither contact angle nor profile: pressures at the nodes near the edge scatter too much
-        found = {"P": opinion.P, "p0": opinion.p0, "dofs": 2 * len(opinion.mesh.x), "iterations": opinion.iterations}
+        found = {
+            "P": opinion.P,
+            "p0": opinion.p0,
+            "dofs": 2 * len(opinion.mesh.x),
+            "iterations": opinion.iterations,
+        }
         if scene.pin.yield_stress:
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
             found["dissipation"] = scene.pin.yield_stress * opinion.peeq_integral
-        return {name: value for name, value in found.items() if value is not None and math.isfinite(value)}
+        return {
+            name: value
+            for name, value in found.items()
+            if value is not None and math.isfinite(value)
+        }
 
     return replace(process, read=read)
 
@@ -138,7 +189,9 @@ def _calculix_version() -> dict[str, str]:
     """CalculiX and its version, if it is installed."""
     if shutil.which("ccx") is None:
         return {}
-    found = re.search(r"Version (\S+)", subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout)
+    found = re.search(
+        r"Version (\S+)", subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout
+    )
     return {CALCULIX: found[1] if found else ""}
 
 

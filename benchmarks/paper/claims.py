@@ -1,6 +1,7 @@
 """The claims of Hu et al., each with our numbers in both planes and a verdict.
 
-A law "holds" in a plane where it stays within 5 % of ours (15 %: "holds with a limit"); the paper says plane strain.
+A law "holds" in a plane where it stays within 5 % of ours (15 %: "holds with a limit"); the paper
+says plane strain.
 """
 
 from __future__ import annotations
@@ -23,11 +24,15 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.report.table import Table
 
-TEXTS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+TEXTS: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
 GOOD, FAIR = 0.05, 0.15
 _CORNER = 85  # degrees from the contact axis beyond which the block is held
 Tables = dict[str, list[Part]]  # of the figures, by name
-Found = tuple[str, dict[str, float]]  # in a plane: what we find, and how far off is what the claim is about
+Found = tuple[
+    str, dict[str, float]
+]  # in a plane: what we find, and how far off is what the claim is about
 
 
 def grade(deviation: float) -> str:
@@ -42,16 +47,24 @@ def verdict(strain: dict[str, float], stress: dict[str, float]) -> str:
     said = []
     for what in strain:
         grades = grade(strain[what]), grade(stress[what])
-        both = grades[0] if grades[0] == grades[1] else f"{grades[0]} in plane strain, {grades[1]} in plane stress"
+        both = (
+            grades[0]
+            if grades[0] == grades[1]
+            else f"{grades[0]} in plane strain, {grades[1]} in plane stress"
+        )
         said.append(f"{what} {both}".strip())
     return "; ".join(said)
 
 
 def judged(runs: Runs, tables: Tables) -> Table:
     """All claims with what we find and the verdicts."""
-    table = Table("claim", "figure", "the paper", *(f"ours, plane {plane}" for plane in PLANES), "verdict")
+    table = Table(
+        "claim", "figure", "the paper", *(f"ours, plane {plane}" for plane in PLANES), "verdict"
+    )
     for name, claim in TEXTS.items():
-        (strain, off), (stress, off_in_stress) = (CLAIMS[name](runs, tables, plane) for plane in PLANES)
+        (strain, off), (stress, off_in_stress) = (
+            CLAIMS[name](runs, tables, plane) for plane in PLANES
+        )
         table.add(name, claim["figure"], claim["text"], strain, stress, verdict(off, off_in_stress))
     return table
 
@@ -61,7 +74,10 @@ def chord_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     row = columns(tables["fig2"], plane=plane)
     inside = row["x/l"] < 0.95  # the last facets hold the edge of the contact
     outer = row["x/l"][inside] > 0.5
-    off = {name: np.abs(row[name] - row["py/p0"])[inside] for name in ("Persson", "parabola", "ellipse")}
+    off = {
+        name: np.abs(row[name] - row["py/p0"])[inside]
+        for name in ("Persson", "parabola", "ellipse")
+    }
     largest = {name: float(off[name].max()) for name in ("Persson", "parabola")}
     return (
         f"of p0, x/l < 0.95: Persson within {largest['Persson']:.1%}, parabola within {largest['parabola']:.1%}; for "
@@ -91,7 +107,10 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     off = {name: row[name] / row[Y] - 1 for name in ("paper", "johnson", "radzimovsky")}
     at = int(np.argmin(np.abs(row[X] - 0.5)))
     deviation = float(np.abs(off["paper"])[row[X] >= 0.2].max())
-    joint, laws = LawJoint.from_scene(run.scene), [find_law(name) for name in ("johnson", "radzimovsky")]
+    joint, laws = (
+        LawJoint.from_scene(run.scene),
+        [find_law(name) for name in ("johnson", "radzimovsky")],
+    )
     ends = [float(law.force(joint, law.limit(joint))) / (run.E_star * run.dR) for law in laws]
     return (
         f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR and by up to {deviation:.1%} from 0.2 dR on; at 0.5 dR "
@@ -117,8 +136,12 @@ def plastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     pairs = [pair for pair in JOINTS.values() if pair[1] is not None]
     of_pair = [{"plane": plane, "dR/R [%]": dR, "sigY/E* [%]": sigma} for dR, sigma in pairs]
     last = [float(columns(tables["fig7"], **where)["P/P(eq. 12)"][-1]) for where in of_pair]
-    ratios = [f"{value:.3f} ({dR} %, {sigma} %)" for value, (dR, sigma) in zip(last, pairs, strict=True)]
-    return f"P/P(eq. 12) at 2 dR: {', '.join(ratios)}", {"": float(np.abs(1 / np.array(last) - 1).max())}
+    ratios = [
+        f"{value:.3f} ({dR} %, {sigma} %)" for value, (dR, sigma) in zip(last, pairs, strict=True)
+    ]
+    return f"P/P(eq. 12) at 2 dR: {', '.join(ratios)}", {
+        "": float(np.abs(1 / np.array(last) - 1).max())
+    }
 
 
 @dataclass(frozen=True)
@@ -136,21 +159,27 @@ class FirstYield:
 
 
 def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.0) -> FirstYield:
-    """From an elastic run: the cell no deeper than ``near_contact`` R whose von Mises stress reaches ``yield_stress``
-    first.
+    """From an elastic run: the cell no deeper than ``near_contact`` R whose von Mises stress
+    reaches ``yield_stress`` first.
 
-    The stress is the cell's mean, interpolated linearly between the steps. The pressed diameter of the pin and the held
-    corner of the block can yield before the contact does: a depth of less than R leaves them out.
+    The stress is the cell's mean, interpolated linearly between the steps. The pressed diameter of
+    the pin and the held corner of the block can yield before the contact does: a depth of less than
+    R leaves them out.
     """
     assert elastic.folder is not None
     fields = [read_fields(elastic.folder, elastic.scene, k + 1) for k in range(len(elastic.delta))]
     centroid = fields[0].coordinates[fields[0].cells[:, :3]].mean(axis=1)
-    stress, delta = np.array([0 * centroid[:, 0], *(f.von_mises for f in fields)]), np.append(0.0, elastic.delta)
+    stress, delta = (
+        np.array([0 * centroid[:, 0], *(f.von_mises for f in fields)]),
+        np.append(0.0, elastic.delta),
+    )
     above, cell = stress >= yield_stress, np.arange(len(centroid))
     step = np.maximum(above.argmax(axis=0), 1)
     low, high = stress[step - 1, cell], stress[step, cell]
     share = (yield_stress - low) / np.maximum(high - low, 1e-300)
-    when = np.where(above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf)
+    when = np.where(
+        above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf
+    )
     pin = fields[0].body == BODIES["pin"]
     radius = np.linalg.norm(centroid + np.where(pin[:, None], [0.0, elastic.dR], 0.0), axis=1)
     depth = np.where(pin, elastic.R - radius, radius - elastic.R - elastic.dR) / elastic.R
@@ -174,7 +203,9 @@ def force_over_angle(runs: Runs, tables: Tables, plane: Plane) -> Found:
     at_angle = "eq. 9 or 12 at the same angle"
     elastic = columns(tables["fig9"], plane=plane, joint="elastic")
     low, unit = elastic["tan(eps/2)"] < 0.4, np.interp(0.4, elastic["tan(eps/2)"], elastic[Y])
-    law, exact = (np.abs(elastic[name] - elastic[Y])[low].max() / unit for name in (at_angle, "Persson"))
+    law, exact = (
+        np.abs(elastic[name] - elastic[Y])[low].max() / unit for name in (at_angle, "Persson")
+    )
     yielding = columns(tables["fig9"], plane=plane, joint="plastic")
     off = yielding[at_angle] / yielding[Y] - 1
     known = off[np.isfinite(off) & (yielding[X] > 0.5)]

@@ -1,6 +1,8 @@
-"""The paper's figures from our runs: for each a table, written as CSV, and a picture as figures.toml says.
+"""The paper's figures from our runs: for each a table, written as CSV, and a picture as
+figures.toml says.
 
-Hu et al., figures 2 to 5 and 7 to 9 (6 is a sketch). Everything is in the paper's dimensionless groups.
+Hu et al., figures 2 to 5 and 7 to 9 (6 is a sketch). Everything is in the paper's dimensionless
+groups.
 """
 
 from __future__ import annotations
@@ -27,16 +29,29 @@ from archord.report.files import replacing, write_rows
 
 Part = dict[str, Any]  # columns by heading; a number or a text holds for all rows
 X, Y = "delta/dR", "P/(E* dR)"
-STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end
-MARKS: dict[str, Part] = {"strain": {"marker": "o", "ms": 6, "mfc": "none"}, "stress": {"marker": "x", "ms": 4}}
+STAGES = (
+    1.25,
+    1.6,
+    2.0,
+)  # A, B and C in clearances: just after the paper's first yield, and on to its end
+MARKS: dict[str, Part] = {
+    "strain": {"marker": "o", "ms": 6, "mfc": "none"},
+    "stress": {"marker": "x", "ms": 4},
+}
 LINES = ("-", ":", "--", "-.")
-LAYOUTS: dict[str, dict] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+LAYOUTS: dict[str, dict] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
 
 
 def columns(parts: list[Part], **where: object) -> dict[str, Array]:
-    """The columns of the ``parts`` in which these entries have these values, one below the other."""
+    """The columns of the ``parts`` in which these entries have these values, one below the
+    other."""
     chosen = [part for part in parts if where.items() <= scalars(part).items()]
-    return {name: np.concatenate([part[name] for part in chosen]) for name in parts[0].keys() - scalars(parts[0])}
+    return {
+        name: np.concatenate([part[name] for part in chosen])
+        for name in parts[0].keys() - scalars(parts[0])
+    }
 
 
 def scalars(part: Part) -> Part:
@@ -45,13 +60,20 @@ def scalars(part: Part) -> Part:
 
 
 def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
-    """Write ``name``.csv and ``name``.png into ``folder``; returns them. The parts have the same headings."""
+    """Write ``name``.csv and ``name``.png into ``folder``; returns them. The parts have the same
+    headings."""
     table, layout = folder / f"{name}.csv", LAYOUTS[name]
     rows: list[Part] = []
     for part in parts:
         filled = np.broadcast_arrays(*(np.asarray(value, dtype=object) for value in part.values()))
         rows += [dict(zip(part, cells, strict=True)) for cells in zip(*filled, strict=True)]
-    write_rows([{key: f"{v:.10g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows], table)
+    write_rows(
+        [
+            {key: f"{v:.10g}" if isinstance(v, float) else v for key, v in row.items()}
+            for row in rows
+        ],
+        table,
+    )
 
     canvas = new_figure(9, 4.5)
     axes = canvas.subplots()
@@ -86,7 +108,8 @@ def kind_of(part: Part) -> str:
 
 
 def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
-    """P of a law at ``delta`` (those of the run) over the unit E* dR of the run's joint; nan beyond the law's limit."""
+    """P of a law at ``delta`` (those of the run) over the unit E* dR of the run's joint; nan beyond
+    the law's limit."""
     law, joint = find_law(name), LawJoint.from_scene(run.scene)
     delta = run.delta if delta is None else delta
     inside = delta <= law.limit(joint) * (1 + 1e-9)
@@ -107,18 +130,21 @@ def strength(run: RunCurve) -> float:
 
 
 def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
-    """``eps``, ``x/l`` and chord pressure of the hole at ``step``: means of facets, as within plastic ones the pressure
-    scatters, without those beyond the edge."""
+    """``eps``, ``x/l`` and chord pressure of the hole at ``step``: means of facets, as within
+    plastic ones the pressure scatters, without those beyond the edge."""
     assert run.folder is not None
     chord = read_chord_pressure(run.folder, step, "hole")
     points = read_contact(run.folder, run.scene, step)["hole"].angle.shape[1]
     whole = len(chord.x) // points * points
-    weight, x, py = (v[:whole].reshape(-1, points) for v in (chord.weight, chord.x_over_l, chord.py))
+    weight, x, py = (
+        v[:whole].reshape(-1, points) for v in (chord.weight, chord.x_over_l, chord.py)
+    )
     return chord.eps, (weight * x).sum(1) / weight.sum(1), (weight * py).sum(1) / weight.sum(1)
 
 
 def fig2(runs: Runs, plane: Plane) -> list[Part]:
-    """Chord pressure over x/l: ours, Persson's at the same angle, the parabola and Hertz's ellipse."""
+    """Chord pressure over x/l: ours, Persson's at the same angle, the parabola and Hertz's
+    ellipse."""
     run, parts = runs.curve("elastic", plane), []
     for fraction in (2.0, 1.5, 1.0, 0.5):
         k = int(np.argmin(np.abs(run.delta / run.dR - fraction)))
@@ -128,7 +154,16 @@ def fig2(runs: Runs, plane: Plane) -> list[Part]:
         pressure = persson_pressure(LawJoint.from_scene(run.scene), run.P[k], np.array(eps), phi)
         shape = np.where(x < 1, 1 - x**2, 0.0)
         ratios = {"py/p0": py / run.p0[k], "Persson": pressure * np.cos(phi) / stretch / run.p0[k]}
-        parts.append({"plane": plane, X: fraction, "x/l": x, **ratios, "parabola": shape, "ellipse": shape**0.5})
+        parts.append(
+            {
+                "plane": plane,
+                X: fraction,
+                "x/l": x,
+                **ratios,
+                "parabola": shape,
+                "ellipse": shape**0.5,
+            }
+        )
     return parts
 
 
@@ -139,12 +174,17 @@ def fig3(runs: Runs, plane: Plane) -> list[Part]:
     johnson = hertz(joint, law_force("johnson", run) * unit).peak_pressure / unit
     ours = run.p0 * run.R / unit
     winkler = find_law("paper").at_displacement(joint, run.delta).peak_pressure / unit
-    laws = {"Winkler, k = 0.85": winkler, "Johnson": johnson, "p0 R/(E* delta)": ours * run.dR / run.delta}
+    laws = {
+        "Winkler, k = 0.85": winkler,
+        "Johnson": johnson,
+        "p0 R/(E* delta)": ours * run.dR / run.delta,
+    }
     return [{"plane": plane, X: run.delta / run.dR, "p0 R/(E* dR)": ours, **laws}]
 
 
 def fig4(runs: Runs, plane: Plane) -> list[Part]:
-    """Force over delta: ours, eq. 9, Johnson and Radzimovsky as printed and with the limit that the paper states."""
+    """Force over delta: ours, eq. 9, Johnson and Radzimovsky as printed and with the limit that the
+    paper states."""
     run = runs.curve("elastic", plane)
     return [curve(run) | {name: law_force(name, run) for name in LAYOUTS["fig4"]["laws"]}]
 
@@ -153,9 +193,14 @@ def fig5(runs: Runs, plane: Plane) -> list[Part]:
     """Pressure over the yield stress along arc and chord at 2 dR."""
     run = runs.curve(FULL_YIELD, plane)
     eps, x, py = chord_profile(run, len(run.delta))
-    angle, pressure = (v[: len(x)] for v in runs.run(FULL_YIELD, plane).arc(side="hole").facet_means())
+    angle, pressure = (
+        v[: len(x)] for v in runs.run(FULL_YIELD, plane).arc(side="hole").facet_means()
+    )
     sides = ("arc", angle / eps, pressure), ("chord", x, py)
-    return [{"plane": plane, "on": side, "phi/eps or x/l": at, "p/sigY": p / strength(run)} for side, at, p in sides]
+    return [
+        {"plane": plane, "on": side, "phi/eps or x/l": at, "p/sigY": p / strength(run)}
+        for side, at, p in sides
+    ]
 
 
 def fig5b(runs: Runs, plane: Plane) -> list[Part]:
@@ -171,7 +216,11 @@ def fig7(runs: Runs, plane: Plane) -> list[Part]:
     for joint in LAYOUTS["fig7"]["joints"]:
         run = runs.curve(joint, plane)
         unit, law = run.R * strength(run), law_force("paper-plastic", run) * run.E_star * run.dR
-        named: Part = {"dR/R [%]": JOINTS[joint][0], "sigY/E* [%]": JOINTS[joint][1], "plane": plane}
+        named: Part = {
+            "dR/R [%]": JOINTS[joint][0],
+            "sigY/E* [%]": JOINTS[joint][1],
+            "plane": plane,
+        }
         forces = {"P/(R sigY)": run.P / unit, "eq. 12": law / unit, "P/P(eq. 12)": run.P / law}
         parts.append(named | {X: run.delta / run.dR} | forces)
     return parts
@@ -187,7 +236,10 @@ def fig8(runs: Runs, plane: Plane) -> list[Part]:
 def fig9(runs: Runs, plane: Plane) -> list[Part]:
     """Force over the contact angle: ours, Persson, eqs 9 and 12 with eq. 5 for the angle."""
     parts = []
-    for kind, joint, name in (("elastic", "elastic", "paper"), ("plastic", FULL_YIELD, "paper-plastic")):
+    for kind, joint, name in (
+        ("elastic", "elastic", "paper"),
+        ("plastic", FULL_YIELD, "paper-plastic"),
+    ):
         run = runs.curve(joint, plane)
         persson = persson_load(LawJoint.from_scene(run.scene), run.eps) / (run.E_star * run.dR)
         delta = run.dR * (1 / np.cos(np.minimum(run.eps, 1.5)) - 1)  # eq. 5
@@ -196,17 +248,29 @@ def fig9(runs: Runs, plane: Plane) -> list[Part]:
     return parts
 
 
-_MAKERS: tuple[Callable[[Runs, Plane], list[Part]], ...] = (fig2, fig3, fig4, fig5, fig5b, fig7, fig8, fig9)
+_MAKERS: tuple[Callable[[Runs, Plane], list[Part]], ...] = (
+    fig2,
+    fig3,
+    fig4,
+    fig5,
+    fig5b,
+    fig7,
+    fig8,
+    fig9,
+)
 FIGURES = dict(zip(LAYOUTS, _MAKERS, strict=True))
 
 
 def draw_zones(runs: Runs, file: Path) -> Path:
-    """Draw figure 8's plastic zones at the stages A, B, C, in plane strain above and in plane stress below."""
+    """Draw figure 8's plastic zones at the stages A, B, C, in plane strain above and in plane
+    stress below."""
     figure = new_figure(15, 9.5)
     for plane, row in zip(PLANES, figure.subplots(len(PLANES), len(STAGES)), strict=True):
         run = runs.run(MILD_YIELD, plane)
         for stage, axes in zip(STAGES, row, strict=True):
-            field_panel(axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1)
+            field_panel(
+                axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1
+            )
             axes.set_title(f"plane {plane}, {axes.get_title()}", fontsize="medium")
     with replacing(file) as new:
         save(figure, new)

@@ -1,4 +1,5 @@
-"""The paper's figures and the judgement of its claims, from runs that are solved where they are missing."""
+"""The paper's figures and the judgement of its claims, from runs that are solved where they are
+missing."""
 
 from __future__ import annotations
 
@@ -19,21 +20,29 @@ from archord.scene.errors import InputError
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """The figures that ``names`` (or "all") ask for, in order. Raises `InputError` for an unknown one."""
+    """The figures that ``names`` (or "all") ask for, in order. Raises `InputError` for an unknown
+    one."""
     for name in names:
         if name not in (*FIGURES, "all"):
-            raise InputError(f"{name}: is not a figure of the paper; figures are {', '.join(FIGURES)}, all.")
+            raise InputError(
+                f"{name}: is not a figure of the paper; figures are {', '.join(FIGURES)}, all."
+            )
     return [name for name in FIGURES if name in names or "all" in names]
 
 
 def reproduce(
-    names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None], strain: str = "small"
+    names: Sequence[str],
+    folder: Path,
+    comm: MPI.Comm,
+    said: Callable[[str], None],
+    strain: str = "small",
 ) -> list[Path]:
-    """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and pictures.
+    """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and
+    pictures.
 
-    With all figures also ``report.md``. All runs are of small or large ``strain``. ``said(sentence)`` follows each.
-    Returns the files, on rank 0. Raises `InputError` for unknown figures and a folder that cannot be written, and
-    RuntimeError if a run failed. Collective.
+    With all figures also ``report.md``. All runs are of small or large ``strain``.
+    ``said(sentence)`` follows each. Returns the files, on rank 0. Raises `InputError` for unknown
+    figures and a folder that cannot be written, and RuntimeError if a run failed. Collective.
     """
     wanted = chosen(names)
     agreed(comm, lambda: claim_folder(folder, force=True))
@@ -43,7 +52,9 @@ def reproduce(
         raise RuntimeError("; ".join(complaints))
     if comm.rank != 0:
         return []
-    tables = {name: [part for plane in PLANES for part in FIGURES[name](runs, plane)] for name in wanted}
+    tables = {
+        name: [part for plane in PLANES for part in FIGURES[name](runs, plane)] for name in wanted
+    }
     files = [file for name in wanted for file in write(tables[name], folder, name)]
     if "fig8" in wanted:
         files.append(draw_zones(runs, folder / "fig8_zones.png"))
@@ -51,7 +62,9 @@ def reproduce(
         pictures = [file.name for file in files if file.suffix == ".png"]
         files.append(folder / "report.md")
         with replacing(files[-1]) as new:
-            new.write_text(report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8")
+            new.write_text(
+                report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8"
+            )
     return files
 
 

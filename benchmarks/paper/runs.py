@@ -1,7 +1,9 @@
-"""The runs behind the paper's figures: joints, planes and meshes; what is solved already is not solved again.
+"""The runs behind the paper's figures: joints, planes and meshes; what is solved already is not
+solved again.
 
-Hu et al. give neither Poisson's ratio nor the ratio of the moduli: like bodies with nu = 0.3 are taken. The text names
-(dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and the ranges of figure 7, within which we chose the other pairs.
+Hu et al. give neither Poisson's ratio nor the ratio of the moduli: like bodies with nu = 0.3 are
+taken. The text names (dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and the ranges of figure
+7, within which we chose the other pairs.
 """
 
 from __future__ import annotations
@@ -56,7 +58,12 @@ def cases(joints: Iterable[str], strain: str = "small") -> list[Case]:
     """All planes and meshes of ``joints``, the longest runs first."""
     asked = set(joints)
     wanted = [joint for joint in JOINTS if joint in asked]
-    return [case(joint, plane, mesh, strain) for mesh in ("fine", "coarse") for joint in wanted for plane in PLANES]
+    return [
+        case(joint, plane, mesh, strain)
+        for mesh in ("fine", "coarse")
+        for joint in wanted
+        for plane in PLANES
+    ]
 
 
 @dataclass(frozen=True)
@@ -75,9 +82,11 @@ class Runs:
         return self.run(joint, plane, mesh).curve
 
 
-def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[str]:
-    """Solve the cases that are not done yet into ``folder``, each on one rank, which says so, the ranks side by side.
-    Returns the complaints of all that failed. Collective."""
+def solve_missing(
+    wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[str], None]
+) -> list[str]:
+    """Solve the cases that are not done yet into ``folder``, each on one rank, which says so, the
+    ranks side by side. Returns the complaints of all that failed. Collective."""
 
     def complaint(number: int) -> str:
         try:
@@ -87,5 +96,7 @@ def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callab
             return str(error).rstrip(".")
         return ""
 
-    missing = agreed(comm, lambda: [number for number, case in enumerate(wanted) if not case.is_done(folder)])
+    missing = agreed(
+        comm, lambda: [number for number, case in enumerate(wanted) if not case.is_done(folder)]
+    )
     return [text for text in side_by_side(comm, missing, complaint) if text]

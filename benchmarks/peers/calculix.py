@@ -1,8 +1,8 @@
 """A second opinion: CalculiX on the deck of a scene, and what its result files say.
 
-As a program, ``python3 -m archord.benchmarks.peers.calculix SCENE [SECTION.KEY=VALUE ...]``, it solves a scene, with
-these keys changed, by archord and by CalculiX on the same mesh, whole processes with one thread each, and prints their
-last forces, their stresses at nodes and times.
+As a program, ``python3 -m archord.benchmarks.peers.calculix SCENE [SECTION.KEY=VALUE ...]``, it
+solves a scene, with these keys changed, by archord and by CalculiX on the same mesh, whole
+processes with one thread each, and prints their last forces, their stresses at nodes and times.
 """
 
 from __future__ import annotations
@@ -33,14 +33,16 @@ _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
 _LONG = 3600.0  # seconds
 
-Printed = list[tuple[str, str, float, Array]]  # tables of a ``.dat`` file: quantity, set, time, rows ``(n, columns)``
+Printed = list[
+    tuple[str, str, float, Array]
+]  # tables of a ``.dat`` file: quantity, set, time, rows ``(n, columns)``
 
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """CalculiX's results on ``mesh``: the ``forces`` ``(steps,)`` on drives by name; at the last step the ``stress``
-    ``(n, 4)`` at the nodes (xx, yy, zz, xy), the pressure on the axis of a joint and the integral of PEEQ over the
-    whole; iterations of all steps."""
+    """CalculiX's results on ``mesh``: the ``forces`` ``(steps,)`` on drives by name; at the last
+    step the ``stress`` ``(n, 4)`` at the nodes (xx, yy, zz, xy), the pressure on the axis of a
+    joint and the integral of PEEQ over the whole; iterations of all steps."""
 
     mesh: DeckMesh
     forces: dict[str, Array]
@@ -56,24 +58,35 @@ class SecondOpinion:
 
 
 def process(scene: AnyScene, folder: Path) -> Process:
-    """CalculiX on the deck of ``scene``, which is written into ``folder``; its result is a `SecondOpinion`."""
+    """CalculiX on the deck of ``scene``, which is written into ``folder``; its result is a
+    `SecondOpinion`."""
     system = system_of(scene)
     mesh = deck_mesh(system)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.inp").write_text(deck(system, mesh, scene.targets), encoding="utf-8")
     old = tuple(f"deck.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
-    return Process("CalculiX", ("ccx", "deck"), folder, lambda: read_opinion(scene, system, mesh, folder), clear=old)
+    return Process(
+        "CalculiX",
+        ("ccx", "deck"),
+        folder,
+        lambda: read_opinion(scene, system, mesh, folder),
+        clear=old,
+    )
 
 
 def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) -> SecondOpinion:
     """CalculiX's results in ``folder``. Raises `Failure` if it did not reach the last step."""
-    printed = read_printed((folder / "deck.dat").read_text()) if (folder / "deck.dat").exists() else []
+    printed = (
+        read_printed((folder / "deck.dat").read_text()) if (folder / "deck.dat").exists() else []
+    )
     forces = drive_forces(system, mesh, printed)
     reached = min(map(len, forces.values()))
     if reached != len(scene.targets):
         said = (folder / "stdout.txt").read_text(errors="replace").splitlines()
         errors = [line.strip() for line in said if "*ERROR" in line]
-        raise Failure("; ".join([f"CalculiX ended after step {reached} of {len(scene.targets)}", *errors]))
+        raise Failure(
+            "; ".join([f"CalculiX ended after step {reached} of {len(scene.targets)}", *errors])
+        )
     text, p0 = (folder / "deck.frd").read_text(), None
     if isinstance(scene, Scene):
         arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
@@ -88,19 +101,25 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
         read_nodal(text, "STRESS", mesh)[:, :4],
         p0,
         peeq_integral(printed, mesh) * system.problem.symmetry,
-        sum(int(row[3]) for row in increments if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
+        sum(
+            int(row[3])
+            for row in increments
+            if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()
+        ),
     )
 
 
 def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, Array]:
-    """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step; nan where the
-    nodes of a set do not move alike."""
+    """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step;
+    nan where the nodes of a set do not move alike."""
     share = system.problem.symmetry / thickness(system.problem, mesh)
     forces: dict[str, Array] = {}
     for m in moved_sets(system, mesh):
         for drive, rate in m.rates.items():
             factor = share * rate[0] if m.whole and np.ptp(rate) == 0 else math.nan
-            forces[drive] = factor * step_forces(printed, label(m.node_set))[:, m.axis] + forces.get(drive, 0.0)
+            forces[drive] = factor * step_forces(printed, label(m.node_set))[
+                :, m.axis
+            ] + forces.get(drive, 0.0)
     return forces
 
 
@@ -117,8 +136,8 @@ def read_printed(text: str) -> Printed:
 
 
 def step_forces(printed: Printed, nodes: str) -> Array:
-    """Forces ``(steps, 3)`` on the set ``nodes`` at the end of each step, which lasts one unit of time. CalculiX prints
-    increments too, and sometimes the end of a step twice: the last counts."""
+    """Forces ``(steps, 3)`` on the set ``nodes`` at the end of each step, which lasts one unit of
+    time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts."""
     forces = {}
     for quantity, name, time, rows in printed:
         if (quantity, name) == ("total force", nodes) and abs(time - round(time)) < 1e-4:
@@ -127,9 +146,12 @@ def step_forces(printed: Printed, nodes: str) -> Array:
 
 
 def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
-    """The integral of PEEQ over the deck's model at the last time printed: means of the elements times their areas, as
-    the points of a triangle have equal weights where its edges are straight."""
-    latest = {name: rows for quantity, name, _, rows in printed if quantity == "equivalent plastic strain"}
+    """The integral of PEEQ over the deck's model at the last time printed: means of the elements
+    times their areas, as the points of a triangle have equal weights where its edges are
+    straight."""
+    latest = {
+        name: rows for quantity, name, _, rows in printed if quantity == "equivalent plastic strain"
+    }
     rows = np.concatenate([np.zeros((0, 3)), *latest.values()])
     area = np.concatenate([areas(mesh.x[nodes]) for nodes in mesh.elements.values()])
     element = rows[:, 0].astype(int) - 1
@@ -139,8 +161,8 @@ def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
 
 
 def areas(x: Array) -> Array:
-    """Areas ``(m,)`` of elements by their nodes ``(m, 6 or 8, 2)``, counting curved edges' parabolic segments; positive
-    if counterclockwise."""
+    """Areas ``(m,)`` of elements by their nodes ``(m, 6 or 8, 2)``, counting curved edges'
+    parabolic segments; positive if counterclockwise."""
     n = x.shape[1] // 2
     around = x.reshape(len(x), 2, n, 2).swapaxes(1, 2).reshape(x.shape)
     edges = (np.stack([p, np.roll(p, -1, axis=1)], axis=-1) for p in (x[:, :n], around))
@@ -149,8 +171,9 @@ def areas(x: Array) -> Array:
 
 
 def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
-    """Values ``(n, 6)`` at the nodes of ``mesh``, from the last ``block`` of the ``.frd`` file ``text``: "CONTACT" (the
-    fourth is the pressure), "STRESS" (xx, yy, zz, xy, yz, zx); zero elsewhere.
+    """Values ``(n, 6)`` at the nodes of ``mesh``, from the last ``block`` of the ``.frd`` file
+    ``text``: "CONTACT" (the fourth is the pressure), "STRESS" (xx, yy, zz, xy, yz, zx); zero
+    elsewhere.
 
     Columns 4 to 13 of a record are the node, from 14 on twelve to a component.
     """
@@ -162,15 +185,32 @@ def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
 
 
 def compare(scene: Path, overrides: Sequence[str], folder: Path) -> Table:
-    """archord and CalculiX on ``scene`` with ``overrides``, in ``folder``: forces, the largest von Mises stress at a
-    node of every body, the difference of its stresses (root of the mean square over nodes, over that of archord's), and
-    seconds. Raises `InputError` and `Failure`."""
+    """archord and CalculiX on ``scene`` with ``overrides``, in ``folder``: forces, the largest von
+    Mises stress at a node of every body, the difference of its stresses (root of the mean square
+    over nodes, over that of archord's), and seconds. Raises `InputError` and `Failure`."""
     overrides = ["output.fields=nodes", *overrides]
     changes = [word for override in overrides for word in ("--set", override)]
-    command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), *changes, "-o", "run", "--force", "-q")
+    command = (
+        sys.executable,
+        "-m",
+        "archord",
+        "solve",
+        str(scene.resolve()),
+        *changes,
+        "-o",
+        "run",
+        "--force",
+        "-q",
+    )
     ours = run_once(Process("archord", command, folder, lambda: Run(folder / "run")))
-    theirs = run_once(replace(process(load_scene(scene, overrides), folder / "calculix"), limit=_LONG))
-    table, run, opinion = Table("", "archord", "CalculiX", "difference", left=1), ours.result, theirs.result
+    theirs = run_once(
+        replace(process(load_scene(scene, overrides), folder / "calculix"), limit=_LONG)
+    )
+    table, run, opinion = (
+        Table("", "archord", "CalculiX", "difference", left=1),
+        ours.result,
+        theirs.result,
+    )
 
     def add(what: str, one: float, other: float) -> None:
         table.add(what, f"{one:.6g}", f"{other:.6g}", f"{other / one - 1:+.2%}")
@@ -179,13 +219,20 @@ def compare(scene: Path, overrides: Sequence[str], folder: Path) -> Table:
         add(f"{load} force".strip(), run.columns[f"{load} force" if load else "P"][-1], forces[-1])
     fields = run.fields()
     for body, tag in run.bodies.items():
-        own, nodes = np.flatnonzero(fields.body_of_node == tag), np.unique(opinion.mesh.elements[body])
+        own, nodes = (
+            np.flatnonzero(fields.body_of_node == tag),
+            np.unique(opinion.mesh.elements[body]),
+        )
         own = own[KDTree(fields.coordinates[own]).query(opinion.mesh.x[nodes])[1]]
         one, other = fields.stress[own], opinion.stress[nodes]
         add(f"{body}: largest von Mises stress", von_mises(one).max(), von_mises(other).max())
-        table.add(f"{body}: stresses", "", "", f"{np.linalg.norm(other - one) / np.linalg.norm(one):.2%}")
+        table.add(
+            f"{body}: stresses", "", "", f"{np.linalg.norm(other - one) / np.linalg.norm(one):.2%}"
+        )
     seconds = ours.seconds, theirs.seconds
-    table.add("seconds", *(f"{taken:.1f}" for taken in seconds), f"times {seconds[1] / seconds[0]:.1f}")
+    table.add(
+        "seconds", *(f"{taken:.1f}" for taken in seconds), f"times {seconds[1] / seconds[0]:.1f}"
+    )
     return table
 
 

@@ -1,11 +1,14 @@
-"""The paper's quarter joint by GetFEM: ``python3 getfem_joint.py --case plastic --steps 20 --output r.json``.
+"""The paper's quarter joint by GetFEM: ``python3 getfem_joint.py --case plastic --steps 20 --output
+r.json``.
 
 Needs Debian's python3-getfem and python3-gmsh, and nothing of archord but `joint_script` beside it.
 
 - Bodies: curved second-order triangles (gmsh's, nodes on the circles), P2 displacements.
-- Contact: kinematics "current", GetFEM's integral large sliding contact brick with raytracing from the pin's deformed
+- Contact: kinematics "current", GetFEM's integral large sliding contact brick with raytracing from
+the pin's deformed
   arc: augmented Lagrangian, P1 multipliers there, augmentation E*/h (Poulios and Renard 2015).
-- Plasticity: GetFEM's brick "plane strain Prandtl Reuss" (J2, perfect, backward Euler, return mapping).
+- Plasticity: GetFEM's brick "plane strain Prandtl Reuss" (J2, perfect, backward Euler, return
+mapping).
 - GetFEM's Newton solver with its sequential MUMPS.
 """
 
@@ -16,7 +19,18 @@ from pathlib import Path
 
 import getfem as gf
 import numpy as np
-from joint_script import BLOCK, DR, ITERATIONS, LAME, MU, PIN, SIGY, axis_pressure, main, mesh_bodies
+from joint_script import (
+    BLOCK,
+    DR,
+    ITERATIONS,
+    LAME,
+    MU,
+    PIN,
+    SIGY,
+    axis_pressure,
+    main,
+    mesh_bodies,
+)
 
 ARC, LOADED, AXIS = 1, 2, 3  # regions; LOADED is the pin's top and the block's held edge
 
@@ -44,7 +58,9 @@ class Joint:
         self.kept: list = []  # a model does not keep what it consists of alive
         for name, value in (("lambda", LAME), ("mu", MU), ("sigY", 1e9), ("r", 1 / size)):
             md.add_initialized_data(name, [value])
-        meshes = {name: mesh_body(body, size, growth) for name, body in (("pin", PIN), ("block", BLOCK))}
+        meshes = {
+            name: mesh_body(body, size, growth) for name, body in (("pin", PIN), ("block", BLOCK))
+        }
         for name, mesh in meshes.items():
             u, mf, mim = f"u_{name}", self._space(mesh, 2), self._points(mesh, 2)
             md.add_fem_variable(u, mf)
@@ -64,10 +80,15 @@ class Joint:
         md.add_Dirichlet_condition_with_simplification("u_block", LOADED)
         self._hold(meshes["pin"], "pin", "top", LOADED)
 
-        self.arc, self.multipliers = self._points(meshes["pin"], 6), self._space(meshes["pin"], 2, degree=1)
+        self.arc, self.multipliers = (
+            self._points(meshes["pin"], 6),
+            self._space(meshes["pin"], 2, degree=1),
+        )
         md.add_filtered_fem_variable("pressure", self.multipliers, ARC)
         contact = md.add_integral_large_sliding_contact_brick_raytracing("r", 20 * DR)
-        md.add_slave_contact_boundary_to_large_sliding_contact_brick(contact, self.arc, ARC, "u_pin", "pressure")
+        md.add_slave_contact_boundary_to_large_sliding_contact_brick(
+            contact, self.arc, ARC, "u_pin", "pressure"
+        )
         hole = self._points(meshes["block"], 6)
         md.add_master_contact_boundary_to_large_sliding_contact_brick(contact, hole, ARC, "u_block")
         self.dofs, self.zero = md.nbdof(), md.from_variables()
@@ -87,14 +108,19 @@ class Joint:
         self.md.add_filtered_fem_variable(force, self._space(mesh, 1), region)
         self.md.add_initialized_data(value, [0.0])
         points = self._points(mesh, 4)
-        self.md.add_normal_Dirichlet_condition_with_multipliers(points, f"u_{name}", force, region, value)
+        self.md.add_normal_Dirichlet_condition_with_multipliers(
+            points, f"u_{name}", force, region, value
+        )
 
     def elastic(self, delta: float):
         """The state at ``delta`` of bodies that do not yield; from then on they do."""
-        # Not quite rigid: the tangent of the plasticity brick is undefined where there is no deviatoric strain.
+        # Not quite rigid: the tangent of the plasticity brick is undefined where there is no
+        # deviatoric strain.
         for name, shift in (("u_pin", -1.0), ("u_block", 0.0)):
             y = self.md.mesh_fem_of_variable(name).basic_dof_nodes()[1]
-            self.md.set_variable(name, delta * np.where(np.arange(len(y)) % 2, shift + 1e-6 * y, 0.0))
+            self.md.set_variable(
+                name, delta * np.where(np.arange(len(y)) % 2, shift + 1e-6 * y, 0.0)
+            )
         found = self.solve(self.md.from_variables(), delta)[0]
         self.md.set_variable("sigY", [SIGY])
         return found
@@ -118,7 +144,9 @@ class Joint:
     def results(self) -> dict[str, float | None]:
         """Force of the whole joint, and pressure on the axis from the multipliers."""
         force = 2 * gf.asm("generic", self.arc, 0, "pressure(2)", ARC, self.md)
-        x, y = self.multipliers.basic_dof_nodes()[:, self.multipliers.basic_dof_on_region(ARC)][:, ::2]
+        x, y = self.multipliers.basic_dof_nodes()[:, self.multipliers.basic_dof_on_region(ARC)][
+            :, ::2
+        ]
         pressure = np.hypot(*self.md.variable("pressure").reshape(-1, 2).T)
         return {"P": float(force), "p0": axis_pressure(np.arctan2(x, -y - DR), pressure)}
 
@@ -126,5 +154,7 @@ class Joint:
 if __name__ == "__main__":
     gf.util_trace_level(0)
     gf.util_warning_level(0)
-    version = re.search(r"libgetfem\.so\.(\S+)", Path("/proc/self/maps").read_text())  # the Python package has none
+    version = re.search(
+        r"libgetfem\.so\.(\S+)", Path("/proc/self/maps").read_text()
+    )  # the Python package has none
     main(Joint, "current", version[1] if version else "unknown")

@@ -1,7 +1,9 @@
-"""The codes beside archord that are here: ``python3 -m archord.benchmarks.peers.installed`` lists them.
+"""The codes beside archord that are here: ``python3 -m archord.benchmarks.peers.installed`` lists
+them.
 
-A peer is one standalone script of this folder. Those of PyPI (requirements.txt) have a virtual environment of their
-own, ``.cache/peers-venv`` in the checkout, so that their numpy and archord's do not meet (docs/peers.md).
+A peer is one standalone script of this folder. Those of PyPI (requirements.txt) have a virtual
+environment of their own, ``.cache/peers-venv`` in the checkout, so that their numpy and archord's
+do not meet (docs/peers.md).
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ _LIMIT = 120.0  # seconds; the first import from a cold disk is slow
 
 @dataclass(frozen=True)
 class Peer:
-    """A code beside archord, and the interpreter ``python`` that has it. ``series`` has (element size over R, order)
-    from coarse to fine for each case; one run may take ``time_limit`` seconds."""
+    """A code beside archord, and the interpreter ``python`` that has it. ``series`` has (element
+    size over R, order) from coarse to fine for each case; one run may take ``time_limit``
+    seconds."""
 
     label: str
     script: str
@@ -31,7 +34,13 @@ class Peer:
 
     def command(self, case: str, size: float, order: int, steps: int, output: Path) -> list[str]:
         """The command line that solves ``case`` and writes its result, JSON, to ``output``."""
-        options = {"--case": case, "--size": size, "--order": order, "--steps": steps, "--output": output}
+        options = {
+            "--case": case,
+            "--size": size,
+            "--order": order,
+            "--steps": steps,
+            "--output": output,
+        }
         return self._started(*(str(word) for option in options.items() for word in option))
 
     def _started(self, *words: str) -> list[str]:
@@ -41,7 +50,9 @@ class Peer:
         """The version of the code, None if it is not here."""
         with suppress(OSError, subprocess.SubprocessError):
             command = self._started("--probe")
-            return subprocess.run(command, capture_output=True, check=True, text=True, timeout=_LIMIT).stdout.strip()
+            return subprocess.run(
+                command, capture_output=True, check=True, text=True, timeout=_LIMIT
+            ).stdout.strip()
         return None
 
 
@@ -51,13 +62,19 @@ PEERS = (
     Peer("scikit-fem", "skfem_joint.py", {"elastic": (*_COARSE, (0.01, 2)), "plastic": _COARSE}),
     # of the image target peers
     Peer("GetFEM", "getfem_joint.py", {"elastic": _COARSE, "plastic": _COARSE}, sys.executable),
-    Peer("NGSolve", "ngsolve_joint.py", {"elastic": _COARSE[1:] + _HIGH, "plastic": _COARSE[1:] + _HIGH[:3]}),
+    Peer(
+        "NGSolve",
+        "ngsolve_joint.py",
+        {"elastic": _COARSE[1:] + _HIGH, "plastic": _COARSE[1:] + _HIGH[:3]},
+    ),
 )
 
 
 def installed() -> list[Peer]:
     """The peers that run here, each with its version."""
-    return [replace(peer, version=version) for peer in PEERS if (version := peer.probe()) is not None]
+    return [
+        replace(peer, version=version) for peer in PEERS if (version := peer.probe()) is not None
+    ]
 
 
 if __name__ == "__main__":

@@ -1,13 +1,18 @@
-"""What the scripts ``*_joint.py`` share: the paper's quarter joint, its mesh by gmsh, the load path, the command line.
+"""What the scripts ``*_joint.py`` share: the paper's quarter joint, its mesh by gmsh, the load
+path, the command line.
 
-Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity. Elements have the size h on the arcs and grow
-by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. A step without equilibrium is cut.
+Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity. Elements have the size h
+on the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. A step
+without equilibrium is cut.
 
-Each has a class ``Joint(size, growth, order, plastic)``: half of the joint below the pin's diameter, discretised, with
-``dofs``, the unloaded state ``zero`` (a state holds all displacements, and can be added and multiplied by numbers) and
+Each has a class ``Joint(size, growth, order, plastic)``: half of the joint below the pin's
+diameter, discretised, with ``dofs``, the unloaded state ``zero`` (a state holds all displacements,
+and can be added and multiplied by numbers) and
 
-- ``elastic(delta)``: the state with the pin's top at ``-delta`` of bodies that do not yield; from then on they do,
-- ``solve(guess, delta)``: state and iterations from a state with its prescribed displacements, or RuntimeError,
+- ``elastic(delta)``: the state with the pin's top at ``-delta`` of bodies that do not yield; from
+then on they do,
+- ``solve(guess, delta)``: state and iterations from a state with its prescribed displacements, or
+RuntimeError,
 - ``commit()``: take over the plastic strain of the state that was solved last,
 - ``results()``: P of the whole joint in that state and, where the code tells, p0.
 """
@@ -31,8 +36,9 @@ PIN, BLOCK = (-DR, R), (0.0, R + DR)  # height of the centre, and radius
 
 
 def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
-    """Second-order triangles of `PIN`, `BLOCK` or both, nodes on the circles: nodes ``(n, 2)`` and elements ``(m, 6)``,
-    corners before midpoints. Elements have ``size`` on the arcs and grow by ``growth`` times the distance from there.
+    """Second-order triangles of `PIN`, `BLOCK` or both, nodes on the circles: nodes ``(n, 2)`` and
+    elements ``(m, 6)``, corners before midpoints. Elements have ``size`` on the arcs and grow by
+    ``growth`` times the distance from there.
     """
     import gmsh
 
@@ -48,7 +54,9 @@ def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
         geo.mesh.setTransfiniteCurve(arc, round(np.pi / 2 / size) + 1)
     geo.synchronize()
     field = gmsh.model.mesh.field.add("MathEval")
-    gmsh.model.mesh.field.setString(field, "F", f"{size} + {growth} * Abs(Sqrt(x*x + y*y) - {R + DR})")
+    gmsh.model.mesh.field.setString(
+        field, "F", f"{size} + {growth} * Abs(Sqrt(x*x + y*y) - {R + DR})"
+    )
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
     for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
         gmsh.option.setNumber(f"Mesh.{option}", 0)
@@ -69,7 +77,8 @@ def axis_pressure(angle, pressure) -> float | None:
 
 
 def newton(error, improve) -> int:
-    """Full steps ``improve()`` until ``error()``, the residual over the reaction, is small; returns their number."""
+    """Full steps ``improve()`` until ``error()``, the residual over the reaction, is small; returns
+    their number."""
     for iteration in range(ITERATIONS):
         residual = error()
         if iteration and residual < TOLERANCE:
@@ -108,9 +117,13 @@ def main(joint, kinematics: str, version: str, orders: tuple[int, ...] = (2,)) -
     parser.add_argument("--order", type=int, choices=orders, default=2)
     parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
     parser.add_argument("--output", type=Path, default=Path("result.json"))
-    parser.add_argument("--probe", action="version", version=version, help="print the code's version")
+    parser.add_argument(
+        "--probe", action="version", version=version, help="print the code's version"
+    )
     options = parser.parse_args()
-    made = joint(options.size, min(0.25, 6.25 * options.size), options.order, options.case == "plastic")
+    made = joint(
+        options.size, min(0.25, 6.25 * options.size), options.order, options.case == "plastic"
+    )
     result = {"kinematics": kinematics, "dofs": made.dofs, "failed": None}
     try:
         result |= {"iterations": load(made, options.steps, 2 * DR)} | made.results()

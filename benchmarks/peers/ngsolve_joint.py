@@ -1,14 +1,18 @@
-"""The paper's quarter joint by NGSolve: ``python3 ngsolve_joint.py --case elastic --order 4 --output r.json``.
+"""The paper's quarter joint by NGSolve: ``python3 ngsolve_joint.py --case elastic --order 4
+--output r.json``.
 
 Needs NGSolve (of PyPI) and nothing of archord but `joint_script` beside it.
 
-- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4). With Netgen's grading large P2 elements
+- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4). With Netgen's
+grading large P2 elements
   are coarser than gmsh's and four times as wrong: 0.6 of it makes about as many.
-- Contact: kinematics "reference", NGSolve's ContactBoundary paired once, in the touching configuration: a linear gap
+- Contact: kinematics "reference", NGSolve's ContactBoundary paired once, in the touching
+configuration: a linear gap
   along the pin's normal, and the energy k/2 <-g>^2 with k = 1e5 E*/R (penalty).
-- Plasticity: J2, perfect, backward Euler. A step minimises the incremental energy, which for the elastic trial
-  deviator e is mu |e|^2 up to |e| = r/(2 mu), r = sqrt(2/3) sigY, and r |e| - r^2/(4 mu) beyond (the radial return;
-  Simo and Hughes 1998, box 3.2, integrated); NGSolve differentiates it.
+- Plasticity: J2, perfect, backward Euler. A step minimises the incremental energy, which for the
+elastic trial
+  deviator e is mu |e|^2 up to |e| = r/(2 mu), r = sqrt(2/3) sigY, and r |e| - r^2/(4 mu) beyond
+  (the radial return; Simo and Hughes 1998, box 3.2, integrated); NGSolve differentiates it.
 - Newton's method with inner unknowns condensed, NGSolve's sparse Cholesky.
 """
 
@@ -40,7 +44,9 @@ def mesh_joint(size: float, growth: float, order: int):
     block = body("block", BLOCK, (WIDTH, 0, "top"), (WIDTH, -WIDTH, ""), (0, -WIDTH, ""))
     geometry = occ.OCCGeometry(occ.Compound([pin, block]), dim=2)
     grading = growth if order > 2 else 0.6 * growth
-    mesh = ng.Mesh(geometry.GenerateMesh(maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1))
+    mesh = ng.Mesh(
+        geometry.GenerateMesh(maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1)
+    )
     return mesh.Curve(order)
 
 
@@ -52,7 +58,8 @@ class Joint:
         held = {"dirichletx": "pin_axis|block_axis|block_top", "dirichlety": "pin_top|block_top"}
         self.space = space = ng.VectorH1(mesh, order=order, **held)
         self.u, self.top, self.rigid = (ng.GridFunction(space) for _ in range(3))
-        # Up by 1: of the pin's top what weighs the reactions, of the whole pin what the first step starts from.
+        # Up by 1: of the pin's top what weighs the reactions, of the whole pin what the first step
+        # starts from.
         self.top.components[1].Set(1, definedon=mesh.Boundaries("pin_top"))
         self.rigid.components[1].Set(1, definedon=mesh.Materials("pin"))
         self.dofs, self.plastic, self.inverse = space.ndof, plastic, None
@@ -80,7 +87,8 @@ class Joint:
         self.contact.Update(self.u, self.form, intorder=2 * order - 2, maxdist=20 * DR)
 
     def _trial(self, u):
-        """Trace of the strain and its deviator (xx, yy, zz, sqrt(2) xy), less the plastic strain if there is any."""
+        """Trace of the strain and its deviator (xx, yy, zz, sqrt(2) xy), less the plastic strain if
+        there is any."""
         grad = ng.Grad(u)
         trace = grad[0, 0] + grad[1, 1]
         shear = (grad[0, 1] + grad[1, 0]) / math.sqrt(2)
@@ -96,7 +104,8 @@ class Joint:
         return (LAME / 2 + MU / 3) * trace * trace + ng.IfPos(inside, beyond, MU * e * e)
 
     def _returned(self):
-        """Plastic strain of the present displacement. Compiled: Interpolate takes 18 times as long without."""
+        """Plastic strain of the present displacement. Compiled: Interpolate takes 18 times as long
+        without."""
         _, e = self._trial(self.u)
         excess = 1 - YIELD / (2 * MU) / ng.sqrt(e * e + 1e-30)
         return (self.strain + ng.IfPos(excess, excess, 0) * e).Compile()
@@ -133,7 +142,9 @@ class Joint:
         form, residual, step = self.form, self.residual, self.step
         form.AssembleLinearization(self.u.vec)
         if self.inverse is None:
-            self.inverse = form.mat.Inverse(self.space.FreeDofs(form.condense), inverse="sparsecholesky")
+            self.inverse = form.mat.Inverse(
+                self.space.FreeDofs(form.condense), inverse="sparsecholesky"
+            )
         else:
             self.inverse.Update()  # keeps the ordering of the unknowns
         if form.condense:

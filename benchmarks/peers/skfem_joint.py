@@ -1,12 +1,19 @@
-"""The paper's quarter joint by scikit-fem: ``python3 skfem_joint.py --case plastic --steps 20 --output r.json``.
+"""The paper's quarter joint by scikit-fem: ``python3 skfem_joint.py --case plastic --steps 20
+--output r.json``.
 
-Needs scikit-fem, gmsh and pypardiso (all of PyPI), and nothing of archord but `joint_script` beside it.
+Needs scikit-fem, gmsh and pypardiso (all of PyPI), and nothing of archord but `joint_script` beside
+it.
 
-- Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three points a triangle.
-- Contact: kinematics "reference". A point x of the pin's arc faces the point y of the hole on its normal n in the
-  touching configuration; the pressure is 1e5 E*/R (penalty) times -g, the gap g = (y - x) . n - (u(x) - u(y)) . n.
-- Plasticity: J2, perfect, radial return with its consistent tangent (Simo and Hughes 1998, box 3.2).
-- Newton's method; element matrices at once by numpy, summed into slots that are found once; MKL's PARDISO.
+- Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three
+points a triangle.
+- Contact: kinematics "reference". A point x of the pin's arc faces the point y of the hole on its
+normal n in the
+  touching configuration; the pressure is 1e5 E*/R (penalty) times -g, the gap g = (y - x) . n -
+  (u(x) - u(y)) . n.
+- Plasticity: J2, perfect, radial return with its consistent tangent (Simo and Hughes 1998, box
+3.2).
+- Newton's method; element matrices at once by numpy, summed into slots that are found once; MKL's
+PARDISO.
 """
 
 from __future__ import annotations
@@ -18,31 +25,56 @@ from pathlib import Path
 
 import numpy as np
 import skfem
-from joint_script import BLOCK, DR, LAME, MU, PENALTY, PIN, SIGY, R, axis_pressure, main, mesh_bodies, newton
+from joint_script import (
+    BLOCK,
+    DR,
+    LAME,
+    MU,
+    PENALTY,
+    PIN,
+    SIGY,
+    R,
+    axis_pressure,
+    main,
+    mesh_bodies,
+    newton,
+)
 from scipy import sparse
 
 
 class UpperTriangle:
-    """Solves with the sparse sum of element matrices ``(m, k, k)`` over rows ``dofs`` ``(m, k)``, by PARDISO, which
-    reads the upper triangle of a positive definite matrix. Places and order of the unknowns are found once."""
+    """Solves with the sparse sum of element matrices ``(m, k, k)`` over rows ``dofs`` ``(m, k)``,
+    by PARDISO, which reads the upper triangle of a positive definite matrix. Places and order of
+    the unknowns are found once."""
 
     def __init__(self, dofs, free) -> None:
         """``free`` ``(n,)`` numbers the unconstrained dofs, -1 elsewhere."""
-        rows, cols = (np.broadcast_to(a, (*dofs.shape, dofs.shape[1])) for a in (dofs[:, :, None], dofs[:, None, :]))
+        rows, cols = (
+            np.broadcast_to(a, (*dofs.shape, dofs.shape[1]))
+            for a in (dofs[:, :, None], dofs[:, None, :])
+        )
         n = int(free.max()) + 1
         self.kept = (free[rows] >= 0) & (free[cols] >= free[rows])
-        keys, self.slot = np.unique(free[rows][self.kept] * n + free[cols][self.kept], return_inverse=True)
+        keys, self.slot = np.unique(
+            free[rows][self.kept] * n + free[cols][self.kept], return_inverse=True
+        )
         indptr = np.searchsorted(keys, n * np.arange(n + 1))
         self.matrix = sparse.csr_matrix((np.zeros(len(keys)), keys % n, indptr), (n, n))
-        self.matrix.indptr, self.matrix.indices = indptr.astype(np.int32), (keys % n).astype(np.int32)
+        self.matrix.indptr, self.matrix.indices = (
+            indptr.astype(np.int32),
+            (keys % n).astype(np.int32),
+        )
         for library in sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*")):
-            os.environ.setdefault("PYPARDISO_MKL_RT", str(library))  # pypardiso would search the whole environment
+            os.environ.setdefault(
+                "PYPARDISO_MKL_RT", str(library)
+            )  # pypardiso would search the whole environment
         import pypardiso.pardiso_wrapper as pardiso
 
         self.solver, self.fault = pardiso.PyPardisoSolver(mtype=2), pardiso.PyPardisoError
 
     def solve(self, blocks, b):
-        """The solution for element matrices ``blocks`` and right-hand side ``b``. Raises RuntimeError."""
+        """The solution for element matrices ``blocks`` and right-hand side ``b``. Raises
+        RuntimeError."""
         self.matrix.data = np.bincount(self.slot, blocks[self.kept], len(self.matrix.indices))
         # PyPardisoSolver.solve would order the unknowns each time (phase 11).
         try:
@@ -55,12 +87,16 @@ class UpperTriangle:
 
 
 def return_map(strain, history, sigy: float):
-    """Stress ``(m, q, 3)`` (xx, yy, xy), tangent ``(m, q, 3, 3)`` and new history of total strains (xx, yy, 2 xy).
+    """Stress ``(m, q, 3)`` (xx, yy, xy), tangent ``(m, q, 3, 3)`` and new history of total strains
+    (xx, yy, 2 xy).
 
     ``history`` ``(m, q, 4)`` is the plastic strain (xx, yy, zz, xy).
     """
     volumetric = strain[..., 0] + strain[..., 1]
-    deviator = np.stack([strain[..., 0], strain[..., 1], 0 * volumetric, strain[..., 2] / 2], axis=-1) - history
+    deviator = (
+        np.stack([strain[..., 0], strain[..., 1], 0 * volumetric, strain[..., 2] / 2], axis=-1)
+        - history
+    )
     deviator[..., :3] -= (volumetric / 3)[..., None]
     s = 2 * MU * deviator
     norm = np.maximum(np.sqrt((s[..., :3] ** 2).sum(-1) + 2 * s[..., 3] ** 2), 1e-300)
@@ -71,22 +107,27 @@ def return_map(strain, history, sigy: float):
     stress = ratio[..., None] * s
     new = history + np.where(plastic, (norm - radius) / (2 * MU), 0.0)[..., None] * n
     stress[..., :3] += ((LAME + 2 * MU / 3) * volumetric)[..., None]
-    # Box 3.2: bulk modulus, 2 mu theta times the deviatoric projection, less 2 mu theta n x n (perfect plasticity).
+    # Box 3.2: bulk modulus, 2 mu theta times the deviatoric projection, less 2 mu theta n x n
+    # (perfect plasticity).
     bulk = np.array([[1.0, 1, 0], [1, 1, 0], [0, 0, 0]])
     projection = np.diag([1, 1, 0.5]) - bulk / 3
     directions = n[..., [0, 1, 3]]
     tangent = (LAME + 2 * MU / 3) * bulk + 2 * MU * ratio[..., None, None] * projection
-    tangent -= (2 * MU * ratio * plastic)[..., None, None] * (directions[..., :, None] * directions[..., None, :])
+    tangent -= (2 * MU * ratio * plastic)[..., None, None] * (
+        directions[..., :, None] * directions[..., None, :]
+    )
     return stress[..., [0, 1, 3]], tangent, new
 
 
 def shapes(xi):
-    """Quadratic shape functions ``(..., 3)`` of a facet's ends and midpoint at ``xi`` in [-1, 1]."""
+    """Quadratic shape functions ``(..., 3)`` of a facet's ends and midpoint at ``xi`` in [-1,
+    1]."""
     return np.stack([xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi * xi], axis=-1)
 
 
 class Joint:
-    """Half of the joint below the pin's diameter, discretised: elements first, then contact points, 12 dofs each."""
+    """Half of the joint below the pin's diameter, discretised: elements first, then contact points,
+    12 dofs each."""
 
     def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
         points, cells = mesh_bodies(size, growth, PIN, BLOCK)
@@ -115,15 +156,20 @@ class Joint:
         self.unyielding = self._element_matrices(self.C[None, None])
 
     def _pair(self, basis):
-        """Contact points ``(f, 2)`` on the pin's arc and their points on the hole; returns their dofs ``(f 2, 12)``."""
+        """Contact points ``(f, 2)`` on the pin's arc and their points on the hole; returns their
+        dofs ``(f 2, 12)``."""
 
         def arc(centre, radius):
-            """Dofs ``(f, 3, 2)`` and nodes ``(f, 3, 2)`` of the facets on a circle, ends and midpoint, from the axis
-            on."""
-            dofs = basis.element_dofs.T.reshape(-1, 6, 2)[:, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]].reshape(-1, 3, 2)
+            """Dofs ``(f, 3, 2)`` and nodes ``(f, 3, 2)`` of the facets on a circle, ends and
+            midpoint, from the axis on."""
+            dofs = basis.element_dofs.T.reshape(-1, 6, 2)[
+                :, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]
+            ].reshape(-1, 3, 2)
             x, y = basis.doflocs[:, dofs[..., 0]]
             on = (np.abs(np.hypot(x, y - centre) - radius) < 1e-9).all(axis=1)
-            dofs = np.take_along_axis(dofs[on], np.argsort(x[on], axis=1)[:, [0, 2, 1], None], axis=1)
+            dofs = np.take_along_axis(
+                dofs[on], np.argsort(x[on], axis=1)[:, [0, 2, 1], None], axis=1
+            )
             dofs = dofs[np.argsort(x[on].min(axis=1))]
             return dofs, basis.doflocs[:, dofs[..., 0]].transpose(1, 2, 0)
 
@@ -148,12 +194,16 @@ class Joint:
         self.gap = ((y - x) * direction).sum(-1)
         N = np.concatenate([np.broadcast_to(N, (len(pin), *N.shape)), -shapes(xi)], axis=-1)
         self.N = (N[..., None] * direction[..., None, :]).reshape(-1, 12)
-        dofs = np.concatenate([np.broadcast_to(pin[:, None], (*xi.shape, 3, 2)), hole[facet]], axis=-2)
+        dofs = np.concatenate(
+            [np.broadcast_to(pin[:, None], (*xi.shape, 3, 2)), hole[facet]], axis=-2
+        )
         return dofs.reshape(-1, 12)
 
     def _element_matrices(self, tangent):
         """Stiffness ``(m, 12, 12)`` of tangents ``(m, q, 3, 3)``."""
-        stress = (tangent * self.weight[..., None, None]) @ self.B.reshape(*self.weight.shape, 3, 12)
+        stress = (tangent * self.weight[..., None, None]) @ self.B.reshape(
+            *self.weight.shape, 3, 12
+        )
         return self.B.transpose(0, 2, 1) @ stress.reshape(self.B.shape)
 
     def pressure(self, u):
@@ -172,8 +222,12 @@ class Joint:
         bulk = ((stress * self.weight[..., None]).reshape(self.cells, 1, -1) @ self.B)[:, 0]
         pressure = self.pressure(self.u)
         contact = (pressure * self.ds).reshape(-1, 1) * self.N
-        stiff = (PENALTY * (pressure > 0) * self.ds).reshape(-1, 1, 1) * (self.N[:, :, None] * self.N[:, None, :])
-        self.forces = np.bincount(self.rows.ravel(), np.concatenate([bulk, contact]).ravel(), self.dofs)
+        stiff = (PENALTY * (pressure > 0) * self.ds).reshape(-1, 1, 1) * (
+            self.N[:, :, None] * self.N[:, None, :]
+        )
+        self.forces = np.bincount(
+            self.rows.ravel(), np.concatenate([bulk, contact]).ravel(), self.dofs
+        )
         self.blocks = np.concatenate([blocks, stiff])
         return float(np.linalg.norm(self.forces[self.free]) / np.abs(self.forces[self.top].sum()))
 
@@ -198,7 +252,10 @@ class Joint:
 
     def results(self) -> dict[str, float | None]:
         """Force of the whole joint, and pressure on the axis from the means of the facets."""
-        mean, angle = ((values * self.ds).sum(1) / self.ds.sum(1) for values in (self.pressure(self.u), self.angle))
+        mean, angle = (
+            (values * self.ds).sum(1) / self.ds.sum(1)
+            for values in (self.pressure(self.u), self.angle)
+        )
         return {"P": -2 * self.forces[self.top].sum(), "p0": axis_pressure(angle, mean)}
 
 

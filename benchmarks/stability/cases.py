@@ -1,9 +1,10 @@
-"""The cases of the stability benchmark: joints read from ``cases.toml``, general scenes from ``problems.toml``, whose
-blocks are drawn here; and what each must give.
+"""The cases of the stability benchmark: joints read from ``cases.toml``, general scenes from
+``problems.toml``, whose blocks are drawn here; and what each must give.
 
-A case names what its numbers must agree with: a closed form; another case of the same run that gets there another way
-(other units, other steps, the other control); or the same joint on a fine mesh, stored in ``fine.json``, which
-``python3 -m archord.benchmarks.stability.cases`` completes: it solves what is missing there.
+A case names what its numbers must agree with: a closed form; another case of the same run that gets
+there another way (other units, other steps, the other control); or the same joint on a fine mesh,
+stored in ``fine.json``, which ``python3 -m archord.benchmarks.stability.cases`` completes: it
+solves what is missing there.
 """
 
 from __future__ import annotations
@@ -30,23 +31,31 @@ FILE = Path(__file__).with_name("fine.json")
 FINE = "fine"  # an expected value that is the same case's on a fine mesh (see `fine_scene`)
 _COARSE, _STEPS = 0.1, 4
 _WITHIN = 0.005  # of the value on a fine mesh
-_SIZE, _TINY = 0.025, 0.0025  # element size over R of fine meshes, where a few elements of 10 %R touch
+_SIZE, _TINY = (
+    0.025,
+    0.0025,
+)  # element size over R of fine meshes, where a few elements of 10 %R touch
 _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 
 
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
     joints, problems = (
-        tomllib.loads(FILE.with_name(f"{name}.toml").read_text(encoding="utf-8")) for name in ("cases", "problems")
+        tomllib.loads(FILE.with_name(f"{name}.toml").read_text(encoding="utf-8"))
+        for name in ("cases", "problems")
     )
     bases = problems.pop("base")
     found = {}
     for group, table in joints.items():
         for name, keys in table.items():
-            found[name] = _case(name, group, keys, _joint, "P/(E* R)")  # which is compared by default
+            found[name] = _case(
+                name, group, keys, _joint, "P/(E* R)"
+            )  # which is compared by default
     for group, table in problems.items():
         for name, keys in table.items():
-            found[name] = _case(name, group, _merged(bases[keys.pop("base", group)], keys), _problem, "")
+            found[name] = _case(
+                name, group, _merged(bases[keys.pop("base", group)], keys), _problem, ""
+            )
     return found
 
 
@@ -58,7 +67,9 @@ def _merged(base: Any, keys: Any) -> Any:
     return {name: value for name, value in both.items() if value != "none"}
 
 
-def _case(name: str, group: str, keys: dict[str, Any], scene: Callable[[Any], AnyScene], default: str) -> Case:
+def _case(
+    name: str, group: str, keys: dict[str, Any], scene: Callable[[Any], AnyScene], default: str
+) -> Case:
     limits = {key: keys.pop(key) for key in ("stops", "warns", "budget") if key in keys}
     expected = _expected(keys, bool(limits.get("stops")), default)
     return Case(name, scene(keys), group, expected, **limits)
@@ -80,11 +91,19 @@ def _expected(keys: dict[str, Any], stops: bool, default: str) -> tuple[Expected
 def _joint(keys: dict[str, Any]) -> Scene:
     """The joint that the rest of the ``keys`` of a case describe."""
     size, steps = keys.pop("size", _COARSE), keys.pop("steps", _STEPS)
-    strength, load, both = keys.pop("yield_stress", None), keys.pop("persson", None), keys.pop("both", None)
+    strength, load, both = (
+        keys.pop("yield_stress", None),
+        keys.pop("persson", None),
+        keys.pop("both", None),
+    )
     if "ratio" in keys or "nu" in keys:
         ratio, nu = keys.pop("ratio", 1.0), keys.pop("nu", 0.3)
         E = (1 - nu**2) * (1 + 1 / ratio)
-        keys = {"pin": {"E": ratio * E, "nu": nu}, "block": {"E": E, "nu": nu} | keys.pop("block", {}), **keys}
+        keys = {
+            "pin": {"E": ratio * E, "nu": nu},
+            "block": {"E": E, "nu": nu} | keys.pop("block", {}),
+            **keys,
+        }
     if both:
         keys |= {"pin": both, "block": both}
     if "relative_force" in keys.get("load", {}):
@@ -95,12 +114,15 @@ def _joint(keys: dict[str, Any]) -> Scene:
 
 
 def _problem(keys: dict[str, Any]) -> AnyScene:
-    """The scene of a case's ``keys``, its ``blocks`` or its ``eye``, if there is one, drawn as a mesh file."""
+    """The scene of a case's ``keys``, its ``blocks`` or its ``eye``, if there is one, drawn as a
+    mesh file."""
     load = keys["load"]
     if cycles := keys.pop("cycles", None):
         load |= {name: value * cycles for name, value in load.items() if isinstance(value, list)}
     if blocks := keys.pop("blocks", None):
-        keys["mesh"] = keys.get("mesh", {}) | {"file": str(_drawn(json.dumps(blocks), keys.pop("triangles", False)))}
+        keys["mesh"] = keys.get("mesh", {}) | {
+            "file": str(_drawn(json.dumps(blocks), keys.pop("triangles", False)))
+        }
     if edges := keys.pop("eye", None):
         keys["mesh"] = {"file": str(drawn_eye(edges))}
     return parse_any(keys)
@@ -108,8 +130,9 @@ def _problem(keys: dict[str, Any]) -> AnyScene:
 
 @cache
 def _drawn(blocks: str, triangles: bool) -> Path:
-    """An .inp file of ``blocks`` by name: ranges x0, y0, x1, y1, and numbers of quadrilaterals across and up, which
-    ``triangles`` cut in two; x and y are radius and angle (times pi) with a 1 behind. Sets: "NAME left" and so on."""
+    """An .inp file of ``blocks`` by name: ranges x0, y0, x1, y1, and numbers of quadrilaterals
+    across and up, which ``triangles`` cut in two; x and y are radius and angle (times pi) with a 1
+    behind. Sets: "NAME left" and so on."""
     file, start = Path(tempfile.mkdtemp()) / "blocks.inp", 1
     with file.open("wb") as out:
         for name, (x0, y0, x1, y1, n, m, *polar) in json.loads(blocks).items():
@@ -117,8 +140,12 @@ def _drawn(blocks: str, triangles: bool) -> Path:
             if polar:
                 x, y = x * np.cos(np.pi * y), x * np.sin(np.pi * y)
             ids = start + np.arange(x.size).reshape(x.shape)
-            quads = np.stack([ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=2).reshape(-1, 4)
-            cells = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
+            quads = np.stack(
+                [ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=2
+            ).reshape(-1, 4)
+            cells = (
+                np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
+            )
             numbered = np.column_stack([start + np.arange(len(cells)), cells])
             rows = {"*NODE": np.column_stack([ids.ravel(), x.ravel(), y.ravel()])}
             rows[f"*ELEMENT, TYPE=CPE{cells.shape[1]}, ELSET={name}"] = numbered
@@ -132,11 +159,18 @@ def _drawn(blocks: str, triangles: bool) -> Path:
 
 
 def fine_scene(scene: Any) -> Scene:
-    """The joint of ``scene`` with equal elements of 2.5 %R (0.25 %R for tiny contacts) or half as large, the default
-    gamma factor and, if it can yield, at least 20 and at least twice as many steps."""
+    """The joint of ``scene`` with equal elements of 2.5 %R (0.25 %R for tiny contacts) or half as
+    large, the default gamma factor and, if it can yield, at least 20 and at least twice as many
+    steps."""
     given = scene.joint
     tiny = not scene.force_controlled and 0 < max(scene.targets) <= _TINY_LOAD * given.dR
-    size = _TINY if tiny else min(_SIZE, given.h / given.radius / 2) if given.size_ratio == 1 else _SIZE
+    size = (
+        _TINY
+        if tiny
+        else min(_SIZE, given.h / given.radius / 2)
+        if given.size_ratio == 1
+        else _SIZE
+    )
     joint = {"element_size": None, "relative_element_size": size, "size_ratio": None}
     return varied(
         scene,
@@ -147,7 +181,8 @@ def fine_scene(scene: Any) -> Scene:
 
 
 def main() -> None:
-    """Solve the joints that `FILE` lacks on fine meshes, and write after each. Raises RuntimeError if a run stops."""
+    """Solve the joints that `FILE` lacks on fine meshes, and write after each. Raises RuntimeError
+    if a run stops."""
     known, values = cases(), json.loads(FILE.read_text(encoding="utf-8"))
     for name, case in known.items():
         if name not in values and any(expected.value == FINE for expected in case.expected):

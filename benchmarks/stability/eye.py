@@ -1,4 +1,5 @@
-"""An eye with a bushing in one bore and a pin in each: bodies that nothing holds but contact and friction."""
+"""An eye with a bushing in one bore and a pin in each: bodies that nothing holds but contact and
+friction."""
 
 from __future__ import annotations
 
@@ -25,8 +26,8 @@ _COARSEST = 8.0
 def drawn_eye(edges: int) -> Path:
     """A .msh file with ``edges`` around each circle; lengths in mm.
 
-    Bodies are "eye", "bush", "pin" (in the bushing) and "pinB" (in the other bore). The bushing is drawn 0.03 larger
-    than its bore; the pins have clearances of 0.05.
+    Bodies are "eye", "bush", "pin" (in the bushing) and "pinB" (in the other bore). The bushing is
+    drawn 0.03 larger than its bore; the pins have clearances of 0.05.
     """
     import gmsh
 
@@ -68,7 +69,11 @@ def _draw(gmsh: Any, edges: int) -> None:
     for name, surface in bodies.items():
         gmsh.model.addPhysicalGroup(2, [surface], name=name)
     for name, (bore, radius) in _CIRCLES.items():
-        curves = [curve for _, curve in gmsh.model.getEntities(1) if _on_circle(gmsh, curve, _AT[bore], radius)]
+        curves = [
+            curve
+            for _, curve in gmsh.model.getEntities(1)
+            if _on_circle(gmsh, curve, _AT[bore], radius)
+        ]
         gmsh.model.addPhysicalGroup(1, curves, name=name)
     options = {"MeshSizeFromCurvature": edges, "MeshSizeMax": _COARSEST, "ElementOrder": 2}
     before = {key: gmsh.option.getNumber(f"Mesh.{key}") for key in options}
@@ -80,7 +85,8 @@ def _draw(gmsh: Any, edges: int) -> None:
 
 
 def _on_circle(gmsh: Any, curve: int, centre: float, radius: float) -> bool:
-    """Whether the ``curve`` lies on the circle around ``(centre, 0)``, seen from where it starts."""
+    """Whether the ``curve`` lies on the circle around ``(centre, 0)``, seen from where it
+    starts."""
     start = gmsh.model.getParametrizationBounds(1, curve)[0][0]
     x, y, _ = gmsh.model.getValue(1, curve, [start])
     return math.isclose(math.hypot(x - centre, y), radius, abs_tol=1e-6)

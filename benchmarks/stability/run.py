@@ -1,4 +1,5 @@
-"""The stability benchmark: cases solved within their budgets, side by side, a verdict on every one, and the table."""
+"""The stability benchmark: cases solved within their budgets, side by side, a verdict on every one,
+and the table."""
 
 from __future__ import annotations
 
@@ -54,8 +55,8 @@ class Check:
 class Result:
     """How a case went. ``status`` is "done", "stopped" (exit code 3) or "failed" (an error).
 
-    ``quantities`` are those of the last step. ``forces`` checks the balance of forces over P, ``energy`` that of
-    energies over the work; None where nothing was solved.
+    ``quantities`` are those of the last step. ``forces`` checks the balance of forces over P,
+    ``energy`` that of energies over the work; None where nothing was solved.
     """
 
     status: str = ""
@@ -73,8 +74,8 @@ class Result:
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the table: a case, its result, the comparison that takes the largest share of its tolerance, if there
-    is any, and what is wrong."""
+    """A line of the table: a case, its result, the comparison that takes the largest share of its
+    tolerance, if there is any, and what is wrong."""
 
     case: Case
     result: Result
@@ -96,28 +97,41 @@ def chosen(pattern: str | None) -> list[str]:
     names = [name for name, case in table.items() if matches(pattern or "", name, case.group)]
     if not names:
         groups = ", ".join(dict.fromkeys(case.group for case in table.values()))
-        raise InputError(f"--only {pattern}: no case has such a name or group; groups are {groups}.")
+        raise InputError(
+            f"--only {pattern}: no case has such a name or group; groups are {groups}."
+        )
     return names
 
 
 def with_references(names: list[str]) -> list[str]:
     """``names`` and the cases they are compared with, in the order of the table."""
     table, wanted = cases(), set(names)
-    while more := {str(e.value) for n in wanted for e in table[n].expected if e.value in table} - wanted:
+    while (
+        more := {str(e.value) for n in wanted for e in table[n].expected if e.value in table}
+        - wanted
+    ):
         wanted |= more
     return [name for name in table if name in wanted]
 
 
 def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[Line]:
-    """Solve the cases ``names`` and those they are compared with below ``folder``, each on one rank; judge ``names``.
+    """Solve the cases ``names`` and those they are compared with below ``folder``, each on one
+    rank; judge ``names``.
 
-    ``said(sentence)`` follows each on the rank that solved it. The lines are the same on all ranks. Collective.
+    ``said(sentence)`` follows each on the rank that solved it. The lines are the same on all ranks.
+    Collective.
     """
-    table, order, fine = cases(), with_references(names), json.loads(FILE.read_text(encoding="utf-8"))
+    table, order, fine = (
+        cases(),
+        with_references(names),
+        json.loads(FILE.read_text(encoding="utf-8")),
+    )
 
     def solved(name: str) -> Result:
         r = solve_case(table[name], folder)
-        cost = f"{r.steps} steps, {r.iterations} iterations, {r.cutbacks} cutbacks, {r.seconds:.1f} s"
+        cost = (
+            f"{r.steps} steps, {r.iterations} iterations, {r.cutbacks} cutbacks, {r.seconds:.1f} s"
+        )
         said(f"{table[name].group}: {name}: {r.status}, {cost}")
         return r
 
@@ -126,7 +140,8 @@ def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[str], No
 
 
 def solve_case(case: Case, folder: Path) -> Result:
-    """Solve ``case`` into its run folder below ``folder`` on this rank; errors become part of the result.
+    """Solve ``case`` into its run folder below ``folder`` on this rank; errors become part of the
+    result.
 
     Raises KeyboardInterrupt if a signal interrupted the run.
     """
@@ -143,7 +158,9 @@ def solve_case(case: Case, folder: Path) -> Result:
         report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
         result.not_finite, result.warnings = not_finite(outcome.folder), report["warnings"]
         result.steps = len(outcome.steps)
-        result.cutbacks = report["totals"]["cutbacks"] + report.get("failed_step", {}).get("cutbacks", 0)
+        result.cutbacks = report["totals"]["cutbacks"] + report.get("failed_step", {}).get(
+            "cutbacks", 0
+        )
         if outcome.steps:
             estimates = report["error_estimates"]
             balance, energy = estimates["force_balance"], estimates["energy_balance"] or 0.0
@@ -159,41 +176,63 @@ def solve_case(case: Case, folder: Path) -> Result:
 
 
 def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
-    """How far the trapezoidal rule can be from the work, over the work, where loads are monotonic between two steps:
-    half the sum of |dP d delta|. That of interferences counts from their first step on; a single step tells nothing."""
+    """How far the trapezoidal rule can be from the work, over the work, where loads are monotonic
+    between two steps: half the sum of |dP d delta|. That of interferences counts from their first
+    step on; a single step tells nothing."""
     if isinstance(scene, Scene):
         fits, path = scene.joint.dR < 0, np.array([[(m.P, m.delta)] for m in steps])
     else:
         fits, what = scene.fits, ("force", "displacement")
-        path = np.array([[[m.values[f"{load.name} {of}"] for of in what] for load in scene.load] for m in steps])
+        path = np.array(
+            [[[m.values[f"{load.name} {of}"] for of in what] for load in scene.load] for m in steps]
+        )
     if fits and len(steps) == 1:
         return math.inf
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
     path = path if fits else np.concatenate([np.zeros_like(path[:1]), path])
-    return float(np.abs(np.prod(np.diff(path, axis=0), axis=2)).sum() / 2 / largest) if largest else 0.0
+    return (
+        float(np.abs(np.prod(np.diff(path, axis=0), axis=2)).sum() / 2 / largest)
+        if largest
+        else 0.0
+    )
 
 
 def not_finite(folder: Path) -> list[str]:
     """The places in a run's files that hold a nan or an infinity."""
     constants: list[str] = []
     if (folder / "run.json").exists():
-        json.loads((folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append)
+        json.loads(
+            (folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append
+        )
     found = [f"run.json: {name}" for name in sorted(set(constants))]
     history = read_history(folder / "history.csv")
-    found += [f"history.csv: {name}" for name, column in history.items() if not np.all(np.isfinite(column))]
+    found += [
+        f"history.csv: {name}"
+        for name, column in history.items()
+        if not np.all(np.isfinite(column))
+    ]
     for path in (folder / "fields.h5", folder / "contact.h5"):
         if path.exists():
             with h5py.File(path) as file:
-                found += [f"{path.name}: {name}" for name, values in all_arrays(file) if not np.isfinite(values).all()]
+                found += [
+                    f"{path.name}: {name}"
+                    for name, values in all_arrays(file)
+                    if not np.isfinite(values).all()
+                ]
     return found
 
 
 def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
-    """Hold the result of ``case`` against its checks, the other ``results`` and the ``fine``-mesh values."""
+    """Hold the result of ``case`` against its checks, the other ``results`` and the ``fine``-mesh
+    values."""
     result, faults = results[case.name], []
     ended = result.status == ("stopped" if case.stops else "done")
     if not ended:
-        faults.append(f"{'went on' if result.status == 'done' else result.status}: {result.message}".rstrip(": "))
+        faults.append(
+            f"{'went on' if result.status == 'done' else result.status}: {result.message}".rstrip(
+                ": "
+            )
+        )
     elif case.stops not in result.message:
         faults.append(f"stopped, but said {result.message}")
     if case.warns and not any(case.warns in warning for warning in result.warnings):
@@ -201,19 +240,34 @@ def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
     if result.not_finite:
         faults.append(f"not finite: {', '.join(result.not_finite)}")
     comparisons = [_compare(case, expected, results, fine) for expected in case.expected if ended]
-    faults += [c.fault for c in (result.forces, result.energy, *comparisons) if c is not None and c.share > 1]
-    return Line(case, result, max(comparisons, key=lambda c: c.share) if comparisons else None, faults)
+    faults += [
+        c.fault
+        for c in (result.forces, result.energy, *comparisons)
+        if c is not None and c.share > 1
+    ]
+    return Line(
+        case, result, max(comparisons, key=lambda c: c.share) if comparisons else None, faults
+    )
 
 
 def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: Values) -> Check:
     """The relative error, absolute where the reference is 0."""
-    value, reference = results[case.name].quantities.get(expected.quantity, math.nan), expected.value
+    value, reference = (
+        results[case.name].quantities.get(expected.quantity, math.nan),
+        expected.value,
+    )
     if isinstance(reference, str):
         values = fine.get(case.name, {}) if reference == FINE else results[reference].quantities
         reference = expected.factor * values.get(expected.quantity, math.nan)
     deviation = abs(value / reference - 1) if reference else abs(value)
     fault = f"{expected.quantity} is {value:.6g}, not {reference:.6g} ({expected.source})"
-    said = expected.quantity, f"{value:.8g}", f"{reference:.8g}", expected.source, f"{deviation:.1e}"
+    said = (
+        expected.quantity,
+        f"{value:.8g}",
+        f"{reference:.8g}",
+        expected.source,
+        f"{deviation:.1e}",
+    )
     return Check(deviation, expected.tolerance, fault, dict(zip(_COMPARED, said, strict=True)))
 
 
@@ -237,16 +291,19 @@ def row(line: Line) -> dict[str, object]:
 
 
 def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
-    """Write stability.csv and stability.md into ``folder``: how many are as they should be, the table, and the
-    sentences of the runs that stopped. Returns the Markdown and the files."""
+    """Write stability.csv and stability.md into ``folder``: how many are as they should be, the
+    table, and the sentences of the runs that stopped. Returns the Markdown and the files."""
     rows = [*map(row, lines)]
     converged = sum(line.result.status == "done" for line in lines)
     solvable = sum(not line.case.stops for line in lines)
     seconds = sum(line.result.seconds for line in lines)
-    said = "".join(f"- {line.case.name}: {line.result.message}.\n" for line in lines if line.result.message)
+    said = "".join(
+        f"- {line.case.name}: {line.result.message}.\n" for line in lines if line.result.message
+    )
     text = (
         f"{len(lines)} scenes in {seconds:.0f} s: {converged} converged of the {solvable} that have a solution, "
         f"{len(lines) - solvable} must stop with a sentence; {sum(bool(line.faults) for line in lines)} not as they "
-        f"should be.\n\n{Table.of(rows).markdown()}" + (f"\nWhat the runs that stopped said:\n\n{said}" if said else "")
+        f"should be.\n\n{Table.of(rows).markdown()}"
+        + (f"\nWhat the runs that stopped said:\n\n{said}" if said else "")
     )
     return text, write_report(folder, "stability", rows, text)

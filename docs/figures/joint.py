@@ -1,7 +1,8 @@
 """The joint, drawn: ``python3 docs/figures/joint.py`` writes joint.png beside this file.
 
-Left, first touch: radii, clearance, supports and load. Right, pressed: displacement, semi-angle and chord of the
-contact by the geometry of rigid circles (eq. 5 of the paper). The clearance is drawn far too large.
+Left, first touch: radii, clearance, supports and load. Right, pressed: displacement, semi-angle and
+chord of the contact by the geometry of rigid circles (eq. 5 of the paper). The clearance is drawn
+far too large.
 """
 
 from __future__ import annotations
@@ -26,11 +27,17 @@ def point(radius: Any, angle: Any) -> np.ndarray:
 
 def arrow(axes: Any, start: Any, end: Any, colour: str = SIZE, style: str = "-|>") -> None:
     """An arrow from ``start`` to ``end``."""
-    axes.annotate("", end, start, arrowprops={"arrowstyle": style, "color": colour, "shrinkA": 0, "shrinkB": 0})
+    axes.annotate(
+        "",
+        end,
+        start,
+        arrowprops={"arrowstyle": style, "color": colour, "shrinkA": 0, "shrinkB": 0},
+    )
 
 
 def bodies(axes: Any, depth: float) -> None:
-    """The block with its hole, held at its top, and the pin below its diameter, which is ``depth`` below the top."""
+    """The block with its hole, held at its top, and the pin below its diameter, which is ``depth``
+    below the top."""
     half = np.linspace(-np.pi / 2, np.pi / 2, 181)
     reach = np.arctan2(R, depth)
     angle = np.linspace(-reach, reach, 181)
@@ -55,8 +62,18 @@ def first_touch(axes: Any) -> None:
     bodies(axes, GAP)
     for x in (-0.8, -0.4, 0.4, 0.8):
         arrow(axes, (x, 0.3), (x, -GAP), FORCE)
-    axes.text(0, 0.52, "displacement $\\delta$, force $P$", color=FORCE, ha="center", backgroundcolor="white")
-    for end, place in ((point(R, -0.75) - [0, GAP], (-0.42, -0.42)), (point(R + GAP, 0.75), (0.36, -0.74))):
+    axes.text(
+        0,
+        0.52,
+        "displacement $\\delta$, force $P$",
+        color=FORCE,
+        ha="center",
+        backgroundcolor="white",
+    )
+    for end, place in (
+        (point(R, -0.75) - [0, GAP], (-0.42, -0.42)),
+        (point(R + GAP, 0.75), (0.36, -0.74)),
+    ):
         arrow(axes, (0, -GAP) if end[0] < 0 else (0, 0), end)
         axes.text(*place, "$R$" if end[0] < 0 else "$R + \\Delta R$", color=SIZE, ha="center")
     for y, shift in ((0, 0.25), (-GAP, -0.25)):
@@ -65,7 +82,11 @@ def first_touch(axes: Any) -> None:
     axes.text(-0.12, -GAP / 2, "$\\Delta R$", color=SIZE, ha="right", va="center")
     for x in (-1.63, 1.63):
         axes.text(x, 0.2, "held", ha="center")
-    for name, place in {"pin": (-0.38, -0.95), "block": (-1.55, -1.1), "free": (-1.55, -1.85)}.items():
+    for name, place in {
+        "pin": (-0.38, -0.95),
+        "block": (-1.55, -1.1),
+        "free": (-1.55, -1.85),
+    }.items():
         axes.text(*place, name, ha="center")
     axes.set_title("first touch")
 
@@ -75,14 +96,29 @@ def pressed(axes: Any) -> None:
     bodies(axes, GAP + DELTA)
     edge, deepest = point(R + GAP, EPS), point(R + GAP, 0.0)
     for angle in np.linspace(-EPS, EPS, 13)[1:-1]:
-        arrow(axes, point(R + GAP + 0.34 * (1 - (angle / EPS) ** 2) + 0.02, angle), point(R + GAP, angle), FORCE)
+        arrow(
+            axes,
+            point(R + GAP + 0.34 * (1 - (angle / EPS) ** 2) + 0.02, angle),
+            point(R + GAP, angle),
+            FORCE,
+        )
     axes.text(-0.62, -1.62, "$p$", color=FORCE)
     axes.plot(*zip(deepest, edge, strict=True), color=SIZE, lw=1.4)
     middle = (deepest + edge) / 2
-    axes.text(middle[0] - 0.05, middle[1] + 0.12, "chord $l$", color=SIZE, ha="center", va="bottom", rotation=29)
+    axes.text(
+        middle[0] - 0.05,
+        middle[1] + 0.12,
+        "chord $l$",
+        color=SIZE,
+        ha="center",
+        va="bottom",
+        rotation=29,
+    )
     axes.plot(*zip((0, 0), edge, strict=True), color=SIZE, lw=0.9)
     axes.plot(*point(0.36, np.linspace(0, EPS, 30)), color=SIZE, lw=0.9)
-    axes.text(*point(0.5, EPS / 2), "$\\varepsilon$", color=SIZE, ha="center", va="center", fontsize=12)
+    axes.text(
+        *point(0.5, EPS / 2), "$\\varepsilon$", color=SIZE, ha="center", va="center", fontsize=12
+    )
     for y in (-GAP, -GAP - DELTA):
         axes.plot([-0.92, -0.6], [y, y], color=SIZE, lw=0.9)
     arrow(axes, (-0.76, 0.1), (-0.76, -GAP))

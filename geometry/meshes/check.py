@@ -19,14 +19,20 @@ from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, outer_
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
-_DISTORTED = 0.02  # smallest over largest jacobian of a cell that is told of; refused are those below -0.02, as the
+# smallest over largest jacobian of a cell that is told of; refused are those below -0.02, as the
+_DISTORTED = 0.02
 # corner of a curved cell with two sides on one arc, which is flat, comes out a little below zero
 _THIN = 0.005  # area over the square of the longest side, below which a cell is told of
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
-_INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
+_INTO = (
+    0.02,
+    1e-3,
+)  # of a side: how deep bodies may overlap by their sides being straight, or curved
 _PIECES = 8  # of a side, as a polygon
 _AT_ONCE = 2_000_000  # pairs of points and pieces
-_POLYGONAL = 1e-3  # of the clearance: sagitta from which corners of straight sides show in the pressure
+_POLYGONAL = (
+    1e-3  # of the clearance: sagitta from which corners of straight sides show in the pressure
+)
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
 _STRAIGHT = np.cos(0.5)  # of the angle up to which two facets are of one line
 _NO_CELL = "look whether a cell is missing there"
@@ -47,20 +53,29 @@ def _in(mesh: PlaneMesh, cell: int) -> str:
 
 
 def faults(mesh: PlaneMesh) -> list[str]:
-    """Why nothing can be computed on ``mesh``: cells that are folded, collapsed, there twice, or three at an edge."""
+    """Why nothing can be computed on ``mesh``: cells that are folded, collapsed, there twice, or
+    three at an edge."""
     said = _unsound(mesh)
-    _, first, count = np.unique(np.sort(mesh.cells, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(
+        np.sort(mesh.cells, axis=1), axis=0, return_index=True, return_counts=True
+    )
     if (count > 1).any():
-        said.append(f"{(count > 1).sum()} cells are there twice, the first at {_in(mesh, first[count > 1][0])}")
+        said.append(
+            f"{(count > 1).sum()} cells are there twice, the first at {_in(mesh, first[count > 1][0])}"
+        )
     sides = sides_of(mesh.cells)
     first, which = distinct_edges(sides[:, :2])
     crowded = first[np.bincount(which) > 2]
     if len(crowded):
         at = _at(mesh.x[sides[crowded[0]]].mean(axis=0))
-        said.append(f"{len(crowded)} edges belong to more than two cells, the first at {at}: cells overlap")
+        said.append(
+            f"{len(crowded)} edges belong to more than two cells, the first at {at}: cells overlap"
+        )
     unlike = (np.sort(sides, axis=1) != np.sort(sides[first][which], axis=1)).any(axis=1)
     within = mesh.cells.size - sides[:, 1:].size  # nodes inside cells
-    if unlike.any() or len(np.unique(sides[:, :2])) + sides[first, 2:].size + within != len(np.unique(mesh.cells)):
+    if unlike.any() or len(np.unique(sides[:, :2])) + sides[first, 2:].size + within != len(
+        np.unique(mesh.cells)
+    ):
         at = f", as at {_at(mesh.x[sides[unlike][0, 0]])}" if unlike.any() else ""
         said.append(f"cells do not have all nodes of their common sides in common{at}")
     return said
@@ -74,7 +89,8 @@ def _jacobians(mesh: PlaneMesh) -> tuple[Array, Array]:
 
 
 def _unsound(mesh: PlaneMesh) -> list[str]:
-    """Why the map of a cell cannot be inverted everywhere, corners and middles of sides included."""
+    """Why the map of a cell cannot be inverted everywhere, corners and middles of sides
+    included."""
     ordered = np.sort(mesh.cells, axis=1)
     repeating = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if len(repeating):
@@ -100,7 +116,8 @@ def _unsound(mesh: PlaneMesh) -> list[str]:
 
 
 def _turned_at_points(mesh: PlaneMesh) -> np.ndarray:
-    """Whether the determinants of a cell ``(n,)`` do not have one sign at its integration points."""
+    """Whether the determinants of a cell ``(n,)`` do not have one sign at its integration
+    points."""
     J, _ = _jacobians(mesh)
     det = np.linalg.det(J)
     none = _FLAT * (J**2).sum(axis=(2, 3)).max(axis=1)
@@ -153,11 +170,12 @@ def check_mesh(
     overlap: float = 0.0,
     millimetres: bool = False,
 ) -> list[str]:
-    """Warnings about a mesh whose ``bodies`` are the named cell sets, with ``pairs`` of surfaces in contact, each with
-    another one or with a rigid disc of that radius; one alone touches whatever its clearance. Collective.
+    """Warnings about a mesh whose ``bodies`` are the named cell sets, with ``pairs`` of surfaces in
+    contact, each with another one or with a rigid disc of that radius; one alone touches whatever
+    its clearance. Collective.
 
-    Bodies may lie in each other by the ``overlap``; lengths may be known to be in ``millimetres``. Raises ValueError
-    with the first fault on all ranks.
+    Bodies may lie in each other by the ``overlap``; lengths may be known to be in ``millimetres``.
+    Raises ValueError with the first fault on all ranks.
     """
     for cells in bodies.values():
         tagged.cell_tags(cells)
@@ -166,7 +184,9 @@ def check_mesh(
         tags_of("facet", tagged.facet_sets, name)
     mesh, found, warnings = gathered(tagged), "", list[str]()
     if mesh is not None:
-        inside = {body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()}
+        inside = {
+            body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()
+        }
         checks = [iter(faults(mesh)), _of_bodies(mesh, inside, millimetres)]
         checks += [_of_surface(mesh, inside, name) for name in surfaces]
         straight = {_COARSE: list[str](), _POLYGONAL: list[str]()}
@@ -184,7 +204,9 @@ def check_mesh(
     return [*tagged.notes, *warnings]
 
 
-def _of_bodies(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], millimetres: bool) -> Iterator[str]:
+def _of_bodies(
+    mesh: PlaneMesh, inside: Mapping[str, np.ndarray], millimetres: bool
+) -> Iterator[str]:
     size, middle = np.ptp(mesh.x, axis=0).max(), mesh.x[mesh.cells].mean(axis=1)
     if millimetres and size < 1:
         yield f"the mesh is {size:g} mm large; is it in metres? Then give mesh.scale = 1000"
@@ -230,10 +252,13 @@ def _polygons(mesh: PlaneMesh, edges: np.ndarray) -> Array:
 
 
 def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float) -> Iterator[str]:
-    """Boundary vertices of a body, or middles of its cells there, that lie in another by more than is ``allowed``."""
+    """Boundary vertices of a body, or middles of its cells there, that lie in another by more than
+    is ``allowed``."""
     outer = {body: outer_sides(mesh.cells[cells]) for body, cells in inside.items()}
     for (a, (sides, behind)), (b, (around, _)) in permutations(outer.items(), 2):
-        x = np.concatenate([mesh.x[sides[:, 0]], mesh.x[mesh.cells[inside[a]][behind]].mean(axis=1)])
+        x = np.concatenate(
+            [mesh.x[sides[:, 0]], mesh.x[mesh.cells[inside[a]][behind]].mean(axis=1)]
+        )
         polygon = _polygons(mesh, around)
         start, end = polygon[:, :-1].reshape(-1, 2), polygon[:, 1:].reshape(-1, 2)
         along = end - start
@@ -242,7 +267,9 @@ def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float)
         spare = allowed + _INTO[mesh.edges.shape[1] > 2] * _PIECES * length
         for part in np.array_split(x, 1 + len(x) * len(start) // _AT_ONCE):
             to = part[:, None] - start
-            above = part[:, None, 1] < np.stack([start[:, 1], end[:, 1]])[:, None]  # exact where edges meet
+            above = (
+                part[:, None, 1] < np.stack([start[:, 1], end[:, 1]])[:, None]
+            )  # exact where edges meet
             crosses = above[0] != above[1]  # of a ray to the right: an odd number from within
             crosses &= (to[..., 0] * along[:, 1] < to[..., 1] * along[:, 0]) == (along[:, 1] > 0)
             within = crosses.sum(axis=1) % 2 == 1
@@ -260,15 +287,17 @@ def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float)
 def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
     """A warning of nodes of a ``body`` of these ``cells`` that ought to be one."""
     nodes = np.unique(outer_sides(mesh.cells[cells])[0][:, :2])
-    pairs = cKDTree(mesh.x[nodes]).query_pairs(_SAME * np.ptp(mesh.x, axis=0).max(), output_type="ndarray")
+    pairs = cKDTree(mesh.x[nodes]).query_pairs(
+        _SAME * np.ptp(mesh.x, axis=0).max(), output_type="ndarray"
+    )
     if len(pairs):
         at = _at(mesh.x[nodes[pairs[0, 0]]])
         yield f"the body {body!r} has {len(pairs)} pairs of nodes at the same place, as at {at}: a crack, if not merged"
 
 
 def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
-    """Warnings of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a facet set, and of
-    nodes in which its boundary meets itself."""
+    """Warnings of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a
+    facet set, and of nodes in which its boundary meets itself."""
     ends = outer_sides(mesh.cells[cells])[0][:, :2]
     nodes, place = np.unique(ends, return_inverse=True)
     place = place.reshape(-1, 2)
@@ -291,7 +320,8 @@ def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
 
 
 def facets_within(mesh: PlaneMesh, name: str) -> Iterator[str]:
-    """What is said of a facet set of which a part is inside the bodies, where the rest is on their boundary."""
+    """What is said of a facet set of which a part is inside the bodies, where the rest is on their
+    boundary."""
     edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets.get(name, ()))]
     within = ~_outside(mesh, edges)
     if within.any() and not within.all():
@@ -300,8 +330,8 @@ def facets_within(mesh: PlaneMesh, name: str) -> Iterator[str]:
 
 
 def gaps(mesh: PlaneMesh, name: str) -> Iterator[str]:
-    """A warning of single facets on the boundary that no set has, though those at both of their ends are of sets, one
-    of them of ``name`` and in line with them."""
+    """A warning of single facets on the boundary that no set has, though those at both of their
+    ends are of sets, one of them of ``name`` and in line with them."""
     outer = outer_sides(mesh.cells)[0][:, :2]
     _, which = distinct_edges(np.concatenate([mesh.edges[:, :2], outer]))
     of_none = outer[~np.isin(which[len(mesh.edges) :], which[: len(mesh.edges)])]
@@ -315,7 +345,8 @@ def gaps(mesh: PlaneMesh, name: str) -> Iterator[str]:
 
 
 def _goes_on(mesh: PlaneMesh, edge: np.ndarray, along: Mapping[int, Array]) -> bool:
-    """Whether an ``edge`` meets facets, which have directions ``along`` them, and turns little there."""
+    """Whether an ``edge`` meets facets, which have directions ``along`` them, and turns little
+    there."""
     direction = mesh.x[edge[1]] - mesh.x[edge[0]]
     others = [along[int(node)] for node in edge if int(node) in along]
     cosines = [abs(o @ direction) / np.linalg.norm(o) / np.linalg.norm(direction) for o in others]
@@ -330,9 +361,9 @@ def _outside(mesh: PlaneMesh, edges: np.ndarray) -> np.ndarray:
 
 
 def _sagitta(mesh: PlaneMesh, pair: Sequence[str | float], said: dict[float, list[str]]) -> None:
-    """Add to what is ``said`` if a round surface beside another, or beside a disc of that radius, has straight sides,
-    by the part of the clearance that their sagitta h^2/(8 R) exceeds: `_COARSE`, which spoils the clearance, or
-    `_POLYGONAL`."""
+    """Add to what is ``said`` if a round surface beside another, or beside a disc of that radius,
+    has straight sides, by the part of the clearance that their sagitta h^2/(8 R) exceeds:
+    `_COARSE`, which spoils the clearance, or `_POLYGONAL`."""
     radii, deepest, names = [], 0.0, [name for name in pair if isinstance(name, str)]
     for name in names:
         edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])]
@@ -355,17 +386,20 @@ def _sagitta(mesh: PlaneMesh, pair: Sequence[str | float], said: dict[float, lis
 
 
 def free_motions(
-    held: Mapping[str, Sequence[tuple[Array, Array]]], links: Sequence[tuple[str, str, Array, Array]] = ()
+    held: Mapping[str, Sequence[tuple[Array, Array]]],
+    links: Sequence[tuple[str, str, Array, Array]] = (),
 ) -> dict[str, list[str]]:
     """Which of "x", "y" and "rotation" nothing holds, by body.
 
-    Each body is ``held`` at points ``(k, 2)`` in directions ``(k, 2)``. Two bodies hold each other likewise by
-    ``links``: contact without friction along its normals, ties in both directions.
+    Each body is ``held`` at points ``(k, 2)`` in directions ``(k, 2)``. Two bodies hold each other
+    likewise by ``links``: contact without friction along its normals, ties in both directions.
     """
     names, parts = list(held), [np.zeros((1, len(held), 3))]
     everything = [(a, a, x, n) for a, found in held.items() for x, n in found] + list(links)
     size = max((np.ptp(x, axis=0).max() for _, _, x, _ in everything), default=1.0) or 1.0
-    centre = {name: next((x[0] for a, b, x, _ in everything if name in (a, b)), 0.0) for name in names}
+    centre = {
+        name: next((x[0] for a, b, x, _ in everything if name in (a, b)), 0.0) for name in names
+    }
     for a, b, x, n in everything:
         row = np.zeros((len(x), len(names), 3))
         for body, sign in {b: -1, a: 1}.items():
@@ -374,6 +408,8 @@ def free_motions(
         parts.append(row)
     rows, moves = np.concatenate(parts), np.zeros((len(names), 3), dtype=bool)
     for kept in (3, 2):  # with rotations, of which others are a part, and without
-        modes = null_space(np.linalg.qr(rows[:, :, :kept].reshape(len(rows), -1), mode="r"), rcond=_HELD)
+        modes = null_space(
+            np.linalg.qr(rows[:, :, :kept].reshape(len(rows), -1), mode="r"), rcond=_HELD
+        )
         moves[:, :kept] = (np.abs(modes) > _HELD).any(axis=1).reshape(-1, kept)
     return {name: list(compress(_MOTIONS, moved)) for name, moved in zip(names, moves, strict=True)}

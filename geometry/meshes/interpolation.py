@@ -5,7 +5,12 @@ from __future__ import annotations
 import basix
 import basix.ufl
 import numpy as np
-from dolfinx.geometry import bb_tree, compute_closest_entity, compute_collisions_points, create_midpoint_tree
+from dolfinx.geometry import (
+    bb_tree,
+    compute_closest_entity,
+    compute_collisions_points,
+    create_midpoint_tree,
+)
 from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
@@ -18,13 +23,15 @@ _STRAIGHT = 1e-9  # last step in a reference cell
 class Interpolation:
     """From the nodes ``x`` ``(n, 2)`` of ``cells`` ``(m, a)`` to points ``to`` ``(k, 2)``.
 
-    A point outside of all cells, as between a curved edge and its coarser image, gets the continuation of a cell next
-    to it.
+    A point outside of all cells, as between a curved edge and its coarser image, gets the
+    continuation of a cell next to it.
     """
 
     def __init__(self, x: Array, cells: np.ndarray, to: Array) -> None:
         kind, degree = cell_kind(cells.shape[1])
-        halves = np.array([[0, 1, 2]] if kind == TRIANGLE else [[0, 1, 2], [3, 2, 1]])  # in basix' order of corners
+        halves = np.array(
+            [[0, 1, 2]] if kind == TRIANGLE else [[0, 1, 2], [3, 2, 1]]
+        )  # in basix' order of corners
         triangle, X = _located(x, cells[:, halves].reshape(-1, 3), to)
         cell, half = np.divmod(triangle, len(halves))
         weights = np.column_stack([1 - X.sum(axis=1), X])
@@ -33,7 +40,9 @@ class Interpolation:
         for _ in range(0 if cells.shape[1] == 3 else _NEWTON):
             table, nodes = tabulate(kind, degree, X[moving]), x[self._nodes[moving]]
             misfit = to[moving] - np.einsum("na,nai->ni", table[0], nodes)
-            step = np.linalg.solve(np.einsum("jna,nai->nij", table[1:], nodes), misfit[..., None])[..., 0]
+            step = np.linalg.solve(np.einsum("jna,nai->nij", table[1:], nodes), misfit[..., None])[
+                ..., 0
+            ]
             X[moving] += step
             moving = moving[np.abs(step).max(axis=1) > _STRAIGHT]
         self._weights = tabulate(kind, degree, X)[0]
@@ -44,11 +53,13 @@ class Interpolation:
 
 
 def _located(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, Array]:
-    """The number of a straight triangle ``(m, 3)`` with vertices ``x`` ``(n, 2)`` around each point of ``to``
-    ``(k, 2)``, or next to it, and the point's reference coordinates ``(k, 2)`` there."""
+    """The number of a straight triangle ``(m, 3)`` with vertices ``x`` ``(n, 2)`` around each point
+    of ``to`` ``(k, 2)``, or next to it, and the point's reference coordinates ``(k, 2)`` there."""
     straight = basix.ufl.element("P", "triangle", 1, shape=(2,))
     vertices, places = np.ascontiguousarray(x), np.pad(to, ((0, 0), (0, 1)))
-    mesh = create_mesh(MPI.COMM_SELF, cells=triangles.astype(np.int64, order="C"), x=vertices, e=straight)
+    mesh = create_mesh(
+        MPI.COMM_SELF, cells=triangles.astype(np.int64, order="C"), x=vertices, e=straight
+    )
     tree = bb_tree(mesh, 2)
     found = compute_collisions_points(tree, places)
     point, cell = np.repeat(np.arange(len(to)), np.diff(found.offsets)), found.array

@@ -1,8 +1,9 @@
 """The sign of the Jacobian determinant all over curved cells, by its Bernstein coefficients.
 
-The determinant of a cell's map is a polynomial, which lies between its smallest and largest Bernstein coefficient
-(Johnen, Remacle and Geuzaine 2013, "Geometrical validity of curvilinear finite elements"). Where these leave the sign
-open, the cell is cut in four, which brings coefficients and values together.
+The determinant of a cell's map is a polynomial, which lies between its smallest and largest
+Bernstein coefficient (Johnen, Remacle and Geuzaine 2013, "Geometrical validity of curvilinear
+finite elements"). Where these leave the sign open, the cell is cut in four, which brings
+coefficients and values together.
 """
 
 from __future__ import annotations
@@ -21,16 +22,19 @@ _NEAR = 1e-3  # of a cell's largest determinant: how far the bounds of a smalles
 
 
 def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
-    """For each cell of ``mesh`` the smallest and the largest determinant ``(n,)`` of its map, positive for cells whose
-    corners run either way round.
+    """For each cell of ``mesh`` the smallest and the largest determinant ``(n,)`` of its map,
+    positive for cells whose corners run either way round.
 
-    The smallest is a value of the determinant, at most a thousandth of the largest one above the true minimum.
+    The smallest is a value of the determinant, at most a thousandth of the largest one above the
+    true minimum.
     """
     kind, order = cell_kind(mesh.cells.shape[1])
     degree = 2 * (order - 1) if kind == TRIANGLE else 2 * order - 1
     value = _determinants(mesh, kind, order, degree)
     to_bernstein = _bernstein_of_values(kind, degree)
-    signed_area = (value @ to_bernstein.T).mean(axis=1)  # all Bernstein polynomials have one integral
+    signed_area = (value @ to_bernstein.T).mean(
+        axis=1
+    )  # all Bernstein polynomials have one integral
     value[signed_area < 0] *= -1
     smallest = value.min(axis=1)
     largest = value.max(axis=1)
@@ -50,7 +54,8 @@ def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
 
 
 def _determinants(mesh: PlaneMesh, kind: basix.CellType, order: int, degree: int) -> Array:
-    """Determinants ``(n, q)`` at the Lagrange nodes of the ``degree``, which say all about the polynomial."""
+    """Determinants ``(n, q)`` at the Lagrange nodes of the ``degree``, which say all about the
+    polynomial."""
     along = tabulate(kind, order, _points(kind, degree))[1:]
     J = np.tensordot(along, mesh.x[mesh.cells], axes=(2, 1))  # (2, q, n, 2)
     return (J[0, ..., 0] * J[1, ..., 1] - J[0, ..., 1] * J[1, ..., 0]).T
@@ -86,7 +91,8 @@ def _choose(degree: int, *parts: np.ndarray) -> Array:
 
 @cache
 def _values_on_parts(kind: basix.CellType, degree: int) -> Array:
-    """Matrices ``(4, q, q)`` from values at the nodes of a cell to those at the nodes of its four parts."""
+    """Matrices ``(4, q, q)`` from values at the nodes of a cell to those at the nodes of its four
+    parts."""
     corner = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]])
     size = np.full(4, 0.5)
     if kind == TRIANGLE:

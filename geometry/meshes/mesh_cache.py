@@ -1,5 +1,5 @@
-"""Meshes kept in the user's cache for the next joint of the same shape: to load gmsh and to mesh takes a fifth of a
-small solve."""
+"""Meshes kept in the user's cache for the next joint of the same shape: to load gmsh and to mesh
+takes a fifth of a small solve."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ _LARGEST = 200_000  # triangles: larger ones take long to solve, and space
 def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
     """The mesh that ``key`` says all about: the kept one, or what ``make`` returns.
 
-    Other versions of gmsh or of the code that meshes make meshes of their own. A mesh that cannot be read or written,
-    or that another user may have written, is made, and so are all where the environment says ``ARCHORD_KEEP_MESHES=0``.
+    Other versions of gmsh or of the code that meshes make meshes of their own. A mesh that cannot
+    be read or written, or that another user may have written, is made, and so are all where the
+    environment says ``ARCHORD_KEEP_MESHES=0``.
     """
     if os.environ.get("ARCHORD_KEEP_MESHES") == "0":
         return make()
@@ -45,7 +46,8 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
 
 
 def _keep(mesh: PlaneMesh, path: Path) -> None:
-    """Write ``mesh`` to ``path``, and remove those that were not used for longest. Raises `OSError`."""
+    """Write ``mesh`` to ``path``, and remove those that were not used for longest. Raises
+    `OSError`."""
     folder = path.parent
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not is_private(folder):

@@ -1,4 +1,5 @@
-"""Curved second-order cells, the highest that XDMF and its readers know, in the place of cells of any degree."""
+"""Curved second-order cells, the highest that XDMF and its readers know, in the place of cells of
+any degree."""
 
 from __future__ import annotations
 
@@ -13,8 +14,9 @@ from archord.geometry.meshes.plane_mesh import distinct_edges
 class SecondOrder:
     """Second-order cells in the place of cells with nodes ``nodes_of_cell`` ``(n, a)``.
 
-    ``cells`` ``(n, 6)`` or ``(n, 9)`` are their nodes: ``corners`` vertices, then the middles of the edges, and of
-    quadrilaterals, in basix' order. The nodes behind the vertices lie between those of ``between``.
+    ``cells`` ``(n, 6)`` or ``(n, 9)`` are their nodes: ``corners`` vertices, then the middles of
+    the edges, and of quadrilaterals, in basix' order. The nodes behind the vertices lie between
+    those of ``between``.
     """
 
     def __init__(self, nodes_of_cell: np.ndarray) -> None:
@@ -33,17 +35,21 @@ class SecondOrder:
         self._at_middle = tabulate(kind, degree, np.array([[0.5, 0.5]]))[0, 0]
         self.corners, within = k, np.searchsorted(self._vertices, self._whole[:, :k])
         self.between = [np.searchsorted(self._vertices, self._edges[:, :2]), within]
-        weights = lagrange(degree) @ 0.5 ** np.arange(degree + 1)  # of equispaced nodes, at the middle
+        weights = lagrange(degree) @ 0.5 ** np.arange(
+            degree + 1
+        )  # of equispaced nodes, at the middle
         self._weights = weights[[0, degree, *range(1, degree)]]
 
     def __call__(self, values: Array) -> Array:
-        """Values ``(m, k)`` at the nodes of the second-order cells, from those at the nodes of the cells."""
+        """Values ``(m, k)`` at the nodes of the second-order cells, from those at the nodes of the
+        cells."""
         middles = np.einsum("a,eak->ek", self._weights, values[self._edges])
         within = np.einsum("a,nak->nk", self._at_middle, values[self._whole])
         return np.concatenate([values[self._vertices], middles, within])
 
     def along(self, ends: np.ndarray) -> np.ndarray:
-        """Nodes ``(k, 3)`` of edges with the vertices ``ends`` ``(k, 2)``: the first one, the middle, the last one."""
+        """Nodes ``(k, 3)`` of edges with the vertices ``ends`` ``(k, 2)``: the first one, the
+        middle, the last one."""
         n, vertices = len(self._vertices), np.searchsorted(self._vertices, ends)
         numbers, wanted = (np.sort(pair, axis=1) @ [n, 1] for pair in (self.between[0], vertices))
         order = np.argsort(numbers)

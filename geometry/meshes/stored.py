@@ -1,4 +1,5 @@
-"""Meshes of archord's own in .npz files: the arrays of a `PlaneMesh`, and the names of its sets as JSON; no pickle."""
+"""Meshes of archord's own in .npz files: the arrays of a `PlaneMesh`, and the names of its sets as
+JSON; no pickle."""
 
 from __future__ import annotations
 
@@ -11,12 +12,19 @@ import numpy as np
 from archord.geometry.basis import cell_kind
 from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
 
-_ARRAYS = {"x": "f", "cells": "i", "bodies": "i", "edges": "i", "tags": "i"}  # and the kind of their numbers
+_ARRAYS = {
+    "x": "f",
+    "cells": "i",
+    "bodies": "i",
+    "edges": "i",
+    "tags": "i",
+}  # and the kind of their numbers
 _SETS = ("cell_sets", "facet_sets", "point_sets")
 
 
 def store_mesh(mesh: PlaneMesh, file: BinaryIO) -> None:
-    """Write ``mesh`` to ``file``, from which `stored_mesh` reads it to the last bit, its sets in their order."""
+    """Write ``mesh`` to ``file``, from which `stored_mesh` reads it to the last bit, its sets in
+    their order."""
     points = {name: nodes.tolist() for name, nodes in mesh.point_sets.items()}
     sets = {"cell_sets": mesh.cell_sets, "facet_sets": mesh.facet_sets, "point_sets": points}
     named = np.frombuffer(json.dumps(sets).encode(), dtype=np.uint8)
@@ -32,7 +40,9 @@ def stored_mesh(path: Path) -> PlaneMesh:
         sets = json.loads(file["sets"].tobytes())
     _require_whole(arrays, sets)
     x = flat(arrays.pop("x"))
-    cell_sets, facet_sets = ({name: tuple(tags) for name, tags in sets[kind].items()} for kind in _SETS[:2])
+    cell_sets, facet_sets = (
+        {name: tuple(tags) for name, tags in sets[kind].items()} for kind in _SETS[:2]
+    )
     points = {name: np.array(nodes, dtype=np.int64) for name, nodes in sets["point_sets"].items()}
     return PlaneMesh(x, **arrays, cell_sets=cell_sets, facet_sets=facet_sets, point_sets=points)
 

@@ -1,4 +1,5 @@
-"""A mesh with named sets of cells, facets and points: what a problem's bodies, surfaces and supports are found by."""
+"""A mesh with named sets of cells, facets and points: what a problem's bodies, surfaces and
+supports are found by."""
 
 from __future__ import annotations
 
@@ -20,10 +21,12 @@ Sets = Mapping[str, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class TaggedMesh:
-    """A mesh of one kind of cells, its ``cells`` and ``facets`` with tags, and named sets; all bodies live in one mesh.
+    """A mesh of one kind of cells, its ``cells`` and ``facets`` with tags, and named sets; all
+    bodies live in one mesh.
 
-    A set has several tags where sets overlap: cells (facets) of the same sets share a tag. ``point_sets`` are the
-    coordinates ``(k, 2)`` of single nodes. ``notes`` are what to warn of, by how the mesh was made.
+    A set has several tags where sets overlap: cells (facets) of the same sets share a tag.
+    ``point_sets`` are the coordinates ``(k, 2)`` of single nodes. ``notes`` are what to warn of, by
+    how the mesh was made.
     """
 
     mesh: Mesh
@@ -39,16 +42,20 @@ class TaggedMesh:
         return tags_of("cell", self.cell_sets, name)
 
     def cells_in(self, name: str) -> np.ndarray:
-        """Cells ``(n,)`` of the cell set ``name`` on this rank, ghosts included. Raises ValueError."""
+        """Cells ``(n,)`` of the cell set ``name`` on this rank, ghosts included. Raises
+        ValueError."""
         return self.cells.indices[np.isin(self.cells.values, self.cell_tags(name))]
 
     def facets_in(self, name: str) -> np.ndarray:
-        """Facets ``(n,)`` of the facet set ``name`` on this rank, ghosts included. Raises ValueError."""
-        return self.facets.indices[np.isin(self.facets.values, tags_of("facet", self.facet_sets, name))]
+        """Facets ``(n,)`` of the facet set ``name`` on this rank, ghosts included. Raises
+        ValueError."""
+        return self.facets.indices[
+            np.isin(self.facets.values, tags_of("facet", self.facet_sets, name))
+        ]
 
     def dofs_in(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
-        """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet and point set ``name``, or in the
-        cell set where it is neither. Collective; raises ValueError."""
+        """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet and point set
+        ``name``, or in the cell set where it is neither. Collective; raises ValueError."""
         found = []
         if name in self.facet_sets:
             found.append(fem.locate_dofs_topological(V, 1, self.facets_in(name)))
@@ -69,12 +76,16 @@ class TaggedMesh:
         if not len(points):
             raise ValueError(f"the point set {name!r} is empty: no cell has a node of it")
         comm, n_owned = self.mesh.comm, V.dofmap.index_map.size_local
-        near = _SAME_PLACE * comm.allreduce(np.abs(self.mesh.geometry.x).max(initial=0.0), op=MPI.MAX)
+        near = _SAME_PLACE * comm.allreduce(
+            np.abs(self.mesh.geometry.x).max(initial=0.0), op=MPI.MAX
+        )
         alike = cKDTree(points).query_ball_point(points, near, return_length=True)
         here = cKDTree(x).query_ball_point(points, near)
         found = comm.allreduce(np.array([sum(dof < n_owned for dof in dofs) for dofs in here]))
         for at in points[found != alike]:
-            raise ValueError(f"the point set {name!r} does not tell which node at ({at[0]:g}, {at[1]:g}) it means")
+            raise ValueError(
+                f"the point set {name!r} does not tell which node at ({at[0]:g}, {at[1]:g}) it means"
+            )
         return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
 
     def tags_behind(self, name: str) -> set[int]:
@@ -94,7 +105,8 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
 
 
 def tags_of(kind: str, sets: Sets, name: str) -> tuple[int, ...]:
-    """Tags of the set ``name`` of a ``kind``. Raises ValueError if there is none, or if it is empty."""
+    """Tags of the set ``name`` of a ``kind``. Raises ValueError if there is none, or if it is
+    empty."""
     if name not in sets:
         raise ValueError(unknown(f"{kind} set", name, list(sets)))
     if not sets[name]:

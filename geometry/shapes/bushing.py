@@ -1,7 +1,7 @@
 """A pin in any number of sleeves in a housing that is held at its outer edge: the half y >= 0.
 
-The housing's centre is the origin. All bodies are drawn concentric, or shifted in +x until each touches the next one
-out. Surfaces that interfere are drawn into each other, around one centre.
+The housing's centre is the origin. All bodies are drawn concentric, or shifted in +x until each
+touches the next one out. Surfaces that interfere are drawn into each other, around one centre.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ def bushing(
 ) -> TaggedMesh:
     """Mesh the bodies "pin", "sleeve 1", ... and "housing", with ``options`` as for `mesh_joint`.
 
-    ``rings`` are the inner and outer radii of sleeves and housing, from the pin outward. Lengths share one unit. All
-    arcs are cut into equal angles, of elements ``element_size`` long on the pin, shorter if walls are thin; away from
-    the arcs they grow by ``growth`` per unit of distance. Sets: "pin", "flat" (the pin's line across the axis, see
-    `lug`), "sleeve 1 inside", "sleeve 1 outside", ..., "bore", "outer edge" and "axis" (y = 0).
+    ``rings`` are the inner and outer radii of sleeves and housing, from the pin outward. Lengths
+    share one unit. All arcs are cut into equal angles, of elements ``element_size`` long on the
+    pin, shorter if walls are thin; away from the arcs they grow by ``growth`` per unit of distance.
+    Sets: "pin", "flat" (the pin's line across the axis, see `lug`), "sleeve 1 inside", "sleeve 1
+    outside", ..., "bore", "outer edge" and "axis" (y = 0).
     """
     rings = [(inner / radius, outer / radius) for inner, outer in rings]
     size = min(element_size / radius, *(longest_edge(outer - inner) for inner, outer in rings))
@@ -44,7 +45,9 @@ def bushing(
     gaps = [touching * max(inner - r, 0.0) for (inner, _), r in zip(rings, within, strict=False)]
     shifts = [sum(gaps[i:]) for i in range(len(rings) + 1)]
     names = ["pin", *(f"sleeve {k}" for k in range(1, len(rings))), "housing"]
-    sets = [(f"{name} inside", f"{name} outside") for name in names[1:-1]] + [("bore", "outer edge")]
+    sets = [(f"{name} inside", f"{name} outside") for name in names[1:-1]] + [
+        ("bore", "outer edge")
+    ]
     sketch = Sketch(names, ["pin", "flat", *(name for pair in sets for name in pair), "axis"])
     sketch.pin(shifts[0], 1, pin)
     sketch.sizes["pin"] = f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"
@@ -54,7 +57,9 @@ def bushing(
         nearest = between(x, inner, outer)
         away = f"{r} - {inner!r}" if body == "housing" else nearest
         sketch.sizes[body] = f"{size!r} * {r} + {growth!r} * Abs({away})"
-    sketch.parts |= {line: math.pi / 2 / size for name in sketch.circles for line in sketch.lines[name]}
+    sketch.parts |= {
+        line: math.pi / 2 / size for name in sketch.circles for line in sketch.lines[name]
+    }
     return mesh_joint(comm, sketch, radius=radius, **options)
 
 
@@ -70,13 +75,23 @@ def between(x: float, inner: float, outer: float) -> str:
 
 
 def draw_ring(
-    sketch: Sketch, body: str, sets: Sequence[str], radii: Sequence[float], x: float, up: int, size: float
+    sketch: Sketch,
+    body: str,
+    sets: Sequence[str],
+    radii: Sequence[float],
+    x: float,
+    up: int,
+    size: float,
 ) -> None:
-    """Draw the half of a ring about (x, 0) above (``up`` = 1) or below the axis, between an inner and an outer radius,
-    whose arcs go to two ``sets``; a wall of few elements of ``size`` is cut into a grid."""
+    """Draw the half of a ring about (x, 0) above (``up`` = 1) or below the axis, between an inner
+    and an outer radius, whose arcs go to two ``sets``; a wall of few elements of ``size`` is cut
+    into a grid."""
     ends = [((x + r, 0.0), (x, up * r), (x - r, 0.0)) for r in radii]
     circles = [Circle(name, (x, 0.0), r) for name, r in zip(sets, radii, strict=True)]
-    arcs = {on.facets: sketch.path(body, *places, on=on) for on, places in zip(circles, ends, strict=True)}
+    arcs = {
+        on.facets: sketch.path(body, *places, on=on)
+        for on, places in zip(circles, ends, strict=True)
+    }
     across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
     face = sketch.face(body, **arcs, axis=across)
     layers = (radii[1] - radii[0]) / (size * radii[0])

@@ -32,10 +32,11 @@ def clevis(
     pin: PinPart = "half",
     **options,
 ) -> TaggedMesh:
-    """Mesh the bodies "inner pin", "inner", "outer pin" and "outer", with ``options`` as for `mesh_joint`.
+    """Mesh the bodies "inner pin", "inner", "outer pin" and "outer", with ``options`` as for
+    `mesh_joint`.
 
-    The plates ``inner`` and ``outer`` have a ``width``, ``edge_distance``, ``length`` and ``end``. Sets are those of a
-    lug with "inner " or "outer " in front, and "axis". Lengths share one unit.
+    The plates ``inner`` and ``outer`` have a ``width``, ``edge_distance``, ``length`` and ``end``.
+    Sets are those of a lug with "inner " or "outer " in front, and "axis". Lengths share one unit.
     """
     hole = (radius + clearance) / radius
     plates = {}

@@ -1,5 +1,5 @@
-"""What the meshes of all kinds of joints share: sets, element sizes, exact circles. gmsh works in units of the pin's
-radius whatever the units of the scene, so meshes do not depend on them."""
+"""What the meshes of all kinds of joints share: sets, element sizes, exact circles. gmsh works in
+units of the pin's radius whatever the units of the scene, so meshes do not depend on them."""
 
 from __future__ import annotations
 
@@ -18,15 +18,19 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 Place = tuple[float, float]
 PinPart = Literal["half", "whole", "none"]
-_CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
+_CUT_ABOVE = (
+    30_000,
+    100_000,
+)  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
 class Sketch:
     """A joint as gmsh is to draw it: every body has each point, line and arc once.
 
-    ``faces`` are those of every body, ``lines`` those of every set; sets have the numbers 1, 2, ... in the order of
-    their names, and may be empty. Shapes add the element ``sizes`` of bodies (expressions in x and y), how many equal
-    edges a line has at least (``parts``), and the corners of faces that are cut into a ``grid``.
+    ``faces`` are those of every body, ``lines`` those of every set; sets have the numbers 1, 2, ...
+    in the order of their names, and may be empty. Shapes add the element ``sizes`` of bodies
+    (expressions in x and y), how many equal edges a line has at least (``parts``), and the corners
+    of faces that are cut into a ``grid``.
     """
 
     def __init__(self, bodies: Sequence[str], sets: Sequence[str]) -> None:
@@ -51,13 +55,15 @@ class Sketch:
             self.circles[on.facets] = on
         for a, b in pairwise(places):
             if (body, a, b) not in self._curve:
-                self.curves.append([self.point(body, place) for place in (a, b, *([on.centre] if on else []))])
+                self.curves.append(
+                    [self.point(body, place) for place in (a, b, *([on.centre] if on else []))]
+                )
                 self._curve[body, a, b] = self._curve[body, b, a] = len(self.curves)
         return [self._curve[body, a, b] for a, b in pairwise(places)]
 
     def face(self, body: str, **paths: list[int]) -> int:
-        """A face of ``body`` within ``paths`` that together are closed, in whatever direction each line goes; the lines
-        go to the sets of these names, where there are such."""
+        """A face of ``body`` within ``paths`` that together are closed, in whatever direction each
+        line goes; the lines go to the sets of these names, where there are such."""
         self.loops.append([line for path in paths.values() for line in path])
         self.faces[body].append(len(self.loops))
         for name in paths.keys() & self.lines:
@@ -65,8 +71,8 @@ class Sketch:
         return len(self.loops)
 
     def pin(self, x: float, up: int, part: PinPart, before: str = "") -> None:
-        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0); the names of its body and its sets
-        have ``before`` in front."""
+        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0); the names of
+        its body and its sets have ``before`` in front."""
         pin = f"{before}pin"
         for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
             arc = self.path(pin, (x + to, 0), (x, up), on=Circle(pin, (x, 0.0), 1.0))
@@ -75,13 +81,21 @@ class Sketch:
 
 
 def mesh_joint(
-    comm: MPI.Comm, sketch: Sketch, *, radius: float, degree: int = 2, refinements: int = 0, partitioner=None
+    comm: MPI.Comm,
+    sketch: Sketch,
+    *,
+    radius: float,
+    degree: int = 2,
+    refinements: int = 0,
+    partitioner=None,
 ) -> TaggedMesh:
-    """Mesh a ``sketch``, times ``radius``, with all nodes of arcs on their circles; the centre of each pin becomes a
-    point set: that of "pin" the set "centre", that of "inner pin" the set "inner centre".
+    """Mesh a ``sketch``, times ``radius``, with all nodes of arcs on their circles; the centre of
+    each pin becomes a point set: that of "pin" the set "centre", that of "inner pin" the set "inner
+    centre".
 
-    The mesh is made with larger elements, which are then cut in four as often as ``refinements`` says: much quicker.
-    ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual ways). Collective; rank 0 meshes.
+    The mesh is made with larger elements, which are then cut in four as often as ``refinements``
+    says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual
+    ways). Collective; rank 0 meshes.
     """
 
     def build(gmsh) -> None:
@@ -113,10 +127,16 @@ def mesh_joint(
         mesh.field.setAsBackgroundMesh(smallest)
 
     how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
-    joint = gmsh_to_mesh(comm, build, list(sketch.circles.values()), **how, key=tuple(vars(sketch).items()))
+    joint = gmsh_to_mesh(
+        comm, build, list(sketch.circles.values()), **how, key=tuple(vars(sketch).items())
+    )
     joint.mesh.geometry.x[:] *= radius
-    pins = {name: circle.centre for name, circle in sketch.circles.items() if name.split()[-1] == "pin"}
-    centres = {name.removesuffix("pin") + "centre": radius * np.array([at]) for name, at in pins.items()}
+    pins = {
+        name: circle.centre for name, circle in sketch.circles.items() if name.split()[-1] == "pin"
+    }
+    centres = {
+        name.removesuffix("pin") + "centre": radius * np.array([at]) for name, at in pins.items()
+    }
     return replace(joint, point_sets=centres) if centres else joint
 
 
@@ -126,6 +146,6 @@ def around(x: float) -> str:
 
 
 def refinements(cells: float) -> int:
-    """How often a mesh that is to have about so many ``cells`` is made by cutting triangles in four: gmsh's time grows
-    faster than the number of triangles, that of the cutting does not."""
+    """How often a mesh that is to have about so many ``cells`` is made by cutting triangles in
+    four: gmsh's time grows faster than the number of triangles, that of the cutting does not."""
     return sum(cells > limit for limit in _CUT_ABOVE)

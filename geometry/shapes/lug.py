@@ -1,9 +1,9 @@
-"""A straight lug: a plate with a hole near its end, a clamp at the other, and a pin that pulls at it in +x, in the hole
-itself or in a bushing that is pressed into the hole.
+"""A straight lug: a plate with a hole near its end, a clamp at the other, and a pin that pulls at
+it in +x, in the hole itself or in a bushing that is pressed into the hole.
 
-The hole's centre is the origin. The pin's centre is (dR, 0), so pin and hole touch at (R + dR, 0); for an interference
-both are drawn into each other around the origin. The plate reaches from the clamp x = -length to the apex x = edge
-distance of its end, and from y = -width/2 to width/2.
+The hole's centre is the origin. The pin's centre is (dR, 0), so pin and hole touch at (R + dR, 0);
+for an interference both are drawn into each other around the origin. The plate reaches from the
+clamp x = -length to the apex x = edge distance of its end, and from y = -width/2 to width/2.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ _CORNER = 2.0  # size at the clamp's corners, where the stress is singular, over
 
 @dataclass(frozen=True)
 class Plate:
-    """Outline of a plate in radii of the pin: radius of the ``hole``, half the width (``side``), from the hole's centre
-    to the apex (``tip``) and to the clamp (``back``), and whether the end is round."""
+    """Outline of a plate in radii of the pin: radius of the ``hole``, half the width (``side``),
+    from the hole's centre to the apex (``tip``) and to the clamp (``back``), and whether the end is
+    round."""
 
     hole: float
     side: float
@@ -41,15 +42,19 @@ class Plate:
         return min(self.side, self.tip) - self.hole
 
 
-def draw_plate(sketch: Sketch, plate: Plate, body: str, up: int, at: float = 0.0, before: str = "") -> None:
-    """Draw the half of a ``plate`` above (``up`` = 1) or below the axis, with the hole's centre at (``at``, 0); the
-    names of its sets but the axis have ``before`` in front."""
+def draw_plate(
+    sketch: Sketch, plate: Plate, body: str, up: int, at: float = 0.0, before: str = ""
+) -> None:
+    """Draw the half of a ``plate`` above (``up`` = 1) or below the axis, with the hole's centre at
+    (``at``, 0); the names of its sets but the axis have ``before`` in front."""
     hole, side, tip, back = plate.hole, plate.side, at + plate.tip, at - plate.back
     round_hole = Circle(f"{before}hole", (at, 0.0), hole)
     apex = Circle(f"{before}end", (tip - side, 0.0), side) if plate.round else None
     corner = (tip - side if apex else tip, up * side)
     arc = sketch.path(body, (at + hole, 0), (at, up * hole), (at - hole, 0), on=round_hole)
-    axis = sketch.path(body, (at - hole, 0), (back, 0)) + sketch.path(body, (tip, 0), (at + hole, 0))
+    axis = sketch.path(body, (at - hole, 0), (back, 0)) + sketch.path(
+        body, (tip, 0), (at + hole, 0)
+    )
     clamp = sketch.path(body, (back, 0), (back, up * side))
     last = sketch.path(body, corner, (tip, 0), on=apex)
     sides = sketch.path(body, (back, up * side), corner)
@@ -63,7 +68,8 @@ def size_around(x: float, r: float, size: float, growth: float) -> str:
 
 
 def plate_size(plate: Plate, size: float, growth: float, at: float = 0.0) -> str:
-    """The element size in a plate with its hole about (``at``, 0): growing from the hole and the clamp's corners."""
+    """The element size in a plate with its hole about (``at``, 0): growing from the hole and the
+    clamp's corners."""
     off = f"Sqrt((x - {at!r} + {plate.back!r})^2 + (Abs(y) - {plate.side!r})^2)"
     clamped = f"{_CORNER * size!r} + {growth!r} * {off}"
     return f"Min({size_around(at, plate.hole, size, growth)}, {clamped})"
@@ -90,16 +96,19 @@ def lug(
     """Mesh the bodies "pin" and "lug", and "bushing" if it has a ``wall``, with ``options`` as for
     `mesh_joint`. Lengths share one unit.
 
-    A round end is an arc of radius width/2, wherever its apex lies. ``element_size`` is the edge length on the arcs of
-    pin and hole, shorter if less than three would lie across the narrowest ligament; away from the arcs it grows by
-    ``growth`` per unit of distance. Sets: "pin", "hole", "end", "sides", "clamp", "axis" (y = 0) and "flat", the pin's
-    line x = dR, which halves a whole pin and bounds the front half of a ``half`` one. The half y >= 0 is meshed or all.
+    A round end is an arc of radius width/2, wherever its apex lies. ``element_size`` is the edge
+    length on the arcs of pin and hole, shorter if less than three would lie across the narrowest
+    ligament; away from the arcs it grows by ``growth`` per unit of distance. Sets: "pin", "hole",
+    "end", "sides", "clamp", "axis" (y = 0) and "flat", the pin's line x = dR, which halves a whole
+    pin and bounds the front half of a ``half`` one. The half y >= 0 is meshed or all.
 
-    A bushing has the sets "bushing inside" and "bushing outside". The clearance is then between the pin
-    and the bushing, whose outer radius exceeds the hole's by the ``interference``. A pin that is not
-    ``touching`` is concentric.
+    A bushing has the sets "bushing inside" and "bushing outside". The clearance is then between the
+    pin and the bushing, whose outer radius exceeds the hole's by the ``interference``. A pin that
+    is not ``touching`` is concentric.
     """
-    bore, side, tip, back = (v / radius for v in (radius + clearance, width / 2, edge_distance, length))
+    bore, side, tip, back = (
+        v / radius for v in (radius + clearance, width / 2, edge_distance, length)
+    )
     outer = bore + (wall or 0.0) / radius
     hole = outer - interference / radius
     plate = Plate(hole, side, tip, back, end == "round")
@@ -119,7 +128,9 @@ def lug(
     sketch.sizes["lug"] = plate_size(plate, size, growth)
     arcs = sketch.lines["pin"] + sketch.lines["hole"]
     if wall:
-        sketch.sizes["bushing"] = f"{size!r} * {around(0)} + {growth!r} * {between(0.0, bore, outer)}"
+        sketch.sizes["bushing"] = (
+            f"{size!r} * {around(0)} + {growth!r} * {between(0.0, bore, outer)}"
+        )
         arcs += [line for name in _SLEEVE for line in sketch.lines[name]]
     sketch.parts |= dict.fromkeys(arcs, math.pi / 2 / size)
     return mesh_joint(comm, sketch, radius=radius, **options)

@@ -1,4 +1,5 @@
-"""A pin of radius R in a block with a hole of radius R + dR: the joints that `[joint]` of a scene is about.
+"""A pin of radius R in a block with a hole of radius R + dR: the joints that `[joint]` of a scene
+is about.
 
 The hole's centre is the origin, the symmetry axis is x = 0.
 """
@@ -13,7 +14,9 @@ from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
 
-_EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
+_EDGE_GROWTH = (
+    0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
+)
 
 
 def quarter_joint(
@@ -30,27 +33,40 @@ def quarter_joint(
     whole_pin: bool = False,
     **options,
 ) -> TaggedMesh:
-    """Mesh the paper's joint, a quarter of pin and hole, with ``options`` as for `mesh_joint`. Lengths share one unit.
+    """Mesh the paper's joint, a quarter of pin and hole, with ``options`` as for `mesh_joint`.
+    Lengths share one unit.
 
-    The pin's centre is (0, -dR), so pin and hole touch at (0, -R - dR). The block reaches to x = W and y = -H, both
-    ``block_size``; its top edge y = 0 is held, the pin's flat top is the loaded edge.
+    The pin's centre is (0, -dR), so pin and hole touch at (0, -R - dR). The block reaches to x = W
+    and y = -H, both ``block_size``; its top edge y = 0 is held, the pin's flat top is the loaded
+    edge.
 
-    ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the pin's; away from
-    them it grows by ``growth`` per unit of distance. ``edge`` is an angle from the axis [rad] and the size to which
-    the elements shrink there, where the contact is to end. A rigid pin is not meshed; of a whole one the upper half,
-    free, is meshed with the rest, which is then pressed along a line inside it.
+    ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the
+    pin's; away from them it grows by ``growth`` per unit of distance. ``edge`` is an angle from the
+    axis [rad] and the size to which the elements shrink there, where the contact is to end. A rigid
+    pin is not meshed; of a whole one the upper half, free, is meshed with the rest, which is then
+    pressed along a line inside it.
     """
     hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
-    sketch = Sketch(("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back"))
+    sketch = Sketch(
+        ("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back")
+    )
     middle, bottom, side, top = (0, 1 - hole), (0, -hole), (1, 1 - hole), (0, 2 - hole)
     if not rigid_pin:
         sketch.point("pin", middle)
-        arc, half = sketch.path("pin", bottom, side, on=Circle("pin", middle, 1.0)), sketch.path("pin", side, middle)
-        sketch.face("pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom))
+        arc, half = (
+            sketch.path("pin", bottom, side, on=Circle("pin", middle, 1.0)),
+            sketch.path("pin", side, middle),
+        )
+        sketch.face(
+            "pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom)
+        )
         if whole_pin:
             sketch.point("pin", top)
             back = sketch.path("pin", side, top, on=Circle("pin back", middle, 1.0))
-            sketch.face("pin", **{"pin back": back, "symmetry": sketch.path("pin", top, middle), "pin top": half})
+            sketch.face(
+                "pin",
+                **{"pin back": back, "symmetry": sketch.path("pin", top, middle), "pin top": half},
+            )
     corners = (hole, 0), (width, 0), (width, -width), (0, -width)
     for place in ((0, 0), bottom, *corners):
         sketch.point("block", place)
@@ -63,7 +79,9 @@ def quarter_joint(
             sketch.parts |= dict.fromkeys(sketch.lines[name], math.pi / 2 / on_arc)
         else:
             x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
-            near_edge = f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
+            near_edge = (
+                f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
+            )
             sketch.sizes[body] = f"Min({sketch.sizes[body]}, {near_edge})"
     return mesh_joint(comm, sketch, radius=radius, **options)
 
@@ -80,23 +98,33 @@ def half_ring(
     size_ratio: float = 1.0,
     **options,
 ) -> TaggedMesh:
-    """Mesh half of a whole pin in a whole ring, with ``options`` as for `mesh_joint`. Lengths share one unit. Persson
-    (1964) solved it, but for the finite material around the hole.
+    """Mesh half of a whole pin in a whole ring, with ``options`` as for `mesh_joint`. Lengths share
+    one unit. Persson (1964) solved it, but for the finite material around the hole.
 
-    Pin and hole have one centre, also where they interfere; the ring's outer edge is held. Elements are
-    ``element_size`` long on the hole's arc and ``size_ratio`` times that on the pin's; away from the arcs they grow by
-    ``growth`` per unit of distance, to a third of ``core_radius`` at the pin's centre.
+    Pin and hole have one centre, also where they interfere; the ring's outer edge is held. Elements
+    are ``element_size`` long on the hole's arc and ``size_ratio`` times that on the pin's; away
+    from the arcs they grow by ``growth`` per unit of distance, to a third of ``core_radius`` at the
+    pin's centre.
     """
-    hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
+    hole, outer, size, core = (
+        1 + clearance / radius,
+        *(v / radius for v in (outer_radius, element_size, core_radius)),
+    )
     sketch = Sketch(("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry"))
 
     def arcs(body: str, name: str, r: float) -> list[int]:
         return sketch.path(body, (0, -r), (r, 0), (0, r), on=Circle(name, (0.0, 0.0), r))
 
     sketch.point("pin", (0, 0))
-    sketch.face("pin", pin=arcs("pin", "pin", 1.0), symmetry=sketch.path("pin", (0, 1.0), (0, 0), (0, -1.0)))
-    round_lines = {name: arcs("block", name, r) for name, r in (("hole", hole), ("block held", outer))}
-    below, above = (sketch.path("block", *ends) for ends in (((0, -outer), (0, -hole)), ((0, hole), (0, outer))))
+    sketch.face(
+        "pin", pin=arcs("pin", "pin", 1.0), symmetry=sketch.path("pin", (0, 1.0), (0, 0), (0, -1.0))
+    )
+    round_lines = {
+        name: arcs("block", name, r) for name, r in (("hole", hole), ("block held", outer))
+    }
+    below, above = (
+        sketch.path("block", *ends) for ends in (((0, -outer), (0, -hole)), ((0, hole), (0, outer)))
+    )
     sketch.face("block", **round_lines, symmetry=below + above)
     from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
     from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"

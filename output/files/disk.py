@@ -1,8 +1,10 @@
-"""Files that survive a kill and a full disk: written beside the old one, which they then replace in one move.
+"""Files that survive a kill and a full disk: written beside the old one, which they then replace in
+one move.
 
-The HDF5 library is kept away from the disk: it leaves files unreadable when a process dies while it writes them, drops
-what does not fit onto a full disk from its buffers without an error, and crashes when it closes such a file. Files are
-composed in memory, and what goes wrong on disk is an `OSError` that names the file.
+The HDF5 library is kept away from the disk: it leaves files unreadable when a process dies while it
+writes them, drops what does not fit onto a full disk from its buffers without an error, and crashes
+when it closes such a file. Files are composed in memory, and what goes wrong on disk is an
+`OSError` that names the file.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ class WriteError(Exception):
 
 
 def new_name(path: Path) -> Path:
-    """Where the successor of ``path`` grows before it takes its place; a kill may leave it behind."""
+    """Where the successor of ``path`` grows before it takes its place; a kill may leave it
+    behind."""
     return path.with_name(path.name + ".new")
 
 
@@ -32,8 +35,8 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def replace_file(path: Path, content: bytes | str, *, durable: bool = False) -> None:
-    """Put a file with ``content`` in the place of ``path``, in one move; if ``durable``, also a power cut then leaves
-    it. Raises `OSError` naming ``path``, which then is what it was."""
+    """Put a file with ``content`` in the place of ``path``, in one move; if ``durable``, also a
+    power cut then leaves it. Raises `OSError` naming ``path``, which then is what it was."""
     new = new_name(path)
     try:
         with naming(path):

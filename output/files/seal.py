@@ -1,8 +1,9 @@
-"""What run.json knows of the files of a run that has ended: their size and SHA-256, which tell of a later change.
+"""What run.json knows of the files of a run that has ended: their size and SHA-256, which tell of a
+later change.
 
-A run that goes on, or was killed, has no seals: its steps count as far as run.json has them. So have runs of versions
-0.1 and 0.2, of which the table of steps is compared with the steps of run.json. The last line of run.json is the
-SHA-256 of the lines before it.
+A run that goes on, or was killed, has no seals: its steps count as far as run.json has them. So
+have runs of versions 0.1 and 0.2, of which the table of steps is compared with the steps of
+run.json. The last line of run.json is the SHA-256 of the lines before it.
 """
 
 from __future__ import annotations
@@ -35,15 +36,16 @@ class ChangedError(ValueError):
 
 
 def seals_of(folder: Path) -> dict[str, dict[str, Any]]:
-    """Bytes and SHA-256 by name of those files in ``folder`` that results are read from. Raises `OSError`."""
+    """Bytes and SHA-256 by name of those files in ``folder`` that results are read from. Raises
+    `OSError`."""
     apart = sorted(folder.glob("fields/[0-9]*.h5"))
     files = [path for path in [*(folder / name for name in SEALED), *apart] if path.is_file()]
     return {str(path.relative_to(folder)): _seal(path) for path in files}
 
 
 def fault_of(folder: Path, name: str, seals: Seals, *, by_size: bool = False) -> str:
-    """What happened to the file ``name`` since the run in ``folder`` ended, in words; nothing where it is what the run
-    left, or no seal tells. ``by_size`` looks at the number of bytes alone."""
+    """What happened to the file ``name`` since the run in ``folder`` ended, in words; nothing where
+    it is what the run left, or no seal tells. ``by_size`` looks at the number of bytes alone."""
     if name not in seals:
         return ""
     seal, path = seals[name], folder / name
@@ -61,7 +63,8 @@ def fault_of(folder: Path, name: str, seals: Seals, *, by_size: bool = False) ->
 
 
 def require_intact(folder: Path, names: Iterable[str]) -> None:
-    """Raise `InputError`, with what to do, if one of the files ``names`` is not what the run in ``folder`` left."""
+    """Raise `InputError`, with what to do, if one of the files ``names`` is not what the run in
+    ``folder`` left."""
     seals = _seals_in(folder)
     for name in names:
         if fault := fault_of(folder, name, seals):
@@ -70,21 +73,26 @@ def require_intact(folder: Path, names: Iterable[str]) -> None:
 
 
 def faults_of(folder: Path, seals: Seals, *, quick: bool = False) -> dict[str, str]:
-    """`fault_of` by name of all sealed files that have one; with ``quick`` large files are known by their size."""
-    found = {name: fault_of(folder, name, seals, by_size=quick and name not in TABLES) for name in seals}
+    """`fault_of` by name of all sealed files that have one; with ``quick`` large files are known by
+    their size."""
+    found = {
+        name: fault_of(folder, name, seals, by_size=quick and name not in TABLES) for name in seals
+    }
     return {name: fault for name, fault in found.items() if fault}
 
 
 def report_text(content: Mapping[str, Any]) -> str:
     """``content`` as run.json has it: a line for each key, and one that seals them."""
-    lines = [f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items()]
+    lines = [
+        f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items()
+    ]
     text = "{\n" + ",\n".join(lines)
     return f"{text}{_OWN}{hashlib.sha256(text.encode()).hexdigest()}{_END}"
 
 
 def read_report(path: Path) -> Any:
-    """What the run.json ``path`` holds, without its own seal. Raises `OSError`, `ValueError` if it is no JSON, and
-    `ChangedError` if it was changed after it was written."""
+    """What the run.json ``path`` holds, without its own seal. Raises `OSError`, `ValueError` if it
+    is no JSON, and `ChangedError` if it was changed after it was written."""
     text = require_file(path).read_bytes().decode()
     report = json_of(text)
     if not isinstance(report, dict) or "sha256" not in report:
@@ -115,7 +123,10 @@ def _read_seals(path: Path, changed: int, size: int) -> Seals:
 def _seal(path: Path) -> dict[str, Any]:
     with naming(path):
         known = path.stat()
-        return {"bytes": known.st_size, "sha256": _digest(path, known.st_mtime_ns, known.st_size, known.st_ino)}
+        return {
+            "bytes": known.st_size,
+            "sha256": _digest(path, known.st_mtime_ns, known.st_size, known.st_ino),
+        }
 
 
 @lru_cache(maxsize=4096)

@@ -1,8 +1,9 @@
 """HDF5 files that grow step by step and survive a kill.
 
-The file itself is written whole after every step and put into its place in one move. Large arrays lie apart, in a file
-for each step that never changes again, and the file has links to them: what is written then grows with the steps, not
-with their square. A reader opens one file and finds ``name/0001`` and so on, whatever lies where.
+The file itself is written whole after every step and put into its place in one move. Large arrays
+lie apart, in a file for each step that never changes again, and the file has links to them: what is
+written then grows with the steps, not with their square. A reader opens one file and finds
+``name/0001`` and so on, whatever lies where.
 """
 
 from __future__ import annotations
@@ -25,13 +26,14 @@ _NUMBERS = count()  # HDF5 tells open files apart by name
 
 
 class StepFile:
-    """``path`` with the arrays ``fixed``, ``name/0001`` and so on for each step, ``accepted``, the number of steps, and
-    ``load``, what each was reached at.
+    """``path`` with the arrays ``fixed``, ``name/0001`` and so on for each step, ``accepted``, the
+    number of steps, and ``load``, what each was reached at.
 
-    ``apart`` puts the arrays into files of their own, NAME/0000.h5 for the fixed ones. The file appears with the next
-    step, the first one or that ``after`` some steps that are there, as this version or version 0.1 wrote them. Raises
-    `OSError`, and `InputError` if a file that should go on is missing, damaged or does not hold these steps. ``loads``
-    and ``names`` are those of all steps and their arrays.
+    ``apart`` puts the arrays into files of their own, NAME/0000.h5 for the fixed ones. The file
+    appears with the next step, the first one or that ``after`` some steps that are there, as this
+    version or version 0.1 wrote them. Raises `OSError`, and `InputError` if a file that should go
+    on is missing, damaged or does not hold these steps. ``loads`` and ``names`` are those of all
+    steps and their arrays.
     """
 
     def __init__(self, path: Path, fixed: Arrays, after: int = 0, *, apart: bool = False) -> None:
@@ -47,7 +49,8 @@ class StepFile:
             self._add_step(load, arrays)
 
     def write(self, load: float, arrays: Arrays) -> None:
-        """Add a step, reached at ``load``. Raises `OSError`: then the file is what it was, this object of no use."""
+        """Add a step, reached at ``load``. Raises `OSError`: then the file is what it was, this
+        object of no use."""
         self._add_step(load, arrays)
         replace_file(self.path, image(self._file))
 
@@ -80,7 +83,9 @@ class StepFile:
         steps: dict[str, Arrays] = {}
         try:
             with h5py.File(self.path) as file:
-                fits = all(name not in file or file[name].shape == a.shape for name, a in fixed.items())
+                fits = all(
+                    name not in file or file[name].shape == a.shape for name, a in fixed.items()
+                )
                 if file["accepted"][()] < after or not fits:
                     raise ValueError(f"it does not hold the first {after} steps of this run")
                 loads = file["load"][:after].tolist()
@@ -105,7 +110,9 @@ def put(file: h5py.File, name: str, values: np.ndarray) -> None:
 
 def hdf5_in_memory() -> h5py.File:
     """A new file that never comes near a disk."""
-    return h5py.File(f"in memory {next(_NUMBERS)}", "w", driver="core", backing_store=False, block_size=4096)
+    return h5py.File(
+        f"in memory {next(_NUMBERS)}", "w", driver="core", backing_store=False, block_size=4096
+    )
 
 
 def image(file: h5py.File) -> bytes:
@@ -115,7 +122,8 @@ def image(file: h5py.File) -> bytes:
 
 
 def all_arrays(group: h5py.Group, prefix: str = "") -> Iterator[tuple[str, np.ndarray]]:
-    """Every array of an open file by its name, also those that lie apart, which `h5py.Group.visit` leaves out."""
+    """Every array of an open file by its name, also those that lie apart, which `h5py.Group.visit`
+    leaves out."""
     for name in group:
         item = group[name]
         if isinstance(item, h5py.Dataset):

@@ -16,9 +16,12 @@ from archord.solver.system import System
 
 Ints = npt.NDArray[np.int64]
 
-# Abaqus counts corners counterclockwise, then the midpoint behind each, then the centre; its edges begin at a corner.
-# These are basix' nodes of degree 2 in that order, and its facets as edges.
-_NODES = {basix.CellType.triangle: [0, 1, 2, 5, 3, 4], basix.CellType.quadrilateral: [0, 1, 3, 2, 4, 6, 7, 5, 8]}
+# Abaqus counts corners counterclockwise, then the midpoint behind each, then the centre; its edges
+# begin at a corner. These are basix' nodes of degree 2 in that order, and its facets as edges.
+_NODES = {
+    basix.CellType.triangle: [0, 1, 2, 5, 3, 4],
+    basix.CellType.quadrilateral: [0, 1, 3, 2, 4, 6, 7, 5, 8],
+}
 _EDGES = {basix.CellType.triangle: [1, 2, 0], basix.CellType.quadrilateral: [0, 3, 1, 2]}
 _OF_MIDDLE = np.array([-0.25] * 4 + [0.5] * 4)  # the middle of a quadrilateral of 8 nodes by these
 _RIM = 0.8  # inner over outer radius of the ring that stands for a rigid disc
@@ -26,8 +29,8 @@ _RIM = 0.8  # inner over outer radius of the ring that stands for a rigid disc
 
 @dataclass(frozen=True)
 class Surface:
-    """The ``elements`` ``(n,)`` behind a surface, their ``edges`` ``(n,)``, edge i going from corner i to the next, and
-    those edges' nodes ``(n, 3)``: start, end, midpoint."""
+    """The ``elements`` ``(n,)`` behind a surface, their ``edges`` ``(n,)``, edge i going from
+    corner i to the next, and those edges' nodes ``(n, 3)``: start, end, midpoint."""
 
     elements: Ints
     edges: Ints
@@ -36,12 +39,14 @@ class Surface:
 
 @dataclass(frozen=True)
 class DeckMesh:
-    """Nodes ``x`` ``(n, 2)`` and per body the nodes ``(m, 6 or 8)`` of its ``elements``, counterclockwise,
-    corners before midpoints; both are numbered from 0, elements through all bodies.
+    """Nodes ``x`` ``(n, 2)`` and per body the nodes ``(m, 6 or 8)`` of its ``elements``,
+    counterclockwise, corners before midpoints; both are numbered from 0, elements through all
+    bodies.
 
-    ``node_sets`` ``(k,)`` and ``surfaces`` have the names of the problem's sets; the ring of elements that stands for a
-    rigid disc is a body and a surface with the `surface_name`. ``dofs`` ``(n,)`` are the nodes' block dofs in the
-    system, and larger than those on a ring. ``middles`` ``(m, 9)`` are the dofs of quadrilaterals without their last.
+    ``node_sets`` ``(k,)`` and ``surfaces`` have the names of the problem's sets; the ring of
+    elements that stands for a rigid disc is a body and a surface with the `surface_name`. ``dofs``
+    ``(n,)`` are the nodes' block dofs in the system, and larger than those on a ring. ``middles``
+    ``(m, 9)`` are the dofs of quadrilaterals without their last.
     """
 
     x: Array
@@ -78,7 +83,9 @@ def deck_mesh(system: System) -> DeckMesh:
     corners, nodes = len(_EDGES[kind]), V.dofmap.list[:, _NODES[kind]].astype(np.int64)
     one, two, last = (x[nodes[:, i]] for i in (0, 1, corners - 1))
     clockwise = np.linalg.det(np.stack([two - one, last - one], axis=1)) < 0
-    turned = [0, *range(corners - 1, 0, -1), *range(2 * corners - 1, corners - 1, -1), 8][: nodes.shape[1]]
+    turned = [0, *range(corners - 1, 0, -1), *range(2 * corners - 1, corners - 1, -1), 8][
+        : nodes.shape[1]
+    ]
     nodes[clockwise] = nodes[clockwise][:, turned]
     cells = {body.name: problem.mesh.cells_in(body.cells or body.name) for body in problem.bodies}
     numbered = np.concatenate(list(cells.values()))
@@ -89,23 +96,31 @@ def deck_mesh(system: System) -> DeckMesh:
     facets_of = mesh.topology.connectivity(2, 1).array.reshape(-1, corners)
 
     def surface(name: str) -> Surface:
-        cell, facet = np.nonzero(np.isin(facets_of, problem.mesh.facets_in(name)) & (number >= 0)[:, None])
+        cell, facet = np.nonzero(
+            np.isin(facets_of, problem.mesh.facets_in(name)) & (number >= 0)[:, None]
+        )
         edge = np.array(_EDGES[kind])[facet]
         edge = np.where(clockwise[cell], corners - 1 - edge, edge)
         along = np.stack([edge, (edge + 1) % corners, edge + corners], axis=1)
         return Surface(number[cell], edge, nodes[cell[:, None], along])
 
-    names = [name for i in problem.interactions for name in i.surfaces if not isinstance(name, Rigid)]
+    names = [
+        name for i in problem.interactions for name in i.surfaces if not isinstance(name, Rigid)
+    ]
     surfaces = {name: surface(name) for name in names}
     node_sets = {s.facets: problem.mesh.dofs_in(V, s.facets) for s in problem.supports}
     for i in problem.interactions:
         if isinstance(disc := i.surfaces[0], Rigid):
             start, end = x[surfaces[i.surfaces[1]].nodes[:, :2]].swapaxes(0, 1)
-            n = int(np.ceil(2 * np.pi * disc.circle.radius / np.linalg.norm(end - start, axis=1).mean()))
+            n = int(
+                np.ceil(2 * np.pi * disc.circle.radius / np.linalg.norm(end - start, axis=1).mean())
+            )
             name, (rim, ring) = surface_name(i, 0), _ring(disc.circle, n)
             ring, x, first = ring + len(x), np.concatenate([x, rim]), sum(map(len, bodies.values()))
             bodies[name], node_sets[name] = ring, np.unique(ring)
-            surfaces[name] = Surface(first + np.arange(n), np.ones(n, dtype=np.int64), ring[:, [1, 2, 5]])
+            surfaces[name] = Surface(
+                first + np.arange(n), np.ones(n, dtype=np.int64), ring[:, [1, 2, 5]]
+            )
     used = np.unique(np.concatenate([own.ravel() for own in bodies.values()]))
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))

@@ -1,14 +1,17 @@
-"""Elastic theories of pin and hole: Hertz's contacts, half-spaces with a logarithm, and Persson's conformal contact.
+"""Elastic theories of pin and hole: Hertz's contacts, half-spaces with a logarithm, and Persson's
+conformal contact.
 
-Johnson, Radzimovsky, ESDU 78035 and Dubowsky and Freudenstein are half-spaces under Hertz's pressure, ``delta = P/(pi
-E*) [ ln(A E* dR/P) + q ]``, and differ only in the numbers ``A`` and ``q``. Each ``P(delta)`` rises until
-``dP/d(delta)`` is infinite at ``P = A e^(q - 1) E* dR``, ``delta = P/(pi E*)``, and turns back there: the load limit.
+Johnson, Radzimovsky, ESDU 78035 and Dubowsky and Freudenstein are half-spaces under Hertz's
+pressure, ``delta = P/(pi E*) [ ln(A E* dR/P) + q ]``, and differ only in the numbers ``A`` and
+``q``. Each ``P(delta)`` rises until ``dP/d(delta)`` is infinite at ``P = A e^(q - 1) E* dR``,
+``delta = P/(pi E*)``, and turns back there: the load limit.
 
-Persson's is the conformal contact of two elastic circles of nearly the same radius without friction, solved exactly for
-Dundurs' beta = 0. The angles: ``b = tan(eps/2)``, ``y = tan(phi/2)``, phi from the contact axis, eps the contact
-semi-angle. With beta = 0 the materials enter only by how the mean pressure ``p_m = (1/2 pi) integral of p dphi``
-changes the clearance: ``dR + (1 + alpha) p_m R/E*`` is one function of the angle for all pairs. So the pressure over
-P/R is the same for every alpha, and alpha moves only the load at which an angle is reached.
+Persson's is the conformal contact of two elastic circles of nearly the same radius without
+friction, solved exactly for Dundurs' beta = 0. The angles: ``b = tan(eps/2)``, ``y = tan(phi/2)``,
+phi from the contact axis, eps the contact semi-angle. With beta = 0 the materials enter only by how
+the mean pressure ``p_m = (1/2 pi) integral of p dphi`` changes the clearance: ``dR + (1 + alpha)
+p_m R/E*`` is one function of the angle for all pairs. So the pressure over P/R is the same for
+every alpha, and alpha moves only the load at which an angle is reached.
 """
 
 from __future__ import annotations
@@ -23,30 +26,36 @@ from archord.postprocess.laws.law import NOTHING, ROUND_OFF, LawState, rising_ro
 
 
 def hertz(joint: LawJoint, P: Array) -> LawState:
-    """Line contact of half-width ``a = 2 sqrt(P R*/(pi E*))``: peak pressure ``p0 = sqrt(P E*/(pi R*))`` and semi-angle
-    ``a/R1`` (Johnson 1985, eqs 4.43 and 4.45)."""
+    """Line contact of half-width ``a = 2 sqrt(P R*/(pi E*))``: peak pressure ``p0 = sqrt(P E*/(pi
+    R*))`` and semi-angle ``a/R1`` (Johnson 1985, eqs 4.43 and 4.45)."""
     root = np.sqrt(P / (math.pi * joint.E_star * joint.relative_radius))
-    return LawState(NOTHING, P, NOTHING, joint.E_star * root, 2 * joint.relative_radius * root / joint.radius)
+    return LawState(
+        NOTHING, P, NOTHING, joint.E_star * root, 2 * joint.relative_radius * root / joint.radius
+    )
 
 
 def hertz_load_limit(joint: LawJoint) -> float:
-    """Load at which the half-width is R1/2; there the parabola for the circle is off by 7 % of the depth."""
+    """Load at which the half-width is R1/2; there the parabola for the circle is off by 7 % of the
+    depth."""
     return math.pi * joint.E_star * (joint.radius / 4) ** 2 / joint.relative_radius
 
 
 def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
-    """Hertz's ball in a socket (Lankarani and Nikravesh 1990, 1994, without damping), as multibody codes use it for
-    pins: ``P = (4/3) E* sqrt(R*) delta^(3/2)/L``, ``p0 = (2/pi) E* sqrt(delta/R*)`` (Johnson 1985, eq. 4.24)."""
+    """Hertz's ball in a socket (Lankarani and Nikravesh 1990, 1994, without damping), as multibody
+    codes use it for pins: ``P = (4/3) E* sqrt(R*) delta^(3/2)/L``, ``p0 = (2/pi) E*
+    sqrt(delta/R*)`` (Johnson 1985, eq. 4.24)."""
     assert joint.length is not None
     root, size = np.sqrt(delta), math.sqrt(joint.relative_radius)
     spring = 4 / 3 * joint.E_star * size / joint.length
-    return LawState(delta, spring * delta * root, 1.5 * spring * root, 2 / math.pi * joint.E_star * root / size)
+    return LawState(
+        delta, spring * delta * root, 1.5 * spring * root, 2 / math.pi * joint.E_star * root / size
+    )
 
 
 def logarithm(joint: LawJoint, delta: Array, A: float, q: float) -> LawState:
-    """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the bracket in
-    the law, ``y = -W_-1(-delta/(e delta_limit))`` with Lambert's function, is 1 at the limit and infinite for no
-    displacement; nan beyond."""
+    """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the
+    bracket in the law, ``y = -W_-1(-delta/(e delta_limit))`` with Lambert's function, is 1 at the
+    limit and infinite for no displacement; nan beyond."""
     spring, limit = math.pi * joint.E_star, turning_point(joint, A, q)
     argument = -delta / (math.e * limit)
     turning = argument <= -(1 - 1e-15) / math.e  # where round-off would give a complex W, or none
@@ -63,23 +72,29 @@ def turning_point(joint: LawJoint, A: float, q: float) -> float:
 
 
 def dubowsky_freudenstein(joint: LawJoint, delta: Array) -> LawState:
-    """``delta = F (s1 + s2)/L [ ln(L^3 dR/(F R1 R2 (s1 + s2))) + 1 ]``, ``s1 + s2 = 1/(pi E*)``, F = P L: Lundberg's
-    compression of two half-spaces that touch along a strip of length L and Hertz's pressure across it."""
+    """``delta = F (s1 + s2)/L [ ln(L^3 dR/(F R1 R2 (s1 + s2))) + 1 ]``, ``s1 + s2 = 1/(pi E*)``, F
+    = P L: Lundberg's compression of two half-spaces that touch along a strip of length L and
+    Hertz's pressure across it."""
     assert joint.length is not None
-    return logarithm(joint, delta, math.pi * joint.length**2 / (joint.relative_radius * joint.clearance), 1.0)
+    return logarithm(
+        joint, delta, math.pi * joint.length**2 / (joint.relative_radius * joint.clearance), 1.0
+    )
 
 
 def dubowsky_freudenstein_limit(joint: LawJoint) -> float:
-    """Displacement at which Hertz's contact is as wide as the joint is long, no strip: ``P = (pi/16) E* L^2/R*``."""
+    """Displacement at which Hertz's contact is as wide as the joint is long, no strip: ``P =
+    (pi/16) E* L^2/R*``."""
     assert joint.length is not None
     return (1 + math.log(16)) * joint.length**2 / (16 * joint.relative_radius)
 
 
 def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array:
-    """Pressure at the angle ``phi`` of a contact of semi-angle ``eps`` under ``P``; zero beyond it (broadcasts).
+    """Pressure at the angle ``phi`` of a contact of semi-angle ``eps`` under ``P``; zero beyond it
+    (broadcasts).
 
-    ``R p/P = 2/(pi sqrt(b^2 + 1)) sqrt(b^2 - y^2)/(1 + y^2) + 1/(2 pi b^2 (1 + b^2)) ln[ (sqrt(b^2 + 1) + sqrt(b^2 -
-    y^2)) / (sqrt(b^2 + 1) - sqrt(b^2 - y^2)) ]`` (Persson 1964; Hu et al., eq. 13).
+    ``R p/P = 2/(pi sqrt(b^2 + 1)) sqrt(b^2 - y^2)/(1 + y^2) + 1/(2 pi b^2 (1 + b^2)) ln[ (sqrt(b^2
+    + 1) + sqrt(b^2 - y^2)) / (sqrt(b^2 + 1) - sqrt(b^2 - y^2)) ]`` (Persson 1964; Hu et al., eq.
+    13).
     """
     b, y = np.tan(eps / 2), np.tan(phi / 2)
     c, s = np.sqrt(1 + b**2), np.sqrt(np.maximum(b**2 - y**2, 0.0))
@@ -88,9 +103,10 @@ def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array
 
 
 def persson_load(joint: LawJoint, eps: Array) -> Array:
-    """Load at which the contact has the semi-angle ``eps``; infinite from the angle on that closes any clearance, 84.83
-    degrees for like bodies. ``E* dR/P = [ 2 - (1 + alpha) (ln(1 + b^2) + 2 b^4) ] / [ 2 pi b^2 (1 + b^2) ]``, with
-    alpha positive for the stiffer pin (Ciavarella and Decuzzi 2001)."""
+    """Load at which the contact has the semi-angle ``eps``; infinite from the angle on that closes
+    any clearance, 84.83 degrees for like bodies. ``E* dR/P = [ 2 - (1 + alpha) (ln(1 + b^2) + 2
+    b^4) ] / [ 2 pi b^2 (1 + b^2) ]``, with alpha positive for the stiffer pin (Ciavarella and
+    Decuzzi 2001)."""
     b2 = np.tan(eps / 2) ** 2
     left = 2 - (1 + joint.dundurs_alpha) * (np.log1p(b2) + 2 * b2**2)
     with np.errstate(divide="ignore"):
@@ -98,7 +114,8 @@ def persson_load(joint: LawJoint, eps: Array) -> Array:
 
 
 def persson(joint: LawJoint, P: Array) -> LawState:
-    """Peak pressure and contact semi-angle [rad] under ``P``: the root of `persson_load`, zero for no load."""
+    """Peak pressure and contact semi-angle [rad] under ``P``: the root of `persson_load`, zero for
+    no load."""
     half = rising_root(lambda b: persson_load(joint, 2 * np.arctan(b)), P, 1.0)
     eps = 2 * np.arctan(half)
     p0 = persson_pressure(joint, P, np.where(P > 0, eps, 1.0), np.zeros_like(eps))

@@ -18,8 +18,8 @@ _COLUMNS = ("run", "of", "value", "s.e.", "mesh", "95 % interval", "R2", "rms", 
 
 
 def parameters(calibration: Calibration) -> list[dict[str, Any]]:
-    """One row per fitted parameter, in numbers: value, errors (None where that of the mesh is unknown), interval,
-    quality of the fit."""
+    """One row per fitted parameter, in numbers: value, errors (None where that of the mesh is
+    unknown), interval, quality of the fit."""
     rows: list[dict[str, Any]] = []
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
     named += [("all together", calibration.joint)] if len(calibration.scenes) > 1 else []
@@ -33,21 +33,40 @@ def parameters(calibration: Calibration) -> list[dict[str, Any]]:
 def summary_table(calibration: Calibration) -> Table:
     """`parameters` for people."""
     table = Table(*_COLUMNS, left=2)
-    for *words, value, error, mesh, (low, high), r2, rms, largest, steps in map(dict.values, parameters(calibration)):
-        errors = f"{error:.1e}", "unknown" if mesh is None else f"{mesh:.1e}", f"{low:.4f} .. {high:.4f}"
-        table.add(*words, f"{value:.5f}", *errors, f"{r2:.5f}", f"{100 * rms:.2f} %", f"{100 * largest:+.2f} %", steps)
+    for *words, value, error, mesh, (low, high), r2, rms, largest, steps in map(
+        dict.values, parameters(calibration)
+    ):
+        errors = (
+            f"{error:.1e}",
+            "unknown" if mesh is None else f"{mesh:.1e}",
+            f"{low:.4f} .. {high:.4f}",
+        )
+        table.add(
+            *words,
+            f"{value:.5f}",
+            *errors,
+            f"{r2:.5f}",
+            f"{100 * rms:.2f} %",
+            f"{100 * largest:+.2f} %",
+            steps,
+        )
     return table
 
 
 def notes(calibration: Calibration) -> list[str]:
-    """What the reader of the table must know about this calibration, one sentence each, and the law."""
+    """What the reader of the table must know about this calibration, one sentence each, and the
+    law."""
     said, joint, scenes = [], calibration.joint, calibration.scenes
     if not joint.orders:
-        said.append("mesh: the discretisation error is unknown, no scene was given on a second mesh.")
+        said.append(
+            "mesh: the discretisation error is unknown, no scene was given on a second mesh."
+        )
     elif len(joint.orders) < len(scenes):
         said.append(f"mesh: {len(joint.orders)} of {len(scenes)} scenes were given on a second mesh; the joint fit "
                     "counts no other.")  # fmt: skip
-    said += [f"mesh: order of convergence of {name}: {order.words}." for name, order in joint.orders]
+    said += [
+        f"mesh: order of convergence of {name}: {order.words}." for name, order in joint.orders
+    ]
     said += [f"mesh: {run.name} serves to estimate the discretisation error of {scene.run.name}."
              for scene in scenes for run in scene.coarser]  # fmt: skip
     if joint.serial_correlation > _BENT:
@@ -57,11 +76,16 @@ def notes(calibration: Calibration) -> list[str]:
     if joint.c is None and any(scene.run.sigY for scene in scenes):
         said.append("c: too few steps past yield in the range; elastic law.")
     if scenes[0].run.scene.pin.whole:
-        said.append("pin.whole: k and c are those of a whole pin; archord law and the paper have them of half a pin.")
+        said.append(
+            "pin.whole: k and c are those of a whole pin; archord law and the paper have them of half a pin."
+        )
     law = calibration.law()
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
     low, high = law.fitted_range
-    return [*said, f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR"]
+    return [
+        *said,
+        f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR",
+    ]
 
 
 def doubts(calibration: Calibration) -> list[str]:
@@ -69,18 +93,24 @@ def doubts(calibration: Calibration) -> list[str]:
     _, rms, largest, _ = calibration.joint.quality
     if rms <= POOR:
         return []
-    return [f"the law misses P of its own runs by {rms:.1%} rms, {largest:+.1%} at worst: theirs has another shape"]
+    return [
+        f"the law misses P of its own runs by {rms:.1%} rms, {largest:+.1%} at worst: theirs has another shape"
+    ]
 
 
 def as_json(calibration: Calibration) -> str:
     """The law (see `FittedLaw.from_json`), all fitted parameters, and notes as JSON."""
-    data = {"law": calibration.law().model_dump(), "fits": parameters(calibration), "notes": notes(calibration)}
+    data = {
+        "law": calibration.law().model_dump(),
+        "fits": parameters(calibration),
+        "notes": notes(calibration),
+    }
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def draw_fit(calibration: Calibration, target: Path) -> Path:
-    """Draw P(delta) of all scenes, the law, and its residuals as ``target``; returns the file. Raises ValueError for an
-    unknown format."""
+    """Draw P(delta) of all scenes, the law, and its residuals as ``target``; returns the file.
+    Raises ValueError for an unknown format."""
     figure, fit = new_figure(9, 4.2), calibration.joint
     force, residuals = figure.subplots(1, 2)
     for i, (scene, part) in enumerate(zip(calibration.scenes, fit.residuals, strict=True)):
@@ -92,7 +122,9 @@ def draw_fit(calibration: Calibration, target: Path) -> Path:
         residuals.plot(part.load, 100 * (part.law / part.data - 1), "o-", ms=3, lw=1, color=f"C{i}")
     residuals.axhline(0, color="black", lw=0.8)
     force.set(ylabel="P / (E* ΔR)", ylim=(0, None))
-    force.set_title(", ".join(f"{name} = {x.value:.3f} ± {x.error:.3f}" for name, x in fit.estimates.items()))
+    force.set_title(
+        ", ".join(f"{name} = {x.value:.3f} ± {x.error:.3f}" for name, x in fit.estimates.items())
+    )
     force.legend(frameon=False, fontsize="small")
     residuals.set(ylabel="law / run - 1 [%]", title="residuals")
     for axis in figure.axes:

@@ -1,4 +1,5 @@
-"""The law calibrated on runs of a joint: P(delta) for use elsewhere, as an object, as JSON and as plain Python."""
+"""The law calibrated on runs of a joint: P(delta) for use elsewhere, as an object, as JSON and as
+plain Python."""
 
 from __future__ import annotations
 
@@ -22,13 +23,13 @@ _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class FittedLaw(BaseModel):
-    """Plastic-Winkler law of one joint (Hu et al., eqs. 9 to 12 with the threshold ``c sigY``); elastic without ``c``
-    and ``sigY``.
+    """Plastic-Winkler law of one joint (Hu et al., eqs. 9 to 12 with the threshold ``c sigY``);
+    elastic without ``c`` and ``sigY``.
 
-    Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is that of ``delta/dR``; outside it the
-    law extrapolates, beyond its end with a `LawRangeWarning`. ``rms`` and ``largest`` are of ``law/run - 1`` of P in
-    that range (None: unknown). Lengths, stresses and forces per unit thickness in the named units. Raises ValueError
-    for values that no joint has.
+    Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is that of
+    ``delta/dR``; outside it the law extrapolates, beyond its end with a `LawRangeWarning`. ``rms``
+    and ``largest`` are of ``law/run - 1`` of P in that range (None: unknown). Lengths, stresses and
+    forces per unit thickness in the named units. Raises ValueError for values that no joint has.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -65,11 +66,14 @@ class FittedLaw(BaseModel):
         return self._state(delta)
 
     def _state(self, delta: ArrayLike) -> LawState:
-        joint = LawJoint(self.R, self.dR, self.E_star, block_yield=self.sigY, k=self.k, c=self.c or 1.0)
+        joint = LawJoint(
+            self.R, self.dR, self.E_star, block_yield=self.sigY, k=self.k, c=self.c or 1.0
+        )
         return plastic_winkler(joint, np.maximum(delta, 0.0))
 
     def force(self, delta: ArrayLike) -> Array:
-        """Force per unit thickness of the whole joint at ``delta`` (any shape); 0 where ``delta <= 0``."""
+        """Force per unit thickness of the whole joint at ``delta`` (any shape); 0 where ``delta <=
+        0``."""
         return self._asked(delta).load
 
     def stiffness(self, delta: ArrayLike) -> Array:
@@ -77,8 +81,8 @@ class FittedLaw(BaseModel):
         return self._asked(delta).stiffness
 
     def displacement(self, force: ArrayLike) -> Array:
-        """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much: the
-        plastic law's force stays below ``2 sqrt(2) c sigY R``."""
+        """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement
+        brings so much: the plastic law's force stays below ``2 sqrt(2) c sigY R``."""
         return rising_root(lambda x: self._state(x).load, np.asarray(force, float), self.dR)
 
     @classmethod
@@ -88,19 +92,28 @@ class FittedLaw(BaseModel):
         return cls.model_validate(data.get("law", data) if isinstance(data, dict) else data)
 
     def to_python(self) -> str:
-        """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs only ``math``."""
+        """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs
+        only ``math``."""
         low, high = self.fitted_range
         numbers = self.model_dump(include={"k", "c", "sigY", "E_star", "R", "dR"})
-        values = {name: "math.inf" if value is None else repr(value) for name, value in numbers.items()} | {
+        values = {
+            name: "math.inf" if value is None else repr(value) for name, value in numbers.items()
+        } | {
             "note": "plastic-Winkler law" if self.c is not None else "Winkler law",
             "k_error": f"{self.k_error:.2g}",
-            "c_comment": "no yield" if self.c is None else f"standard error {self.c_error or 0.0:.2g}",
+            "c_comment": "no yield"
+            if self.c is None
+            else f"standard error {self.c_error or 0.0:.2g}",
             "range": f"{low:g} to {high:g}",
             "end": repr(high * self.dR),
             "units": json.dumps(f"{self.length_unit}; force per unit thickness: {self.force_unit}"),
             "sources": json.dumps(", ".join(self.fitted_to)),
             "plane": self.plane,
-            "quality": "unknown" if self.rms is None else f"{self.rms:.2%} rms, {self.largest or 0.0:+.2%} at worst",
+            "quality": "unknown"
+            if self.rms is None
+            else f"{self.rms:.2%} rms, {self.largest or 0.0:+.2%} at worst",
         }
-        template = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["module"]
+        template = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))[
+            "module"
+        ]
         return Template(template).substitute(values)

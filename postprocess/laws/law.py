@@ -25,7 +25,8 @@ NOTHING: Array = np.array(np.nan)  # of a quantity that a law says nothing of
 
 
 class LawState(NamedTuple):
-    """What a law says at several points; nan where it is outside its range, or says nothing of that quantity."""
+    """What a law says at several points; nan where it is outside its range, or says nothing of that
+    quantity."""
 
     delta: Array
     load: Array
@@ -39,11 +40,12 @@ class LawState(NamedTuple):
 class Law:
     """A law ``P(delta)`` of a pin joint, or one that gives pressure and angle of a load only.
 
-    Displacements are positive in compression and measured from first touch, forces are per unit length of the joint,
-    angles are semi-angles in radians. Methods take arrays of any shape and return arrays of that shape. Points outside
-    the range give nan, or with ``extrapolate`` the formula, which is nan where it has ended itself, and a
-    `LawRangeWarning`. Of a small block or a whole pin laws with displacements warn. All raise ValueError if the law
-    needs a parameter that the joint lacks, or gives displacements and the joint is a ring.
+    Displacements are positive in compression and measured from first touch, forces are per unit
+    length of the joint, angles are semi-angles in radians. Methods take arrays of any shape and
+    return arrays of that shape. Points outside the range give nan, or with ``extrapolate`` the
+    formula, which is nan where it has ended itself, and a `LawRangeWarning`. Of a small block or a
+    whole pin laws with displacements warn. All raise ValueError if the law needs a parameter that
+    the joint lacks, or gives displacements and the joint is a ring.
     """
 
     name: str
@@ -52,9 +54,15 @@ class Law:
     range: str
     source: str
     remarks: str
-    state: Callable[[LawJoint, Array], LawState]  # of displacements; of loads where it gives no displacement
-    limit: Callable[[LawJoint], float]  # largest displacement of the range; largest load of a law without displacements
-    unfit: Callable[[LawJoint], str] = lambda joint: ""  # why the law does not hold for the whole joint
+    state: Callable[
+        [LawJoint, Array], LawState
+    ]  # of displacements; of loads where it gives no displacement
+    limit: Callable[
+        [LawJoint], float
+    ]  # largest displacement of the range; largest load of a law without displacements
+    unfit: Callable[[LawJoint], str] = (
+        lambda joint: ""
+    )  # why the law does not hold for the whole joint
     needs: tuple[str, ...] = ()
     gives: tuple[str, ...] = ("displacement", "pressure", "contact angle")
     coefficients: tuple[str, ...] = ()  # fitted ones among k and c
@@ -74,24 +82,35 @@ class Law:
         """``dP/d(delta)``; infinite at a load limit."""
         return self.at_displacement(joint, delta, extrapolate).stiffness
 
-    def displacement(self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False) -> Array:
+    def displacement(
+        self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False
+    ) -> Array:
         """``delta(P)``, the inverse of `force`; nan for a law without displacements."""
         return self.at_load(joint, load, extrapolate).delta
 
-    def at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, extrapolate: bool = False) -> LawState:
+    def at_displacement(
+        self, joint: LawJoint, delta: npt.ArrayLike, extrapolate: bool = False
+    ) -> LawState:
         """All quantities at displacements ``delta``."""
         self.check(joint)
         if not self.gives_displacement:
-            raise ValueError(f"{self.name}: this law gives no displacement, only pressure and angle of a load.")
-        return self._known(joint, self._inside(joint, delta, self.limit(joint), "delta", extrapolate))
+            raise ValueError(
+                f"{self.name}: this law gives no displacement, only pressure and angle of a load."
+            )
+        return self._known(
+            joint, self._inside(joint, delta, self.limit(joint), "delta", extrapolate)
+        )
 
     def at_load(self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False) -> LawState:
-        """All quantities at loads ``load``; displacement and stiffness are nan for a law without."""
+        """All quantities at loads ``load``; displacement and stiffness are nan for a law
+        without."""
         self.check(joint)
         limit = self.limit(joint)
         if not self.gives_displacement:
             return self._known(joint, self._inside(joint, load, limit, "P", extrapolate))
-        P = self._inside(joint, load, float(self.state(joint, np.array(limit)).load), "P", extrapolate)
+        P = self._inside(
+            joint, load, float(self.state(joint, np.array(limit)).load), "P", extrapolate
+        )
         delta = rising_root(lambda x: self.state(joint, x).load, P, limit)
         return self._known(joint, delta)._replace(load=P)
 
@@ -100,7 +119,9 @@ class Law:
         state = self.state(joint, np.where(x >= 0, x, 0.0))
         return LawState(*(np.where(x >= 0, values, np.nan) for values in state))
 
-    def _inside(self, joint: LawJoint, x: npt.ArrayLike, limit: float, what: str, extrapolate: bool) -> Array:
+    def _inside(
+        self, joint: LawJoint, x: npt.ArrayLike, limit: float, what: str, extrapolate: bool
+    ) -> Array:
         """``x`` with nan where the law has nothing to say; warns about points outside the range."""
         named, unit = ("dR", joint.clearance) if what == "delta" else ("E* dR", joint.unit)
         x = np.asarray(x, dtype=float)
@@ -111,13 +132,15 @@ class Law:
         valid = x >= 0 if extrapolate else ~beyond & (not reason)
         if not reason:
             ends = dict.fromkeys(f"{end / unit:.4g}" for end in (x[beyond].min(), x[beyond].max()))
-            reason = f"{what} = {' to '.join(ends)} {named} is outside 0 to {limit / unit:.4g} {named}"
+            reason = (
+                f"{what} = {' to '.join(ends)} {named} is outside 0 to {limit / unit:.4g} {named}"
+            )
         warnings.warn(LawRangeWarning(f"{self.name}: {reason} (range: {self.range})"), stacklevel=4)
         return np.where(valid, x, np.nan)
 
     def check(self, joint: LawJoint) -> None:
-        """Refuse a joint that lacks what the law needs, or whose P(delta) is another one; warn where it is softer or
-        stiffer."""
+        """Refuse a joint that lacks what the law needs, or whose P(delta) is another one; warn
+        where it is softer or stiffer."""
         for name in self.needs:
             if getattr(joint, name) is None:
                 raise ValueError(f"{self.name}: this law needs {name}.")
@@ -134,16 +157,22 @@ class Law:
                 "beyond yield)"
             )
         if joint.whole and self.gives_displacement:
-            said.append("for half a pin, cut where it is pressed; of a whole one P is higher: 2 %, beyond yield 10 %")
+            said.append(
+                "for half a pin, cut where it is pressed; of a whole one P is higher: 2 %, beyond yield 10 %"
+            )
         if joint.hardens and self.plastic:
-            said.append("of perfect plasticity; of bodies that harden its P is too low beyond yield")
+            said.append(
+                "of perfect plasticity; of bodies that harden its P is too low beyond yield"
+            )
         if joint.friction:
             said.append(
                 f"without friction; with the coefficient {joint.friction:g} P is higher: in the paper's elastic joint "
                 "at 2 dR by 3.5 % with 0.1, by 10.5 % with 0.3"
             )
         if joint.large_strain:
-            said.append("of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, 1.6 % at 2 %")
+            said.append(
+                "of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, 1.6 % at 2 %"
+            )
         if joint.fixed_pairs and self.solved:
             said.append(
                 'of closest points on the deformed curves; with analysis.kinematics = "reference" P of a run is lower: '
@@ -154,9 +183,9 @@ class Law:
 
 
 def rising_root(f: Callable[[Array], Array], target: Array, start: float) -> Array:
-    """Solve ``f(x) = target`` ``(...)`` for ``x >= 0`` with ``f`` rising, until no number is left between the ends of
-    brackets; nan where f stays below it. ``start`` is a first guess of the size of x; f may be nan above some x.
-    Targets that are not positive or nan give 0 and nan."""
+    """Solve ``f(x) = target`` ``(...)`` for ``x >= 0`` with ``f`` rising, until no number is left
+    between the ends of brackets; nan where f stays below it. ``start`` is a first guess of the size
+    of x; f may be nan above some x. Targets that are not positive or nan give 0 and nan."""
     target = np.asarray(target, dtype=float)
     low, high = np.zeros_like(target), np.full_like(target, start)
     while (short := (f(high) < target) & (high < _FAR)).any():

@@ -16,11 +16,17 @@ from archord.report.table import Table
 
 
 def sample(
-    law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool, deepest: float = 0.0
+    law: Law,
+    joint: LawJoint,
+    by_load: bool,
+    to: float,
+    points: int,
+    extrapolate: bool,
+    deepest: float = 0.0,
 ) -> LawState:
-    """``points`` states of ``law`` in equal steps up to delta = ``to`` clearances, or P = ``to`` E* dR (``by_load``);
-    outside the range nan but for the steps themselves. With archord's law the joint may have been at ``deepest``
-    clearances before."""
+    """``points`` states of ``law`` in equal steps up to delta = ``to`` clearances, or P = ``to`` E*
+    dR (``by_load``); outside the range nan but for the steps themselves. With archord's law the
+    joint may have been at ``deepest`` clearances before."""
     steps = np.arange(1, points + 1) * (to / points) * joint.clearance
     if by_load:
         load = steps * joint.E_star
@@ -29,7 +35,9 @@ def sample(
     if deepest:
         found = general_law(joint, extrapolate=True).at(steps, deepest * joint.clearance)
         quantities = found.load, found.stiffness, found.peak_pressure, found.angle, found.error
-        state = LawState(steps, *(np.where(np.isnan(state.load), np.nan, values) for values in quantities))
+        state = LawState(
+            steps, *(np.where(np.isnan(state.load), np.nan, values) for values in quantities)
+        )
     return state
 
 
@@ -40,7 +48,8 @@ def says_nothing(state: LawState, by_load: bool) -> bool:
 
 
 def too_elastic(law: Law, joint: LawJoint, state: LawState) -> list[str]:
-    """A sentence if a ``law`` that knows no yielding has a pressure above the weaker body's yield stress."""
+    """A sentence if a ``law`` that knows no yielding has a pressure above the weaker body's yield
+    stress."""
     p0 = float(np.max(state.peak_pressure, where=np.isfinite(state.peak_pressure), initial=0.0))
     if law.plastic or joint.yield_stress is None or p0 <= joint.yield_stress:
         return []
@@ -48,9 +57,12 @@ def too_elastic(law: Law, joint: LawJoint, state: LawState) -> list[str]:
     return [f"{law.name}: knows no yielding, and its p0 reaches {over:.3g} times the yield stress"]
 
 
-def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float = 1.0) -> str:
-    """The law's title and its `sample`, a row for each point, in ``units`` of length, force, stiffness and stress where
-    they are known, forces of a joint of this ``thickness``; without columns that the law says nothing of."""
+def law_table(
+    law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float = 1.0
+) -> str:
+    """The law's title and its `sample`, a row for each point, in ``units`` of length, force,
+    stiffness and stress where they are known, forces of a joint of this ``thickness``; without
+    columns that the law says nothing of."""
     moving, one = law.gives_displacement, joint.clearance
     columns = [
         ("delta", "length", state.delta, moving),
@@ -63,20 +75,31 @@ def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str],
         ("eps/deg", "", np.degrees(state.angle), "contact angle" in law.gives),
         ("+-P", "force", state.error * thickness, bool(np.isfinite(state.error).any())),
     ]
-    shown = [(f"{name} [{units[of]}]" if of in units else name, values) for name, of, values, given in columns if given]
+    shown = [
+        (f"{name} [{units[of]}]" if of in units else name, values)
+        for name, of, values, given in columns
+        if given
+    ]
     rows = np.transpose([values for _, values in shown])
-    table = Table(*(name for name, _ in shown), rows=[[f"{value:.6g}" for value in row] for row in rows])
+    table = Table(
+        *(name for name, _ in shown), rows=[[f"{value:.6g}" for value in row] for row in rows]
+    )
     return f"{law.name}: {law.title}\n{table}"
 
 
-def draw_laws(states: Sequence[tuple[Law, LawState]], joint: LawJoint, target: Path, by_load: bool, to: float) -> Path:
-    """Draw force, peak pressure and contact angle of laws with their `sample`, ``by_load`` displacement, pressure and
-    angle over the force, as ``target``; returns the file. Raises `InputError` if it cannot be written."""
+def draw_laws(
+    states: Sequence[tuple[Law, LawState]], joint: LawJoint, target: Path, by_load: bool, to: float
+) -> Path:
+    """Draw force, peak pressure and contact angle of laws with their `sample`, ``by_load``
+    displacement, pressure and angle over the force, as ``target``; returns the file. Raises
+    `InputError` if it cannot be written."""
     figure = new_figure(14, 4.4)
     axes = figure.subplots(1, 3)
     for law, state in states:
         x, y = (state.delta / joint.clearance, state.load / joint.unit)[:: -1 if by_load else 1]
-        for axis, values in zip(axes, (y, state.peak_pressure / joint.E_star, np.degrees(state.angle)), strict=True):
+        for axis, values in zip(
+            axes, (y, state.peak_pressure / joint.E_star, np.degrees(state.angle)), strict=True
+        ):
             axis.plot(x, values, label=law.name)
     over, of = ("δ / ΔR", "P / (E* ΔR)")[:: -1 if by_load else 1]
     for axis, label in zip(axes, (of, "p0 / E*", "contact semi-angle [°]"), strict=True):

@@ -1,5 +1,5 @@
-"""The closed-form laws by name: ``LAWS["johnson"].force(joint, delta)``. Their formulas, ranges, sources and remarks in
-words are laws.toml's."""
+"""The closed-form laws by name: ``LAWS["johnson"].force(joint, delta)``. Their formulas, ranges,
+sources and remarks in words are laws.toml's."""
 
 from __future__ import annotations
 
@@ -19,12 +19,16 @@ from archord.postprocess.laws.law import Law, LawState
 
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation
 _ALIKE = 0.01  # Dundurs' beta that counts as zero
-_DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare their law with finite elements
+_DEEPEST = (
+    2.0  # displacement over clearance up to which Hu et al. compare their law with finite elements
+)
 
 
 def _archord(joint: LawJoint, delta: Array) -> LawState:
     found = general.general_law(joint, extrapolate=True).at(delta)
-    return LawState(delta, found.load, found.stiffness, found.peak_pressure, found.angle, found.error)
+    return LawState(
+        delta, found.load, found.stiffness, found.peak_pressure, found.angle, found.error
+    )
 
 
 def _thick(joint: LawJoint) -> str:
@@ -39,7 +43,8 @@ def _unlike(joint: LawJoint) -> str:
 
 
 def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
-    """`elastic.logarithm` up to its load limit, with the pressure and contact angle of ``hertz`` in his range."""
+    """`elastic.logarithm` up to its load limit, with the pressure and contact angle of ``hertz`` in
+    his range."""
 
     def state(joint: LawJoint, delta: Array) -> LawState:
         found = elastic.logarithm(joint, delta, A, q)
@@ -54,7 +59,12 @@ def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
 
 _CHORD: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance, "unfit": _thick}
 _WINKLER: dict[str, Any] = {"coefficients": ("k",), **_CHORD}
-_PLASTIC: dict[str, Any] = {"coefficients": ("k", "c"), "needs": ("yield_stress",), "plastic": True, **_CHORD}
+_PLASTIC: dict[str, Any] = {
+    "coefficients": ("k", "c"),
+    "needs": ("yield_stress",),
+    "plastic": True,
+    **_CHORD,
+}
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
     "archord": {
@@ -69,11 +79,18 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
     "paper-plastic": {"state": chord.plastic_winkler, **_PLASTIC},
     "winkler": {"state": chord.winkler, **_WINKLER},
     "liu": {"state": chord.liu, **_CHORD},
-    "johnson": _half_spaces(4 * math.pi, -1.0),  # the bracket is ln(4 R1/a) + ln(4 R2/a) - 1 with Hertz's half-width a
-    # 2/3 + ln(4 R1/d) + ln(4 R2/d) with d = width (R* P/E*)^(1/2), so A = 16/width^2: R1 and R2 cancel
+    "johnson": _half_spaces(
+        4 * math.pi, -1.0
+    ),  # the bracket is ln(4 R1/a) + ln(4 R2/a) - 1 with Hertz's half-width a
+    # 2/3 + ln(4 R1/d) + ln(4 R2/d) with d = width (R* P/E*)^(1/2), so A = 16/width^2: R1 and R2
+    # cancel
     "radzimovsky": _half_spaces(16 / 1.6**2, 2 / 3),
-    "radzimovsky-width": _half_spaces(16 / (2 * 1.6**2), 2 / 3),  # Roark's K_D = D1 D2/(D1 - D2) is 2 R*
-    "radzimovsky-2.41": _half_spaces(2.41 * math.exp(1 / 3), 2 / 3),  # by the limit of 2.41 E* dR (below eq. 9)
+    "radzimovsky-width": _half_spaces(
+        16 / (2 * 1.6**2), 2 / 3
+    ),  # Roark's K_D = D1 D2/(D1 - D2) is 2 R*
+    "radzimovsky-2.41": _half_spaces(
+        2.41 * math.exp(1 / 3), 2 / 3
+    ),  # by the limit of 2.41 E* dR (below eq. 9)
     "esdu-78035": _half_spaces(4 * math.pi, 1.0, hertz=False),
     "dubowsky-freudenstein": {
         "state": elastic.dubowsky_freudenstein,
@@ -89,11 +106,18 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
         "gives": ("displacement", "pressure"),
     },
     "hertz": {"state": elastic.hertz, "limit": elastic.hertz_load_limit, **_OF_LOAD},
-    "persson": {"state": elastic.persson, "limit": lambda joint: math.inf, "unfit": _unlike, **_OF_LOAD},
+    "persson": {
+        "state": elastic.persson,
+        "limit": lambda joint: math.inf,
+        "unfit": _unlike,
+        **_OF_LOAD,
+    },
 }
 _WORDS = tomllib.loads((Path(__file__).parent / "laws.toml").read_text(encoding="utf-8"))
 
-LAWS: dict[str, Law] = {name: Law(name, **_WORDS[name], **functions) for name, functions in _FUNCTIONS.items()}
+LAWS: dict[str, Law] = {
+    name: Law(name, **_WORDS[name], **functions) for name, functions in _FUNCTIONS.items()
+}
 
 
 def default_law(joint: LawJoint) -> Law:

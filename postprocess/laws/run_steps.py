@@ -1,4 +1,5 @@
-"""What a run knows of P(delta): force over displacement of its joint, or of one load of a general scene."""
+"""What a run knows of P(delta): force over displacement of its joint, or of one load of a general
+scene."""
 
 from __future__ import annotations
 
@@ -21,12 +22,12 @@ _OPEN = 1e-6  # of the largest force: nothing touches
 
 @dataclass(frozen=True)
 class RunSteps:
-    """Accepted steps of a run, ``(n,)``: displacement ``x`` over ``length`` and force ``y`` over ``force``, positive
-    where they press, energy ``dissipated`` over both, largest pressure ``peak`` over ``pressure`` and semi-angle
-    ``angle`` [rad], nan if unknown.
+    """Accepted steps of a run, ``(n,)``: displacement ``x`` over ``length`` and force ``y`` over
+    ``force``, positive where they press, energy ``dissipated`` over both, largest pressure ``peak``
+    over ``pressure`` and semi-angle ``angle`` [rad], nan if unknown.
 
-    Units are dR, E* dR and E* dR/R of a joint, else those of the run; forces are of the run's thickness, per unit of it
-    if it has none.
+    Units are dR, E* dR and E* dR/R of a joint, else those of the run; forces are of the run's
+    thickness, per unit of it if it has none.
     """
 
     run: Run
@@ -58,8 +59,8 @@ class RunSteps:
 
     @property
     def units(self) -> dict[str, Any]:
-        """Units of x, y and peak as numbers, the names of their units, and the length that forces are of, as
-        `JointCurve` has them."""
+        """Units of x, y and peak as numbers, the names of their units, and the length that forces
+        are of, as `JointCurve` has them."""
         length_unit, force_unit = (self.run.units.get(name, "-") for name in self.names)
         numbers = {"length": self.length, "force": self.force, "pressure": self.pressure}
         words = {"length_unit": length_unit, "force_unit": force_unit}
@@ -77,7 +78,8 @@ class RunSteps:
 
     @property
     def accuracy(self) -> float | None:
-        """The error of mesh and steps that `analysis.accuracy` estimates of force or displacement, over the largest."""
+        """The error of mesh and steps that `analysis.accuracy` estimates of force or displacement,
+        over the largest."""
         known = self.run.scene.accurate in self.names
         return (self.run.summary.get("accuracy") or {}).get("estimated") if known else None
 
@@ -91,7 +93,11 @@ class RunSteps:
         """What the table is of."""
         run, scene = self.run, self.run.scene
         sha = hashlib.sha256(resolved(scene).encode()).hexdigest()[:16]
-        joint = {"R": scene.joint.radius, "dR": scene.joint.dR, "E*": scene.E_star} if run.is_joint else {}
+        joint = (
+            {"R": scene.joint.radius, "dR": scene.joint.dR, "E*": scene.E_star}
+            if run.is_joint
+            else {}
+        )
         thick, accuracy = scene.analysis.thickness, self.accuracy
         units = ", ".join(f"{name} in {run.units.get(name, '-')}" for name in self.names)
         said = "unknown: the scene asks for no analysis.accuracy"
@@ -101,14 +107,16 @@ class RunSteps:
             "scene": f"sha256 {sha}; plane {scene.analysis.plane}",
             "units": f"{units}, {'per unit thickness' if thick is None else f'of a thickness of {thick:g}'}",
             **joint,
-            "error of mesh and steps": said if accuracy is None else f"{accuracy:.2g} of the largest (estimated)",
+            "error of mesh and steps": said
+            if accuracy is None
+            else f"{accuracy:.2g} of the largest (estimated)",
         }
 
 
 def read_steps(run: Run, of: str | None = None) -> RunSteps:
-    """The steps of a joint's ``run``, or of its load ``of``, which need not be named if it is the only one; where an
-    interference arises first, from the end of that on. Raises `InputError` of a run without a step or contact, or
-    such a load."""
+    """The steps of a joint's ``run``, or of its load ``of``, which need not be named if it is the
+    only one; where an interference arises first, from the end of that on. Raises `InputError` of a
+    run without a step or contact, or such a load."""
     run.number(None)
     scene, columns = run.scene, {name: np.array(values) for name, values in run.columns.items()}
     columns["unknown"] = np.full(run.steps, np.nan)
@@ -116,7 +124,9 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
         raise InputError(f"{run.folder}: has no contact, and a table is of a joint's.")
     if run.is_joint:
         if of is not None:
-            raise InputError(f"{run.folder}: is the run of a joint, which has one load; --of is for general scenes.")
+            raise InputError(
+                f"{run.folder}: is the run of a joint, which has one load; --of is for general scenes."
+            )
         gap = abs(scene.joint.dR)
         units = gap, scene.E_star * gap * scene.thickness, scene.E_star * gap / scene.joint.radius
         known = scene.joint.dR > 0  # or the fit presses without a load
@@ -135,7 +145,18 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
         was = [columns[name][:begin][-1] for name in names]
         delta, lost = delta - was[0], lost - was[4]
         if abs(was[1]) > _OPEN * np.abs(P).max(initial=0.0):
-            raise InputError(f"{run.folder}: {names[1]} is {was[1]:.6g} before the load moves; a table begins at 0.")
+            raise InputError(
+                f"{run.folder}: {names[1]} is {was[1]:.6g} before the load moves; a table begins at 0."
+            )
     sign = next((np.sign(d) for d in delta if d), 1.0)
     x, y = sign * delta / units[0], sign * P / units[1]
-    return RunSteps(run, (names[0], names[1]), x, y, lost / (units[0] * units[1]), peak / units[2], angle, *units)
+    return RunSteps(
+        run,
+        (names[0], names[1]),
+        x,
+        y,
+        lost / (units[0] * units[1]),
+        peak / units[2],
+        angle,
+        *units,
+    )

@@ -25,11 +25,21 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
     bodies = Table("cell set", "cells", "area", "parts", left=1)
     for name, inside in cells.items():
-        bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", parts(mesh.cells[inside]).max(initial=-1) + 1)
+        bodies.add(
+            name,
+            inside.sum(),
+            f"{area[inside].sum():.6g}",
+            parts(mesh.cells[inside]).max(initial=-1) + 1,
+        )
     facets = Table("facet set", "of", "circle", "facets", "length", "shortest", "longest", left=3)
     for name, tags in mesh.facet_sets.items():
         facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
-    points = Table("point set", "nodes", left=1, rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()))
+    points = Table(
+        "point set",
+        "nodes",
+        left=1,
+        rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()),
+    )
     doubts = [*mesh.notes, *distorted(mesh)]
     doubts += [said for name, inside in cells.items() for said in cracks(mesh, name, inside)]
     warnings = [f"warning: {said}" for said in doubts]
@@ -46,7 +56,9 @@ def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarra
     said = ["closed"] if len(nodes) and (count == 2).all() else []
     if circle:
         (x, y), radius = circle[0].round(9) + 0.0, circle[1]
-        straight = [f"sagitta {length.max() ** 2 / (8 * radius):.2g}"] if edges.shape[1] == 2 else []
+        straight = (
+            [f"sagitta {length.max() ** 2 / (8 * radius):.2g}"] if edges.shape[1] == 2 else []
+        )
         said = [f"({x:.5g}, {y:.5g}) R {radius:.8g}", *straight, *said]
     sizes = length.sum(), length.min(initial=np.inf), length.max(initial=0.0)
     return [owners, ", ".join(said), len(edges), *(f"{value:.5g}" for value in sizes)]
@@ -57,8 +69,8 @@ def _along(edges: np.ndarray) -> np.ndarray:
 
 
 def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
-    """The cells, facets and points of named sets, each set in a colour, small ones over large; returns ``target``.
-    Raises `InputError`."""
+    """The cells, facets and points of named sets, each set in a colour, small ones over large;
+    returns ``target``. Raises `InputError`."""
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -69,12 +81,18 @@ def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
     around = [[0, 1, 2], [0, 1, 3, 2]][len(sides) // len(mesh.cells) - 3]
     for k, (name, tags) in enumerate(mesh.cell_sets.items()):
         inside = mesh.x[mesh.cells[np.isin(mesh.bodies, tags)]][:, around]
-        axes.add_collection(PolyCollection(inside, facecolors=[faint(k % 8)], label=name, zorder=-len(inside)))
+        axes.add_collection(
+            PolyCollection(inside, facecolors=[faint(k % 8)], label=name, zorder=-len(inside))
+        )
     axes.add_collection(LineCollection(sides, colors="0.5", linewidths=0.3, zorder=1))
     for k, (name, tags) in enumerate(mesh.facet_sets.items()):
         edges = mesh.x[_along(mesh.edges[np.isin(mesh.tags, tags)])]
         above = 3 - len(edges) / len(mesh.edges)
-        axes.add_collection(LineCollection(edges, colors=[colours(k % 10)], linewidths=2.0, label=name, zorder=above))
+        axes.add_collection(
+            LineCollection(
+                edges, colors=[colours(k % 10)], linewidths=2.0, label=name, zorder=above
+            )
+        )
     for k, (name, nodes) in enumerate(mesh.point_sets.items()):
         axes.plot(*mesh.x[nodes].T, ".", color=colours((k + len(mesh.facet_sets)) % 10), label=name)
     axes.autoscale_view()

@@ -35,13 +35,20 @@ def save_figure(figure: Figure, target: Path) -> Path:
 
 
 def draw_run(
-    run: Run, target: Path | str, *, steps: Sequence[int] = (), field: str = "", edges: Sequence[str] = ()
+    run: Run,
+    target: Path | str,
+    *,
+    steps: Sequence[int] = (),
+    field: str = "",
+    edges: Sequence[str] = (),
 ) -> Path:
-    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file.
+    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``;
+    returns the file.
 
-    The ``field``, by default PEEQ or von Mises stress, is that of the first of ``steps``, by default the last step, or
-    of an unloaded run that with the largest load. Named ``edges`` of the mesh take the place of the contact pressure:
-    along them the ``field``, or the hoop stress, is drawn at all ``steps``. Raises `InputError`.
+    The ``field``, by default PEEQ or von Mises stress, is that of the first of ``steps``, by
+    default the last step, or of an unloaded run that with the largest load. Named ``edges`` of the
+    mesh take the place of the contact pressure: along them the ``field``, or the hoop stress, is
+    drawn at all ``steps``. Raises `InputError`.
     """
     draws = panels_of(run, steps=steps, field=field, edges=edges)
     figure = new_figure(5.0 * len(draws), 4.4)
@@ -53,7 +60,8 @@ def draw_run(
 def panels_of(
     run: Run, *, steps: Sequence[int] = (), field: str = "", edges: Sequence[str] = ()
 ) -> list[Callable[[Any], None]]:
-    """What `draw_run` draws, a function of the axes each. Raises `InputError` for a step that the run does not have."""
+    """What `draw_run` draws, a function of the axes each. Raises `InputError` for a step that the
+    run does not have."""
     run.number(None)
     numbers = [run.number(step) for step in steps]
     kind: Any = joint if run.is_joint else problems
@@ -62,7 +70,9 @@ def panels_of(
     draws: list[Callable[[Any], None]] = []
     of_body = "" if edges and field in problems.OF_EDGES else field
     if run.scene.output.fields or of_body:
-        draws.append(lambda axes: kind.field_panel(axes, run, numbers[0] if numbers else None, of_body))
+        draws.append(
+            lambda axes: kind.field_panel(axes, run, numbers[0] if numbers else None, of_body)
+        )
     if edges:
         draws.append(lambda axes: problems.edge_panel(axes, run, edges, field, numbers))
     elif run.has_contact:
@@ -72,13 +82,15 @@ def panels_of(
 
 
 def draw_probe(probe: Probe, target: Path) -> Path:
-    """Write ``probe`` as ``target``, a table if its name ends in .csv, else a picture; returns the file. Raises
-    `InputError`."""
+    """Write ``probe`` as ``target``, a table if its name ends in .csv, else a picture; returns the
+    file. Raises `InputError`."""
     if target.suffix == ".csv":
         from archord.postprocess.frames import with_headings
 
         with writing(target) as new:
-            with_headings(probe.frame()).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
+            with_headings(probe.frame()).to_csv(
+                new, index=False, float_format="%.12g", lineterminator="\n"
+            )
         return target
     figure = new_figure(6.0, 4.4)
     label = f"{probe.place}, step {probe.step}"
@@ -89,9 +101,9 @@ def draw_probe(probe: Probe, target: Path) -> Path:
 def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     """Draw ``runs`` with their ``names`` over each other as ``target``; returns the file.
 
-    The first three of `curves_of` over the load, but of joints the pressure on the arc at the last common displacement
-    for p0. The colour runs with the order, which more than ten have in place of a legend. Raises `InputError` if the
-    file cannot be written or a run's contact cannot be read.
+    The first three of `curves_of` over the load, but of joints the pressure on the arc at the last
+    common displacement for p0. The colour runs with the order, which more than ten have in place of
+    a legend. Raises `InputError` if the file cannot be written or a run's contact cannot be read.
     """
     from matplotlib import colormaps
 
@@ -100,7 +112,10 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     figure = new_figure(5.0 * len(shown), 4.6)
     panels = np.atleast_1d(figure.subplots(1, len(shown)))
     rising = [table["load"][first_loading(table["load"])] for table in tables]
-    last, colours = min(float(load[-1]) for load in rising), colormaps["viridis"](np.linspace(0, 0.9, len(runs)))
+    last, colours = (
+        min(float(load[-1]) for load in rising),
+        colormaps["viridis"](np.linspace(0, 0.9, len(runs))),
+    )
     for axes, quantity in zip(panels, shown, strict=True):
         axes.set(xlabel=labels["load"], ylabel=labels[quantity])
         axes.grid(alpha=0.3)
@@ -111,16 +126,23 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
                 x, y = np.degrees(phi), p / scales[k]
             axes.plot(x, y, lw=1.3, ls="--" if k else "-", color=colours[k], label=name)
         if quantity == "p0":
-            axes.set(xlabel="angle from the contact axis [°]", ylabel=labels["p0"].replace("p0", "p"), xlim=(0, None))
+            axes.set(
+                xlabel="angle from the contact axis [°]",
+                ylabel=labels["p0"].replace("p0", "p"),
+                xlim=(0, None),
+            )
             axes.set(ylim=(0, None), title=f"contact pressure at {labels['load']} = {last:.4g}")
     if len(runs) <= _FEW:
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+        figure.legend(
+            *axes.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False
+        )
     return save_figure(figure, target)
 
 
 def _pressure_at(run: Run, delta: Array, wanted: float) -> tuple[Array, Array]:
-    """Angle and mean pressure of each facet of the hole (of the pin, if that alone is integrated) where the rising
-    ``delta`` of the first steps is ``wanted``, linearly between two steps; before the first, that step."""
+    """Angle and mean pressure of each facet of the hole (of the pin, if that alone is integrated)
+    where the rising ``delta`` of the first steps is ``wanted``, linearly between two steps; before
+    the first, that step."""
     place = float(np.interp(wanted, delta, np.arange(len(delta))))
     below, above = (run.arc(int(k) + 1).facet_means() for k in (np.floor(place), np.ceil(place)))
     return below[0], below[1] + (place % 1) * (above[1] - below[1])

@@ -1,4 +1,5 @@
-"""A run as a report of two or three pages: what was solved, how it went, what came of it, as a PDF file."""
+"""A run as a report of two or three pages: what was solved, how it went, what came of it, as a PDF
+file."""
 
 from __future__ import annotations
 
@@ -16,7 +17,13 @@ from archord.postprocess.fields import Fields
 from archord.postprocess.pictures.pictures import panels_of
 from archord.postprocess.pictures.problems import draw_outline
 from archord.postprocess.run import Run
-from archord.postprocess.tables import cost_of, facts_of, first_of_each_kind, history_table, peaks_of
+from archord.postprocess.tables import (
+    cost_of,
+    facts_of,
+    first_of_each_kind,
+    history_table,
+    peaks_of,
+)
 from archord.presets.measures import ENERGIES
 from archord.report.figure import new_figure
 from archord.report.table import Table
@@ -39,8 +46,9 @@ _BALANCES = ("force_balance", "energy_balance", "newton_residual")
 
 
 def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
-    """Write the report of ``run`` as the PDF file ``target``; returns it. The file is written beside and moved. Raises
-    `InputError` for a run without an accepted step, and if ``target`` is there and ``force`` is not given."""
+    """Write the report of ``run`` as the PDF file ``target``; returns it. The file is written
+    beside and moved. Raises `InputError` for a run without an accepted step, and if ``target`` is
+    there and ``force`` is not given."""
     from matplotlib.backends.backend_pdf import PdfPages
 
     run.number(None)
@@ -60,7 +68,8 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
 
 
 def _text_of(run: Run) -> list[str]:
-    """What was solved, what came of it, cost, versions, warnings, and the table of steps, in lines."""
+    """What was solved, what came of it, cost, versions, warnings, and the table of steps, in
+    lines."""
     lines = [*_wrapped(run.message), *_listed(facts_of(run)), "", *_wrapped(peaks_of(run)), ""]
     lines += _listed(row for row in cost_of(run) if row[0] != "warning")
     warnings = first_of_each_kind(run.warnings)
@@ -77,9 +86,12 @@ def _text_of(run: Run) -> list[str]:
 
 
 def _pages_of(run: Run) -> Iterator[Figure]:
-    """The pages in their order; the text goes on behind the pictures where the first page is full."""
+    """The pages in their order; the text goes on behind the pictures where the first page is
+    full."""
     lines = _text_of(run)
-    figure = _page(f"{run.folder.resolve().name}: {run.status}, {run.steps} of {len(run.scene.targets)} steps")
+    figure = _page(
+        f"{run.folder.resolve().name}: {run.status}, {run.steps} of {len(run.scene.targets)} steps"
+    )
     room = _LINES
     text: Any = figure
     if run.scene.output.fields:
@@ -103,7 +115,9 @@ def _results_page(run: Run) -> Figure:
     axes = figure.subplots(rows, 2, squeeze=False).ravel()
     for place, draw in zip(axes, panels, strict=False):
         draw(place)
-        title = [part for line in place.get_title().splitlines() for part in textwrap.wrap(line, _TITLE)]
+        title = [
+            part for line in place.get_title().splitlines() for part in textwrap.wrap(line, _TITLE)
+        ]
         place.set_title("\n".join(title), fontsize="medium")
     for place in axes[len(panels) :]:
         place.set_axis_off()
@@ -137,7 +151,9 @@ def _balance_panel(run: Run) -> Any:
                 axes.semilogy(steps[: len(shown)], shown, ".-", label=name)
         estimates = run.summary.get("error_estimates", {})
         told = [
-            f"{name.replace('_', ' ')} {estimates[name]:.1e}" for name in _BALANCES if estimates.get(name) is not None
+            f"{name.replace('_', ' ')} {estimates[name]:.1e}"
+            for name in _BALANCES
+            if estimates.get(name) is not None
         ]
         axes.set(xlabel="step", ylabel="relative error")
         axes.set_title(", ".join(told))
@@ -152,8 +168,12 @@ def _energy_panel(run: Run) -> Any:
     def draw(axes: Any) -> None:
         for name in ("work", *ENERGIES):
             if name in run.columns:
-                axes.plot(run.columns["step"], run.columns[name], ".-", label=name.replace("_", " "))
-        axes.set(xlabel="step", ylabel=f"energy [{run.units.get('work', '-')}]", title="energy balance")
+                axes.plot(
+                    run.columns["step"], run.columns[name], ".-", label=name.replace("_", " ")
+                )
+        axes.set(
+            xlabel="step", ylabel=f"energy [{run.units.get('work', '-')}]", title="energy balance"
+        )
         axes.legend(frameon=False, fontsize="small")
         axes.grid(alpha=0.3)
 
@@ -176,7 +196,9 @@ def _draw_mesh(axes: Any, run: Run, fields: Fields) -> None:
     for k, (name, tag) in enumerate(fields.bodies.items()):
         cells = x[fields.cells[fields.body == tag][:, :corners]]
         tint = colormaps["Pastel2"](k % 8)
-        axes.add_collection(PolyCollection(cells, facecolors=[tint], edgecolors="0.5", linewidths=0.2, label=name))
+        axes.add_collection(
+            PolyCollection(cells, facecolors=[tint], edgecolors="0.5", linewidths=0.2, label=name)
+        )
     draw_outline(axes, fields, x, color="black", lw=0.8)
     axes.autoscale_view()
     length = run.scene.units.length

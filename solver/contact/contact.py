@@ -1,12 +1,15 @@
-"""Nitsche contact of deformable bodies (Chouly, Hild and Renard 2015; theta = 0): all interactions of a problem.
+"""Nitsche contact of deformable bodies (Chouly, Hild and Renard 2015; theta = 0): all interactions
+of a problem.
 
-At a point ``x`` of a side, with closest point ``y`` on the opposite surface, ``n`` the opposite's outward normal there
-and ``g = (x - y) . n`` the gap, the trial pressure is ``t . n - gamma g`` with ``t = sigma(u) N`` the traction of the
-own body. The law makes a traction ``f`` of it, ``[t . n - gamma g]_+ n`` without friction, of which law.py has the
-shear, and the virtual work of the contact forces is ``sum over sides of share * integral of f . (v(x) - v(y))``.
-Linearised are ``n`` and ``y``, too.
+At a point ``x`` of a side, with closest point ``y`` on the opposite surface, ``n`` the opposite's
+outward normal there and ``g = (x - y) . n`` the gap, the trial pressure is ``t . n - gamma g`` with
+``t = sigma(u) N`` the traction of the own body. The law makes a traction ``f`` of it, ``[t . n -
+gamma g]_+ n`` without friction, of which law.py has the shear, and the virtual work of the contact
+forces is ``sum over sides of share * integral of f . (v(x) - v(y))``. Linearised are ``n`` and
+``y``, too.
 
-Opposite surfaces may lie on other ranks: displacements are exchanged, and forces summed over the ranks.
+Opposite surfaces may lie on other ranks: displacements are exchanged, and forces summed over the
+ranks.
 """
 
 from __future__ import annotations
@@ -27,12 +30,12 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 
 class Contact:
-    """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``,
-    and whether any of them ``has_friction``.
+    """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies,
+    ``rigid`` ones, ``pairs``, and whether any of them ``has_friction``.
 
-    A surface belongs to one interface. ``active_set_changes`` counts this rank's points that opened, closed or changed
-    between stick and slide at the last evaluation; ``tangent`` is the derivative of what `add_force` adds, renewed as
-    the pattern grows. Collective.
+    A surface belongs to one interface. ``active_set_changes`` counts this rank's points that
+    opened, closed or changed between stick and slide at the last evaluation; ``tangent`` is the
+    derivative of what `add_force` adds, renewed as the pattern grows. Collective.
     """
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
@@ -52,7 +55,8 @@ class Contact:
         self.tangent = ContactTangent(self._reaches)
 
     def move(self, levels: Array, fitted: float = 1.0) -> None:
-        """Displace rigid surfaces to the drives' ``levels`` ``(d,)``, with the part ``fitted`` of interferences."""
+        """Displace rigid surfaces to the drives' ``levels`` ``(d,)``, with the part ``fitted`` of
+        interferences."""
         for surface in self.rigid:
             surface.motion = levels[None] @ surface.rate
         for interface in self.interfaces:
@@ -64,8 +68,9 @@ class Contact:
             pair.begin(u, pair.opposite.curve_displacement(u))
 
     def touch_down(self, u: Array, levels: Array) -> None:
-        """Count slip from this rank's displacements ``u`` ``(n, 2)`` and the drives' ``levels`` ``(d,)`` on, at points
-        that did not touch in the accepted state: bodies came there without load. Collective."""
+        """Count slip from this rank's displacements ``u`` ``(n, 2)`` and the drives' ``levels``
+        ``(d,)`` on, at points that did not touch in the accepted state: bodies came there without
+        load. Collective."""
         self.move(levels)
         for pair in self.pairs if self.has_friction else []:
             pair.touch_down(u, pair.opposite.curve_displacement(u))
@@ -82,8 +87,9 @@ class Contact:
                 pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
     def evaluate(self, u: Array, *, reach: bool = True) -> bool:
-        """Gaps, tractions and trial history at this rank's displacements ``u`` ``(n, 2)``; whether the pattern had to
-        grow, which without ``reach`` it does not. Collective; raises `ProjectionError` on every rank."""
+        """Gaps, tractions and trial history at this rank's displacements ``u`` ``(n, 2)``; whether
+        the pattern had to grow, which without ``reach`` it does not. Collective; raises
+        `ProjectionError` on every rank."""
         motions = [pair.opposite.curve_displacement(u) for pair in self.pairs]
         try:
             with on_every_rank(self.comm):
@@ -99,15 +105,16 @@ class Contact:
         return grew
 
     def anticipate(self, u: Array, levels: Array) -> bool:
-        """Open and close points as increments ``u`` ``(n, 2)``, and those of the drives' ``levels`` ``(d,)``, would, to
-        first order, with the partners they have; returns whether any does. Closed points carry their trial pressure,
-        even a tension. Collective."""
+        """Open and close points as increments ``u`` ``(n, 2)``, and those of the drives' ``levels``
+        ``(d,)``, would, to first order, with the partners they have; returns whether any does.
+        Closed points carry their trial pressure, even a tension. Collective."""
         for pair in self.pairs:
             pair.expect(trial_rate(pair, u, levels))
         return self.comm.allreduce(sum(pair.changes for pair in self.pairs)) > 0
 
     def round_off(self) -> float:
-        """Size of the force that rounding of this rank's contact points leaves: positions times gamma."""
+        """Size of the force that rounding of this rank's contact points leaves: positions times
+        gamma."""
         squares = 0.0
         for pair in self.pairs:
             spring = (pair.share * pair.gamma[:, 0] * pair.surface.weight.ravel())[pair.active]
@@ -115,7 +122,8 @@ class Contact:
         return float(2 * np.finfo(float).eps * np.sqrt(squares))
 
     def add_force(self, force: Array) -> None:
-        """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)`` of owned nodes."""
+        """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)``
+        of owned nodes."""
         on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in self._all}
         for pair in self.pairs:
             pair.add_forces(on[id(pair.surface)], on[id(pair.opposite)])
@@ -123,31 +131,40 @@ class Contact:
             surface.add_to_owned(surface.sum_over_ranks(-on[id(surface)]), force)
 
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Block ``(rows, columns)`` that the contacts of all ranks may fill, each once, in global dofs. Collective."""
+        """Block ``(rows, columns)`` that the contacts of all ranks may fill, each once, in global
+        dofs. Collective."""
         size = self._n_dofs
         rows, columns = self.tangent.rows, self.tangent.columns
         slots = (rows * size + columns)[(rows < size) & (columns < size)]
         return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)
 
     def resultant(self, name: str = "") -> Array:
-        """Force ``(2,)`` on the second surface of the interaction ``name``, the first without, over all ranks."""
+        """Force ``(2,)`` on the second surface of the interaction ``name``, the first without, over
+        all ranks."""
         return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
 
     def moment(self, name: str, point: Sequence[float]) -> float:
         """Moment of that force about ``point``, anticlockwise, over all ranks."""
-        return next(i for i in self.interfaces if name in ("", i.interaction.name)).moment(np.asarray(point))
+        return next(i for i in self.interfaces if name in ("", i.interaction.name)).moment(
+            np.asarray(point)
+        )
 
     def largest_pressed(self) -> float:
-        """Sum of the sizes of the points' forces of the interaction where it is largest, over all ranks; 0 without."""
+        """Sum of the sizes of the points' forces of the interaction where it is largest, over all
+        ranks; 0 without."""
         return max((interface.pressed() for interface in self.interfaces), default=0.0)
 
     def force_on_drives(self) -> Array:
-        """Contact force ``(d,)`` along the rates of rigid surfaces, over all ranks; a single zero without any."""
+        """Contact force ``(d,)`` along the rates of rigid surfaces, over all ranks; a single zero
+        without any."""
         first = [(i.surfaces[0], i) for i in self.interfaces]
-        return sum((d.rate @ i.resultant() for d, i in first if isinstance(d, RigidSurface)), np.zeros(1))
+        return sum(
+            (d.rate @ i.resultant() for d, i in first if isinstance(d, RigidSurface)), np.zeros(1)
+        )
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
-        """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of laws, by place."""
+        """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of
+        laws, by place."""
         found = {}
         for pair in self.pairs:
             found[f"contact {pair.surface.name}"] = pair.surface.facet, pair.surface.points

@@ -1,10 +1,12 @@
 """Contact laws: the traction at points of a surface, from how they lie to their partners.
 
-All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` and, turned from it by a
-quarter anticlockwise, its tangent. A traction ``(m, 2)`` is a pressure, positive in compression, and a shear.
+All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` and,
+turned from it by a quarter anticlockwise, its tangent. A traction ``(m, 2)`` is a pressure,
+positive in compression, and a shear.
 
-The slip is that since the last accepted state, along the tangent, of the points that are partners now: in contact both
-sides agree on it, whatever the angle at which they met, and what turns with the surfaces slips by nothing.
+The slip is that since the last accepted state, along the tangent, of the points that are partners
+now: in contact both sides agree on it, whatever the angle at which they met, and what turns with
+the surfaces slips by nothing.
 """
 
 from __future__ import annotations
@@ -22,8 +24,9 @@ State = Any
 class ContactLaw(Protocol):
     """A law by its `update`, a pure function; without a history and without friction as it stands.
 
-    Points of a law that ``slides`` move along the opposite surface; others keep partners, and undeformed gaps as zero.
-    One that ``has_friction`` has shear; of one that is ``unilateral`` points which do not touch carry nothing.
+    Points of a law that ``slides`` move along the opposite surface; others keep partners, and
+    undeformed gaps as zero. One that ``has_friction`` has shear; of one that is ``unilateral``
+    points which do not touch carry nothing.
     """
 
     slides: ClassVar[bool] = True
@@ -31,20 +34,26 @@ class ContactLaw(Protocol):
     unilateral: ClassVar[bool] = False
 
     def state(self, n: int) -> State:
-        """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a material."""
+        """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a
+        material."""
         return None
 
-    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
-        """Traction ``(m, 2)``, its derivative ``(m, 2, 2)`` with respect to ``trial``, and the new state.
+    def update(
+        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
+    ) -> tuple[Array, Array, State]:
+        """Traction ``(m, 2)``, its derivative ``(m, 2, 2)`` with respect to ``trial``, and the new
+        state.
 
-        ``trial`` ``(m, 2)`` is Nitsche's traction of points that touch and stick: that of the own body's stress minus
-        ``gamma`` ``(m, 2)`` times ``gap`` and ``slip``, ``(m,)`` each. Traction and derivative are zero at points that
-        do not touch; where they touch, the pressure follows its trial value. What is not a number stays that.
+        ``trial`` ``(m, 2)`` is Nitsche's traction of points that touch and stick: that of the own
+        body's stress minus ``gamma`` ``(m, 2)`` times ``gap`` and ``slip``, ``(m,)`` each. Traction
+        and derivative are zero at points that do not touch; where they touch, the pressure follows
+        its trial value. What is not a number stays that.
         """
         ...
 
     def elastic(self) -> ContactLaw:
-        """A law with the same states that answers from each as if points could not slide (any further)."""
+        """A law with the same states that answers from each as if points could not slide (any
+        further)."""
         return self
 
     def frictionless(self) -> ContactLaw:
@@ -52,7 +61,8 @@ class ContactLaw(Protocol):
         return self
 
     def by_secants(self) -> ContactLaw:
-        """The law itself, with a derivative that leaves no point without stiffness along the surface."""
+        """The law itself, with a derivative that leaves no point without stiffness along the
+        surface."""
         return self
 
     def dissipation(self, state: State) -> Array | float:
@@ -65,7 +75,9 @@ class Frictionless(ContactLaw):
 
     unilateral = True
 
-    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
+    def update(
+        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
+    ) -> tuple[Array, Array, State]:
         """Pressure where the trial pressure is positive."""
         touches, derivative = ~(trial[:, 0] <= 0), np.zeros((len(trial), 2, 2))
         derivative[:, 0, 0] = touches
@@ -74,8 +86,8 @@ class Frictionless(ContactLaw):
 
 @dataclass(frozen=True)
 class FrictionState:
-    """History of ``m`` points: ``elastic_slip``, gamma times which is what the shear is below that of the own body's
-    stress, ``pressure``, and the energy ``dissipated`` per area."""
+    """History of ``m`` points: ``elastic_slip``, gamma times which is what the shear is below that
+    of the own body's stress, ``pressure``, and the energy ``dissipated`` per area."""
 
     elastic_slip: Array
     pressure: Array
@@ -84,17 +96,19 @@ class FrictionState:
 
 @dataclass(frozen=True)
 class Coulomb(ContactLaw):
-    """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward Euler).
+    """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward
+    Euler).
 
-    A point that sticks has its trial shear, and the slip of the step is added to its elastic slip: what sticks for
-    many steps does not creep. Where that leaves the cone the shear comes back to it at the same pressure, and the
-    elastic slip becomes what gives this shear: a return map with gamma for its stiffness. It is zero at points that do
-    not touch.
+    A point that sticks has its trial shear, and the slip of the step is added to its elastic slip:
+    what sticks for many steps does not creep. Where that leaves the cone the shear comes back to it
+    at the same pressure, and the elastic slip becomes what gives this shear: a return map with
+    gamma for its stiffness. It is zero at points that do not touch.
 
-    If ``held``, points that touched stick, whatever their shear, and others slide without friction: an elastic
-    predictor. With ``secant`` the derivative by the trial shear is shear over trial shear at points that slide, and the
-    shear does not follow the pressure there. Newton's method then is the fixed-point iteration of Kacanov (1959):
-    slower, but bodies that only friction keeps from turning keep a stiffness.
+    If ``held``, points that touched stick, whatever their shear, and others slide without friction:
+    an elastic predictor. With ``secant`` the derivative by the trial shear is shear over trial
+    shear at points that slide, and the shear does not follow the pressure there. Newton's method
+    then is the fixed-point iteration of Kacanov (1959): slower, but bodies that only friction keeps
+    from turning keep a stiffness.
     """
 
     friction: float
@@ -107,7 +121,9 @@ class Coulomb(ContactLaw):
         """Points at rest."""
         return FrictionState(*np.zeros((3, n)))
 
-    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
+    def update(
+        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
+    ) -> tuple[Array, Array, State]:
         """Pressure as without friction, and the shear returned to the cone."""
         touches = ~(trial[:, 0] <= 0)
         pressure = np.where(touches, trial[:, 0], 0.0)
@@ -129,7 +145,9 @@ class Coulomb(ContactLaw):
             derivative[:, 1, 0] = np.where(slides, sign * friction, 0.0)
         lost = 0.5 * friction * (state.pressure + pressure) * np.abs(moved)
         new = FrictionState(
-            np.where(touches, state.elastic_slip + slip + moved, 0.0), pressure, state.dissipated + lost
+            np.where(touches, state.elastic_slip + slip + moved, 0.0),
+            pressure,
+            state.dissipated + lost,
         )
         return np.stack([pressure, shear], axis=1), derivative, new
 
@@ -155,14 +173,16 @@ class Tied(ContactLaw):
 
     slides = False
 
-    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
+    def update(
+        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
+    ) -> tuple[Array, Array, State]:
         """The trial traction."""
         return trial, np.tile(np.eye(2), (len(trial), 1, 1)), state
 
 
 def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
-    """The law of a name, with Coulomb's ``friction`` if there is any. Raises ValueError for friction that is negative,
-    or of another law than that without friction."""
+    """The law of a name, with Coulomb's ``friction`` if there is any. Raises ValueError for
+    friction that is negative, or of another law than that without friction."""
     if friction and (law != "frictionless" or not friction > 0):
         raise ValueError(
             f"friction must be positive, of a law that is frictionless without it: {friction:g} of {law!r}"

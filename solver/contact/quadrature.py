@@ -1,8 +1,9 @@
 """Quadrature that respects the facets of the opposite curve.
 
-A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its ends. Points that ignore
-them integrate a uniform pressure with an error of the order of the mesh; facets broken there pass a patch test exactly.
-Breaks stay, as points carry history: pairs that slide by a part of a facet get that part of the error back.
+A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its
+ends. Points that ignore them integrate a uniform pressure with an error of the order of the mesh;
+facets broken there pass a patch test exactly. Breaks stay, as points carry history: pairs that
+slide by a part of a facet get that part of the error back.
 """
 
 from __future__ import annotations
@@ -16,19 +17,24 @@ _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
 
 
 def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
-    """Positions and weights ``(n_facets of own, q)`` in xi; all facets of ``own`` get equally many segments.
+    """Positions and weights ``(n_facets of own, q)`` in xi; all facets of ``own`` get equally many
+    segments.
 
-    Breaks lie where ``own`` faces the vertices of ``opposite``; facets with fewer of them are broken further.
+    Breaks lie where ``own`` faces the vertices of ``opposite``; facets with fewer of them are
+    broken further.
     """
     met = own.closest_point(*opposite.vertices(), np.zeros_like(own.X))
     inside = met.found & (met.xi > _SHORTEST) & (met.xi < 1 - _SHORTEST)
     breaks = []
     for k in range(own.n_facets):
         met_here = np.sort(met.xi[inside & (met.facet == k)])
-        breaks.append(np.concatenate([[0.0], met_here[np.diff(met_here, prepend=0.0) > _SHORTEST], [1.0]]))
+        breaks.append(
+            np.concatenate([[0.0], met_here[np.diff(met_here, prepend=0.0) > _SHORTEST], [1.0]])
+        )
     points = max(map(len, breaks))
     ends = np.array([_refined(b, points) for b in breaks])
-    # two more than a quadratic pressure against quadratic shape functions wants, as pairs slide and breaks do not
+    # two more than a quadratic pressure against quadratic shape functions wants, as pairs slide and
+    # breaks do not
     x, w = np.polynomial.legendre.leggauss(own.degree + 3)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2

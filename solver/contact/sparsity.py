@@ -1,4 +1,5 @@
-"""Which facets may meet, and so which matrix entries a contact may fill: kept ahead of the sliding pairs."""
+"""Which facets may meet, and so which matrix entries a contact may fill: kept ahead of the sliding
+pairs."""
 
 from __future__ import annotations
 
@@ -13,9 +14,11 @@ _WIDEST = 16  # the same where pairs are expected to slide further
 
 
 class Reach:
-    """Which opposite facets each facet of a ``pair`` may meet, where points slide by about ``slide``. Collective.
+    """Which opposite facets each facet of a ``pair`` may meet, where points slide by about
+    ``slide``. Collective.
 
-    ``keys`` ``(n,)``, sorted and alike on all ranks, are own facets times the number of opposite ones, plus opposite.
+    ``keys`` ``(n,)``, sorted and alike on all ranks, are own facets times the number of opposite
+    ones, plus opposite.
     """
 
     def __init__(self, pair: Pair, slide: float) -> None:
@@ -26,7 +29,8 @@ class Reach:
         self.extend()
 
     def extend(self) -> bool:
-        """Make room for the pairs of the last evaluation and their neighbours; True if any rank had to. Collective."""
+        """Make room for the pairs of the last evaluation and their neighbours; True if any rank had
+        to. Collective."""
         new = np.setdiff1d(self.point_keys(), self.keys)
         if not self._comm.allreduce(len(new) > 0, op=MPI.LOR):
             return False
@@ -42,7 +46,8 @@ class Reach:
         return (facet[:, None] * self._n + self.pair.projection.facet.reshape(shape)).ravel()
 
     def dofs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The keys ``(p,)`` of this rank's facets, their dofs of rows ``(p, k + o)`` and of columns ``(p, a + o)``."""
+        """The keys ``(p,)`` of this rank's facets, their dofs of rows ``(p, k + o)`` and of columns
+        ``(p, a + o)``."""
         surface, opposite = self.pair.surface, self.pair.opposite
         facet, met = np.divmod(self.keys, self._n)
         here = np.isin(facet, surface.facet)
@@ -50,4 +55,8 @@ class Reach:
         there = opposite.curve_dofs[opposite.curve.connectivity[met[here]]]
         rows = np.take_along_axis(surface.cell_global, surface.trace, axis=1)[own]
         columns = surface.cell_global[own]
-        return self.keys[here], np.concatenate([rows, there], axis=1), np.concatenate([columns, there], axis=1)
+        return (
+            self.keys[here],
+            np.concatenate([rows, there], axis=1),
+            np.concatenate([columns, there], axis=1),
+        )

@@ -1,8 +1,9 @@
-"""Newton's linear system with a few more unknowns: levels of drives, such as rigid motions on which given forces act.
+"""Newton's linear system with a few more unknowns: levels of drives, such as rigid motions on which
+given forces act.
 
-``[A B; C D] (u, s) = (r, rho)`` with ``m`` of them is solved by one factorisation of A, the matrix at given levels, and
-``m + 1`` solves with it, through the Schur complement ``D - C A^-1 B``: displacement control is regular wherever force
-control is, and beyond.
+``[A B; C D] (u, s) = (r, rho)`` with ``m`` of them is solved by one factorisation of A, the matrix
+at given levels, and ``m + 1`` solves with it, through the Schur complement ``D - C A^-1 B``:
+displacement control is regular wherever force control is, and beyond.
 """
 
 from __future__ import annotations
@@ -16,8 +17,12 @@ from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
 
-_SINGULAR = 1e-9  # stiffness against a motion over ``stiffness`` below which nothing resists the force
-_FORCED = 1e-3  # part of a right-hand side along such a motion above which the system has no solution
+_SINGULAR = (
+    1e-9  # stiffness against a motion over ``stiffness`` below which nothing resists the force
+)
+_FORCED = (
+    1e-3  # part of a right-hand side along such a motion above which the system has no solution
+)
 
 
 def why_not(facts: Facts) -> str | None:
@@ -26,8 +31,9 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Border:
-    """Python context of a matrix ``A`` with the border ``B`` and the transpose of ``C`` ``(n_owned dofs, m)``, ``D``
-    ``(m, m)`` of all ranks; ``extra`` of its unknowns, the levels, are this rank's. Collective."""
+    """Python context of a matrix ``A`` with the border ``B`` and the transpose of ``C`` ``(n_owned
+    dofs, m)``, ``D`` ``(m, m)`` of all ranks; ``extra`` of its unknowns, the levels, are this
+    rank's. Collective."""
 
     def __init__(self, A: PETSc.Mat, B: Array, C: Array, D: Array) -> None:
         self.comm, self.A, self.B, self.C, self.D = A.comm.tompi4py(), A, B, C, D
@@ -58,15 +64,20 @@ class Border:
 
 
 class Bordered(Strategy):
-    """Python context of the preconditioner of the bordered matrix, which solves with the last one that was factorised.
-    Collective.
+    """Python context of the preconditioner of the bordered matrix, which solves with the last one
+    that was factorised. Collective.
 
-    The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance; ``factoriser``
-    gives the strategy for ``A``. ``singular`` numbers the level that a force moves most which nothing resists, or None.
+    The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance;
+    ``factoriser`` gives the strategy for ``A``. ``singular`` numbers the level that a force moves
+    most which nothing resists, or None.
     """
 
     def __init__(
-        self, A: PETSc.Mat, m: int, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy] = Direct
+        self,
+        A: PETSc.Mat,
+        m: int,
+        stiffness: float,
+        factoriser: Callable[[PETSc.Mat], Strategy] = Direct,
     ) -> None:
         self.comm, self._stiffness, self._factoriser = A.comm.tompi4py(), stiffness, factoriser
         zero: Array = np.zeros((A.getLocalSize()[0], m))
@@ -91,8 +102,8 @@ class Bordered(Strategy):
         return self.matrix.createVecRight()
 
     def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
-        """New border for a matrix with new values (see `Border`). Without ``factorise`` the preconditioner stays that
-        of the last matrix that was factorised."""
+        """New border for a matrix with new values (see `Border`). Without ``factorise`` the
+        preconditioner stays that of the last matrix that was factorised."""
         self.last.B, self.last.C, self.last.D = B, C, D
         self._stale |= factorise
         self._ksp.getPC().setReusePreconditioner(not self._stale)
@@ -103,7 +114,8 @@ class Bordered(Strategy):
         return self._y.array_r.copy()
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
-        """``x = [A B; C D]^-1 r``, called by PETSc; levels stay along motions that nothing resists."""
+        """``x = [A B; C D]^-1 r``, called by PETSc; levels stay along motions that nothing
+        resists."""
         last = self.last
         if self._stale:
             self._along_B = np.stack([self._solve(b) for b in last.B.T], axis=1)
@@ -111,7 +123,9 @@ class Bordered(Strategy):
         rho, u = last.levels(r), self._solve(r.array_r[: last.n])
         C, D = self._factorised
         along_B, along_u = self.comm.allreduce(C.T @ self._along_B), self.comm.allreduce(u @ C)
-        if not np.isfinite(along_B).all():  # the matrix could not be factorised: Newton's method sees the step fail
+        if not np.isfinite(
+            along_B
+        ).all():  # the matrix could not be factorised: Newton's method sees the step fail
             self.replace(last.A)
             last.join(x, np.full_like(u, np.nan), np.full(len(rho), np.nan))
             return

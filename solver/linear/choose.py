@@ -11,7 +11,8 @@ from archord.solver.linear import bordered, condensed, lagged, look_ahead, subst
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
 
-# Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit the facts.
+# Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit
+# the facts.
 _MODULES = bordered, condensed, substructured, lagged, look_ahead
 RULES = {module.__name__.rpartition(".")[2]: module.why_not for module in _MODULES}
 INSTEAD = ("condensed", "substructured")  # of MUMPS on the whole matrix: the first that fits
@@ -38,10 +39,14 @@ class Choice:
         return Direct(A)
 
     def words(self) -> dict[str, str | dict[str, str]]:
-        """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the reasons."""
+        """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the
+        reasons."""
         used = [name for name, reason in self.why_not.items() if reason is None]
         used += [] if {*INSTEAD} & {*used} else ["direct"]
-        return {"strategy": " + ".join(used), "not_used": {n: r for n, r in self.why_not.items() if r is not None}}
+        return {
+            "strategy": " + ".join(used),
+            "not_used": {n: r for n, r in self.why_not.items() if r is not None},
+        }
 
 
 def choose(facts: Facts) -> Choice:

@@ -1,13 +1,15 @@
 """Newton's linear systems of elastic bodies, solved with one sparse factorisation for all.
 
-Nothing changes but the contact: the tangent is ``K + E D`` with the constant stiffness ``K``, the rows ``D`` of the
-contact forces, and ``E`` that puts them in their places. By the formula of Woodbury (Golub and Van Loan 2013, 2.1.4)
+Nothing changes but the contact: the tangent is ``K + E D`` with the constant stiffness ``K``, the
+rows ``D`` of the contact forces, and ``E`` that puts them in their places. By the formula of
+Woodbury (Golub and Van Loan 2013, 2.1.4)
 
     (K + E D)^-1 r = y - Z (1 + D Z)^-1 D y,    y = K^-1 r,    Z = K^-1 E,
 
 a system as small as the contact. ``Z`` is found once, for all places that may get a force.
 
-Which points are closed is asked again after each solve, as in look_ahead.py, and the small system is solved again.
+Which points are closed is asked again after each solve, as in look_ahead.py, and the small system
+is solved again.
 """
 
 from __future__ import annotations
@@ -45,15 +47,19 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Condensed(Strategy):
-    """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Collective.
+    """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it.
+    Collective.
 
-    ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
-    forces, ``near`` ``(k,)`` those on which they depend: the same on every rank, as all that is as small as contact.
-    ``revise(increment)`` goes over to the points that are closed after an increment ``(k, 2)`` of the solution at
-    ``near``, calls `update`, and returns what that adds to the residual at the nodes ``(m, 2)``; None for no change.
+    ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block
+    dofs that may get forces, ``near`` ``(k,)`` those on which they depend: the same on every rank,
+    as all that is as small as contact. ``revise(increment)`` goes over to the points that are
+    closed after an increment ``(k, 2)`` of the solution at ``near``, calls `update`, and returns
+    what that adds to the residual at the nodes ``(m, 2)``; None for no change.
     """
 
-    def __init__(self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]) -> None:
+    def __init__(
+        self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]
+    ) -> None:
         self.comm, self._K, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
         self._start, self._end = K.getOwnershipRange()
         K.setOption(PETSc.Mat.Option.SPD, True)
@@ -66,13 +72,20 @@ class Condensed(Strategy):
         self.matrix.setUp()
 
     def _responses(self, dofs: np.ndarray) -> Array:
-        """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""
+        """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one
+        after the other."""
         K, m = self._K, len(dofs)
-        self._found, unit = (PETSc.Mat().createDense((K.getSizes()[0], (None, m)), comm=K.comm) for _ in range(2))
+        self._found, unit = (
+            PETSc.Mat().createDense((K.getSizes()[0], (None, m)), comm=K.comm) for _ in range(2)
+        )
         self._found.setUp()
-        if self.comm.size == 1:  # sparse: MUMPS skips what they leave zero; of several ranks PETSc spoils sparse ones
+        if (
+            self.comm.size == 1
+        ):  # sparse: MUMPS skips what they leave zero; of several ranks PETSc spoils sparse ones
             csr = np.arange(m + 1, dtype=PETSc.IntType), dofs.astype(PETSc.IntType), np.ones(m)
-            unit = PETSc.Mat().createTranspose(PETSc.Mat().createAIJ((m, K.getSize()[0]), csr=csr, comm=K.comm))
+            unit = PETSc.Mat().createTranspose(
+                PETSc.Mat().createAIJ((m, K.getSize()[0]), csr=csr, comm=K.comm)
+            )
         else:
             unit.setUp()
             mine, at = self._own(dofs)
@@ -96,7 +109,8 @@ class Condensed(Strategy):
         return self._sum(values)
 
     def at_nodes(self, own: Array) -> Array:
-        """What this rank has for its block dofs, ``own`` ``(n, 2)``, for the nodes ``(m, 2)`` on every rank."""
+        """What this rank has for its block dofs, ``own`` ``(n, 2)``, for the nodes ``(m, 2)`` on
+        every rank."""
         return self._on_all(_dofs(self._nodes), own.ravel()).reshape(-1, 2)
 
     def _sum(self, values: Array) -> Array:
@@ -105,8 +119,8 @@ class Condensed(Strategy):
         return values
 
     def occupy(self, rows: np.ndarray, columns: np.ndarray) -> None:
-        """Let this rank's blocks of `update` be at block dofs ``rows``, among the nodes, and ``columns`` ``(b,)``, each
-        place once; all are zero."""
+        """Let this rank's blocks of `update` be at block dofs ``rows``, among the nodes, and
+        ``columns`` ``(b,)``, each place once; all are zero."""
         self.near = np.unique(np.concatenate(self.comm.allgather(np.unique(columns))))
         self._columns = _dofs(self.near)
         self._row = np.searchsorted(self._nodes, rows)
@@ -119,7 +133,8 @@ class Condensed(Strategy):
         self._D = self._own_D if self.comm.size == 1 else self._own_D.copy()
 
     def update(self, blocks: Array) -> None:
-        """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, 2, 2)``; what has not changed costs nothing."""
+        """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, 2, 2)``; what has not changed costs
+        nothing."""
         changed = filled(blocks != self._blocks)
         self._own_D[self._at[0][changed], self._at[1][changed]] = blocks[changed]
         self._blocks = blocks
@@ -137,8 +152,8 @@ class Condensed(Strategy):
         y.array[at] += (self._D @ self._on_all(self._columns, x.array_r))[mine]
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
-        """``x = (K + E D)^-1 r`` with the points that are closed after ``-x``, called by PETSc; not a number if that is
-        singular."""
+        """``x = (K + E D)^-1 r`` with the points that are closed after ``-x``, called by PETSc; not
+        a number if that is singular."""
         self._ksp.solve(r, self._y)
         forces, near = np.zeros(self._Z.shape[1]), self._on_all(self._columns, self._y.array_r)
         drawn = self._drawn(near)
@@ -152,7 +167,8 @@ class Condensed(Strategy):
         x.array[:] = self._y.array_r + self._Z @ (forces - drawn)
 
     def _drawn(self, y: Array) -> Array:
-        """``(1 + D Z)^-1 D y`` of ``y`` ``(2 k,)`` at ``near``, a force on each dof of the nodes ``(2 m,)``."""
+        """``(1 + D Z)^-1 D y`` of ``y`` ``(2 k,)`` at ``near``, a force on each dof of the nodes
+        ``(2 m,)``."""
         force = np.zeros(len(self._DZ))
         rows = np.flatnonzero(self._D.any(axis=1))
         small = self._DZ[np.ix_(rows, rows)]
@@ -165,7 +181,8 @@ class Condensed(Strategy):
 
 
 def filled(blocks: np.ndarray) -> np.ndarray:
-    """Which of ``blocks`` ``(n, 2, 2)`` are not all zero; numpy's `any` is several times slower on so short axes."""
+    """Which of ``blocks`` ``(n, 2, 2)`` are not all zero; numpy's `any` is several times slower on
+    so short axes."""
     a, b, c, d = blocks.reshape(-1, 4).T != 0
     return np.flatnonzero(a | b | c | d)
 

@@ -10,7 +10,8 @@ _SPARE = 60  # per cent of MUMPS's workspace
 
 
 class Direct(Strategy):
-    """One sparse factorisation of the whole ``matrix``, by MUMPS, of the ``kind`` "lu" or "cholesky". Collective."""
+    """One sparse factorisation of the whole ``matrix``, by MUMPS, of the ``kind`` "lu" or
+    "cholesky". Collective."""
 
     def __init__(self, matrix: PETSc.Mat, kind: str = "lu") -> None:
         self.matrix, self._kind = matrix, kind
@@ -25,4 +26,6 @@ class Direct(Strategy):
         pc.setFactorSetUpSolverType()
         factors = pc.getFactorMatrix()
         factors.setMumpsIcntl(14, _SPARE)
-        factors.setMumpsIcntl(8, 1)  # scale by the diagonal: MUMPS's own choice takes a seventh of a factorisation
+        factors.setMumpsIcntl(
+            8, 1
+        )  # scale by the diagonal: MUMPS's own choice takes a seventh of a factorisation

@@ -1,7 +1,8 @@
 """FGMRES preconditioned by a factorisation of an earlier matrix, for large elastic problems.
 
-With a good guess few contact points change from one iteration to the next: one to three products and solves replace a
-factorisation. From step to step too many of them change, and plastic bodies change all over.
+With a good guess few contact points change from one iteration to the next: one to three products
+and solves replace a factorisation. From step to step too many of them change, and plastic bodies
+change all over.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ class Lagged:
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp``, which has a direct preconditioner, iterate."""
-        ksp.setType("fgmres")  # needs one solve less than GMRES: it keeps the preconditioned vectors
+        ksp.setType(
+            "fgmres"
+        )  # needs one solve less than GMRES: it keeps the preconditioned vectors
         ksp.setConvergenceTest(self._test)
 
     def _test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
@@ -40,11 +43,13 @@ class Lagged:
         if iteration == 0:
             self._right_side = norm
         done = norm <= _TOLERANCE * self._right_side or iteration >= 2 * _MANY_SOLVES
-        return PETSc.KSP.ConvergedReason.CONVERGED_ITS if done else PETSc.KSP.ConvergedReason.ITERATING
+        return (
+            PETSc.KSP.ConvergedReason.CONVERGED_ITS if done else PETSc.KSP.ConvergedReason.ITERATING
+        )
 
     def factorises(self, iterations: int, changes: int, *, renewed: bool) -> bool:
-        """Whether to factorise the next matrix: the last system took so many ``iterations``, there were ``changes`` of
-        the active set since the last matrix, or it is ``renewed``."""
+        """Whether to factorise the next matrix: the last system took so many ``iterations``, there
+        were ``changes`` of the active set since the last matrix, or it is ``renewed``."""
         self._changes += changes
         factorise = renewed or iterations > _MANY_SOLVES or self._changes > _MANY_CHANGES
         self._changes = 0 if factorise else self._changes

@@ -1,4 +1,5 @@
-"""In which order to eliminate the unknowns of a sparse matrix: METIS's nested dissection (Karypis and Kumar 1998)."""
+"""In which order to eliminate the unknowns of a sparse matrix: METIS's nested dissection (Karypis
+and Kumar 1998)."""
 
 from __future__ import annotations
 
@@ -32,8 +33,8 @@ def metis() -> tuple[cffi.FFI, Any]:
 
 
 def corners(V: fem.FunctionSpace) -> np.ndarray:
-    """The nodes ``(n_owned, k)``, in global numbers, at the corners of the edge or the cell that each of this rank's
-    nodes of ``V`` lies on; those at corners are their own."""
+    """The nodes ``(n_owned, k)``, in global numbers, at the corners of the edge or the cell that
+    each of this rank's nodes of ``V`` lies on; those at corners are their own."""
     element = V.element.basix_element
     weight = lagrange_element(element.cell_type, 1).tabulate(0, element.points)[0, ..., 0]
     k = weight.shape[1]
@@ -45,14 +46,17 @@ def corners(V: fem.FunctionSpace) -> np.ndarray:
 
 
 def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.ndarray) -> np.ndarray:
-    """As `nested_dissection`, quicker: only unknowns at corners are ordered by METIS, the others come right before the
-    first one of their corners ``(n, k)``, -1 where that is none of the unknowns. That keeps what separates parts: of
-    the nodes of an edge or a cell none is in a part without its corners."""
+    """As `nested_dissection`, quicker: only unknowns at corners are ordered by METIS, the others
+    come right before the first one of their corners ``(n, k)``, -1 where that is none of the
+    unknowns. That keeps what separates parts: of the nodes of an edge or a cell none is in a part
+    without its corners."""
     alone = corner[:, 0] == np.arange(n)
     number = np.cumsum(alone) - 1
     both = alone[rows] & alone[columns]
     place = np.full(n + 1, n)  # the last is that of no corner
-    place[:-1][alone] = nested_dissection(int(alone.sum()), number[rows[both]], number[columns[both]])
+    place[:-1][alone] = nested_dissection(
+        int(alone.sum()), number[rows[both]], number[columns[both]]
+    )
     first = np.where(alone, place[:n], place[corner].min(axis=1, initial=n))
     found = np.empty(n, dtype=np.int32)
     found[np.lexsort((alone, first))] = np.arange(n)
@@ -60,17 +64,26 @@ def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.nda
 
 
 def nested_dissection(n: int, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Places ``(n,)`` of ``n`` unknowns in an order with little fill-in; ``rows`` and ``columns`` ``(k,)`` are coupled,
-    one way or the other. Raises MemoryError if METIS does not get what it needs."""
+    """Places ``(n,)`` of ``n`` unknowns in an order with little fill-in; ``rows`` and ``columns``
+    ``(k,)`` are coupled, one way or the other. Raises MemoryError if METIS does not get what it
+    needs."""
     apart = rows != columns
     rows, columns = rows[apart].astype(np.int64), columns[apart].astype(np.int64)
-    row, column = np.divmod(np.unique(np.concatenate([rows * n + columns, columns * n + rows])), max(n, 1))
+    row, column = np.divmod(
+        np.unique(np.concatenate([rows * n + columns, columns * n + rows])), max(n, 1)
+    )
     place = np.arange(n, dtype=np.int32)
     if not len(row):
         return place
     offsets = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
     ffi, library = metis()
-    arrays = np.array([n], dtype=np.int32), offsets, column.astype(np.int32), np.empty(n, dtype=np.int32), place
+    arrays = (
+        np.array([n], dtype=np.int32),
+        offsets,
+        column.astype(np.int32),
+        np.empty(n, dtype=np.int32),
+        place,
+    )
     size, at, neighbours, order, places = (ffi.from_buffer("int32_t[]", a) for a in arrays)
     if library.METIS_NodeND(size, at, neighbours, ffi.NULL, ffi.NULL, order, places) != 1:
         raise MemoryError("METIS found no order of elimination")

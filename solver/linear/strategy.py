@@ -13,10 +13,11 @@ from petsc4py import PETSc
 
 @dataclass(frozen=True)
 class Facts:
-    """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``, surfaces have ``friction``, or
-    strains are large, as ``finite``; whether levels of drives are unknown, as ``by_force``; ``gamma_factor``, the
-    largest of its unilateral interactions, None without one or with others; and ``held()``, whether supports alone keep
-    every body from moving rigidly (collective)."""
+    """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``, surfaces have
+    ``friction``, or strains are large, as ``finite``; whether levels of drives are unknown, as
+    ``by_force``; ``gamma_factor``, the largest of its unilateral interactions, None without one or
+    with others; and ``held()``, whether supports alone keep every body from moving rigidly
+    (collective)."""
 
     comm: MPI.Comm
     dofs: int
@@ -29,9 +30,10 @@ class Facts:
 
 
 class Strategy:
-    """A way to solve with a ``matrix``, as PETSc's linear solver ``ksp`` is told by `attach`: unless a strategy says
-    otherwise it is the Python context of a preconditioner, which solves exactly. Beside it a function
-    ``why_not(facts)`` returns a reason not to use it, or None. Collective."""
+    """A way to solve with a ``matrix``, as PETSc's linear solver ``ksp`` is told by `attach`:
+    unless a strategy says otherwise it is the Python context of a preconditioner, which solves
+    exactly. Beside it a function ``why_not(facts)`` returns a reason not to use it, or None.
+    Collective."""
 
     matrix: PETSc.Mat
 
@@ -44,8 +46,8 @@ class Strategy:
 
 
 class Product:
-    """Python context of the matrix that a ``strategy`` with a method `mult` makes. It does not keep the strategy alive,
-    which holds the matrix: what PETSc refers to Python cannot collect."""
+    """Python context of the matrix that a ``strategy`` with a method `mult` makes. It does not keep
+    the strategy alive, which holds the matrix: what PETSc refers to Python cannot collect."""
 
     def __init__(self, strategy: Any) -> None:
         self._strategy = ref(strategy)

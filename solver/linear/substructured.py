@@ -1,13 +1,16 @@
-"""Sparse systems on several ranks, each of which eliminates its own unknowns (direct substructuring).
+"""Sparse systems on several ranks, each of which eliminates its own unknowns (direct
+substructuring).
 
-The interface are the unknowns on cells of several ranks, and few more where pairs in contact lie on two. Without it the
-ranks' blocks do not know of each other: every rank orders and factorises its own by itself, and what is left of the
-interface is the sum of the Schur complements (Smith, Bjorstad and Gropp 1996, 4.2)
+The interface are the unknowns on cells of several ranks, and few more where pairs in contact lie on
+two. Without it the ranks' blocks do not know of each other: every rank orders and factorises its
+own by itself, and what is left of the interface is the sum of the Schur complements (Smith,
+Bjorstad and Gropp 1996, 4.2)
 
     S = sum over ranks of A_GG - A_GI A_II^-1 A_IG,
 
-a dense matrix on all ranks. Bodies that are cut in sectors have short interfaces. MUMPS does the same within one tree,
-but orders the whole matrix on one rank, and waits where fronts span the ranks.
+a dense matrix on all ranks. Bodies that are cut in sectors have short interfaces. MUMPS does the
+same within one tree, but orders the whole matrix on one rank, and waits where fronts span the
+ranks.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ _LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of t
 
 
 def why_not(facts: Facts) -> str | None:
-    """Why the ranks do not eliminate unknowns of their own, as far as that is known before there is a matrix."""
+    """Why the ranks do not eliminate unknowns of their own, as far as that is known before there is
+    a matrix."""
     if facts.comm.size == 1:
         return "one rank"
     missing = None
@@ -41,8 +45,8 @@ def why_not(facts: Facts) -> str | None:
 
 
 def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | str:
-    """Substructures for matrices with the pattern of ``A``, of the displacements ``V``; a reason where they do not
-    go. Collective."""
+    """Substructures for matrices with the pattern of ``A``, of the displacements ``V``; a reason
+    where they do not go. Collective."""
     comm = A.comm.tompi4py()
     interface = _interface(A, comm)
     if len(interface) > _LARGEST_INTERFACE:
@@ -55,8 +59,8 @@ def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | str:
 
 
 def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
-    """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several ranks, and of any others
-    that are, as the contact's, the ones of the higher rank."""
+    """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several
+    ranks, and of any others that are, as the contact's, the ones of the higher rank."""
     start, end = A.getOwnershipRange()
 
     def union(dofs: np.ndarray) -> np.ndarray:
@@ -79,8 +83,9 @@ def schur_kernels() -> Any:
 
 
 class Substructures(Strategy):
-    """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose dofs ``interface``
-    ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in `corners`. Collective."""
+    """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose
+    dofs ``interface`` ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in
+    `corners`. Collective."""
 
     def __init__(self, A: PETSc.Mat, interface: np.ndarray, corner: np.ndarray) -> None:
         self.matrix, self.comm = A, A.comm.tompi4py()
@@ -97,11 +102,18 @@ class Substructures(Strategy):
         offsets, columns, _ = self._block.getValuesCSR()
         rows = np.repeat(np.arange(len(local), dtype=np.int32), np.diff(offsets))
         last = np.isin(local, interface)
-        self._shared = np.flatnonzero(last[rows] & last[columns])  # of the interface alone: all ranks have them
+        self._shared = np.flatnonzero(
+            last[rows] & last[columns]
+        )  # of the interface alone: all ranks have them
         size = A.getBlockSize()
         corner = np.searchsorted(local[::size] // size, corner)  # all are on cells of this rank
         place = _places(rows, columns, last, corner, self._own.start // size, size)
-        self._arrays = rows + 1, columns.astype(np.int32, copy=False) + 1, kept.astype(np.int32) + 1, place + 1
+        self._arrays = (
+            rows + 1,
+            columns.astype(np.int32, copy=False) + 1,
+            kept.astype(np.int32) + 1,
+            place + 1,
+        )
         self._b = np.zeros(len(local))
         m = len(interface)
         self._reduced, self._complement = np.zeros(m), np.zeros((m, m))
@@ -126,7 +138,9 @@ class Substructures(Strategy):
                 MPI.COMM_SELF.py2f(), *sizes, rows, columns, len(kept), kept, place, pointer(status)
             )
         if status[0] >= 0:
-            status[0] = self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
+            status[0] = self._kernels.schur_factorise(
+                self._mumps, pointer(values), pointer(self._complement)
+            )
         self.singular = self.comm.allreduce(int(status[0]), op=MPI.MIN) < 0
         if self.singular:
             return
@@ -164,15 +178,22 @@ class Substructures(Strategy):
 
 
 def _places(
-    rows: np.ndarray, columns: np.ndarray, last: np.ndarray, corner: np.ndarray, start: int, size: int
+    rows: np.ndarray,
+    columns: np.ndarray,
+    last: np.ndarray,
+    corner: np.ndarray,
+    start: int,
+    size: int,
 ) -> np.ndarray:
-    """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others.
-    Entries are at ``rows`` and ``columns``, in blocks of ``size``. Block ``start + i`` has the blocks ``corner[i]`` at
-    its corners; all that are not last have some."""
+    """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)``
+    behind the others. Entries are at ``rows`` and ``columns``, in blocks of ``size``. Block ``start
+    + i`` has the blocks ``corner[i]`` at its corners; all that are not last have some."""
     inner = np.flatnonzero(~last[::size])
     number = np.full(len(last) // size, -1)
     number[inner] = np.arange(len(inner))
-    one = (rows % size == 0) & (columns % size == 0) & ~last[rows] & ~last[columns]  # entry of each block
+    one = (
+        (rows % size == 0) & (columns % size == 0) & ~last[rows] & ~last[columns]
+    )  # entry of each block
     row, column = number[rows[one] // size], number[columns[one] // size]
     place = np.empty(len(number), dtype=np.int32)
     place[inner] = before_corners(len(inner), row, column, number[corner[inner - start]])

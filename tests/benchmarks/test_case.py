@@ -4,7 +4,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from archord.benchmarks.case import Case, matches, paper_joint, quantities, side_by_side, slug, varied
+from archord.benchmarks.case import (
+    Case,
+    matches,
+    paper_joint,
+    quantities,
+    side_by_side,
+    slug,
+    varied,
+)
 from archord.scene.file import resolved
 
 
@@ -14,12 +22,15 @@ def test_a_variation_changes_what_it_names_and_nothing_else():
     assert resolved(varied(scene)) == resolved(scene)
     other = varied(scene, pin={"rigid": True}, load={"displacement": None, "relative_force": 0.003})
     assert other.pin.rigid
-    assert other.targets == pytest.approx([0.001 * other.E_star, 0.002 * other.E_star, 0.003 * other.E_star])
+    assert other.targets == pytest.approx(
+        [0.001 * other.E_star, 0.002 * other.E_star, 0.003 * other.E_star]
+    )
     assert (other.joint, other.block, other.analysis) == (scene.joint, scene.block, scene.analysis)
 
 
 def test_joints_are_compared_per_thickness():
-    """What has no units is the same of a joint ten times as thick, whose force is ten times as large."""
+    """What has no units is the same of a joint ten times as thick, whose force is ten times as
+    large."""
     thin, thick = (SimpleNamespace(P=P, p0=0.5, eps=1.0, delta=0.01) for P in (2.0, 20.0))
     scene = paper_joint()
     assert quantities(varied(scene, analysis={"thickness": 10.0}), thick) == quantities(scene, thin)
@@ -35,7 +46,9 @@ def test_names_become_folders_and_are_found(tmp_path):
 
 def test_a_run_that_stops_is_a_sentence(tmp_path):
     """Nothing resists a pull; `attempt` gives what was reached, `solve` insists on the end."""
-    pulled = Case("pulled", paper_joint(0.3, 1, load={"displacement": None, "relative_force": -0.001}))
+    pulled = Case(
+        "pulled", paper_joint(0.3, 1, load={"displacement": None, "relative_force": -0.001})
+    )
     assert pulled.attempt(tmp_path).status == "stopped"
     assert not pulled.is_done(tmp_path)
     with pytest.raises(RuntimeError, match=r"^pulled: no equilibrium"):

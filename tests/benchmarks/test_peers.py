@@ -1,4 +1,5 @@
-"""The peers of the benchmark "error against run time": their list, and the force of the joint that each computes."""
+"""The peers of the benchmark "error against run time": their list, and the force of the joint that
+each computes."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from archord.benchmarks.peers.installed import PEERS
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 
-# Elastic: independent solvers of each kinematics, refined until the digits stood (README.md). Plastic: archord's for
-# fixed pairs, GetFEM's and NGSolve's for closest points.
+# Elastic: independent solvers of each kinematics, refined until the digits stood (README.md).
+# Plastic: archord's for fixed pairs, GetFEM's and NGSolve's for closest points.
 FORCE = {
     "elastic": {"reference": 0.0127596, "current": 0.0127785},
     "plastic": {"reference": 0.00668, "current": 0.006692},
@@ -41,18 +42,24 @@ def test_only_what_answers_is_listed(tmp_path, monkeypatch):
     answers.write_text("#!/bin/sh\necho 1.2\n")
     answers.chmod(0o755)
     pythons = [str(tmp_path / "none"), "/bin/false", str(answers)]
-    monkeypatch.setattr(installed, "PEERS", [replace(PEERS[0], python=python) for python in pythons])
+    monkeypatch.setattr(
+        installed, "PEERS", [replace(PEERS[0], python=python) for python in pythons]
+    )
     (found,) = installed.installed()
     assert (found.python, found.version) == (str(answers), "1.2")
     python, script, *words = found.command("plastic", 0.04, 2, 20, tmp_path / "r.json")
     assert python == found.python
     assert Path(script).is_file()
-    assert " ".join(words) == f"--case plastic --size 0.04 --order 2 --steps 20 --output {tmp_path / 'r.json'}"
+    assert (
+        " ".join(words)
+        == f"--case plastic --size 0.04 --order 2 --steps 20 --output {tmp_path / 'r.json'}"
+    )
 
 
 @pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.label)
 @pytest.mark.parametrize(
-    ("case", "mesh", "steps", "tolerance"), [("elastic", 0, 2, 1e-2), ("elastic", 1, 2, 1e-3), ("plastic", 0, 20, 1e-2)]
+    ("case", "mesh", "steps", "tolerance"),
+    [("elastic", 0, 2, 1e-2), ("elastic", 1, 2, 1e-3), ("plastic", 0, 20, 1e-2)],
 )
 def test_the_force_is_that_of_its_kinematics(tmp_path, peer, case, mesh, steps, tolerance):
     """On its coarsest mesh within 1 %, on the next one within 0.1 %."""
@@ -71,15 +78,22 @@ def test_the_force_is_that_of_its_kinematics(tmp_path, peer, case, mesh, steps, 
 
 
 def test_return_map_of_scikit_fems_peer(monkeypatch):
-    """Stress, tangent and plastic strain are those of archord's perfectly plastic material, below yield and beyond."""
-    monkeypatch.syspath_prepend(str(Path(installed.__file__).parent))  # scripts find each other there
+    """Stress, tangent and plastic strain are those of archord's perfectly plastic material, below
+    yield and beyond."""
+    monkeypatch.syspath_prepend(
+        str(Path(installed.__file__).parent)
+    )  # scripts find each other there
     monkeypatch.setitem(sys.modules, "skfem", ModuleType("skfem"))
     script, sigy = import_module("joint_script"), 0.02
     strain = np.random.default_rng(1).normal(size=(40, 2, 3)) * 0.01
-    stress, tangent, history = import_module("skfem_joint").return_map(strain, np.zeros((40, 2, 4)), sigy)
+    stress, tangent, history = import_module("skfem_joint").return_map(
+        strain, np.zeros((40, 2, 4)), sigy
+    )
     material = J2Material(script.E, script.NU, "strain", LinearHardening(sigy))
     expected, modulus, state = material.update(strain.reshape(80, 3), material.state(80))
     assert 10 < np.count_nonzero(state.peeq) < 75
-    np.testing.assert_allclose(stress.reshape(80, 3), expected[:, [0, 1, 3]], rtol=0, atol=1e-12 * sigy)
+    np.testing.assert_allclose(
+        stress.reshape(80, 3), expected[:, [0, 1, 3]], rtol=0, atol=1e-12 * sigy
+    )
     np.testing.assert_allclose(tangent.reshape(80, 3, 3), modulus, rtol=0, atol=1e-12 * script.E)
     np.testing.assert_allclose(history.reshape(80, 4), state.plastic_strain, rtol=0, atol=1e-14)

@@ -23,10 +23,17 @@ def folder(tmp_path_factory):
         patch.setattr(paper_runs, "MESHES", {"coarse": 0.3, "fine": 0.15})
         patch.setattr(paper_runs, "STEPS", STEPS)
         solved: list[str] = []
-        files = reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda said: solved.append(said.partition(":")[0]))
+        files = reproduce(
+            ["fig5", "fig3"],
+            target,
+            MPI.COMM_SELF,
+            lambda said: solved.append(said.partition(":")[0]),
+        )
         assert solved == [one.name for one in cases(["elastic", FULL_YIELD])]
         assert [f.name for f in files] == ["fig3.csv", "fig3.png", "fig5.csv", "fig5.png"]
-        reproduce(["all"], target, MPI.COMM_SELF, lambda said: solved.append(said.partition(":")[0]))
+        reproduce(
+            ["all"], target, MPI.COMM_SELF, lambda said: solved.append(said.partition(":")[0])
+        )
         assert sorted(solved) == sorted(one.name for one in cases(JOINTS))
         yield target
 
@@ -44,9 +51,12 @@ def test_a_figure_s_table_holds_the_runs(folder):
 
 
 def test_the_report_judges_every_claim_and_shows_every_figure(folder):
-    """The finding, on any mesh: p0/sigY at 2 dR is capped near 1 in plane stress, and is not in plane strain."""
+    """The finding, on any mesh: p0/sigY at 2 dR is capped near 1 in plane stress, and is not in
+    plane strain."""
     text = (folder / "report.md").read_text(encoding="utf-8")
-    claims = {line.split(" | ")[0][2:]: line for line in text.splitlines() if line.startswith("| C")}
+    claims = {
+        line.split(" | ")[0][2:]: line for line in text.splitlines() if line.startswith("| C")
+    }
     assert set(claims) == set(CLAIMS)
     assert "does not hold in plane strain" in claims["C5"]
     for name in FIGURES:
@@ -57,7 +67,8 @@ def test_the_report_judges_every_claim_and_shows_every_figure(folder):
 
 
 def test_first_yield_scales_with_the_yield_stress(folder):
-    """Half the yield stress is reached earlier, none at all never; near the contact it begins on the axis."""
+    """Half the yield stress is reached earlier, none at all never; near the contact it begins on
+    the axis."""
     run = Runs(folder / "runs").curve("elastic", "strain")
     early, late = (first_yield(run, s, near_contact=0.5) for s in (0.001, 0.002))
     assert 0 < early.delta < late.delta < 2
@@ -71,7 +82,9 @@ def test_every_scene_of_the_paper_is_in_its_plane_with_unit_contact_modulus(join
     """And some figure needs it."""
     scene = case(joint, plane).scene
     assert (scene.E_star, scene.analysis.plane) == (pytest.approx(1.0), plane)
-    assert [scene.joint.dR, scene.pin.yield_stress or 0] == pytest.approx([(v or 0) / 100 for v in JOINTS[joint]])
+    assert [scene.joint.dR, scene.pin.yield_stress or 0] == pytest.approx(
+        [(v or 0) / 100 for v in JOINTS[joint]]
+    )
     assert any(joint in LAYOUTS[name]["joints"] for name in FIGURES)
 
 

@@ -5,7 +5,16 @@ import csv
 import pytest
 
 from archord.benchmarks.cost import scaling
-from archord.benchmarks.cost.scaling import PARTS, SIZES, Setting, cost_of, exponent, refined, settings, unlike
+from archord.benchmarks.cost.scaling import (
+    PARTS,
+    SIZES,
+    Setting,
+    cost_of,
+    exponent,
+    refined,
+    settings,
+    unlike,
+)
 from archord.benchmarks.timing import Process, Run, Timing
 from archord.cli import run
 
@@ -19,8 +28,14 @@ def test_a_power_law_has_its_exponent(power):
 def test_every_size_runs_on_every_number_of_ranks():
     """Meshes are refinements of one, which have about as many dofs as is said."""
     found = settings(1e6, 2)
-    assert {(s.dofs, s.ranks) for s in found if s.material == "elastic"} == {(n, r) for n in SIZES for r in (1, 2)}
-    assert [(s.dofs, s.ranks) for s in found if s.material == "plastic"] == [(5_000, 1), (30_000, 1), (100_000, 1)]
+    assert {(s.dofs, s.ranks) for s in found if s.material == "elastic"} == {
+        (n, r) for n in SIZES for r in (1, 2)
+    }
+    assert [(s.dofs, s.ranks) for s in found if s.material == "plastic"] == [
+        (5_000, 1),
+        (30_000, 1),
+        (100_000, 1),
+    ]
     assert {s.ranks for s in settings(30_000, 5)} == {1, 2, 4}
     assert max(s.dofs for s in settings(30_000, 1)) == 30_000
     for dofs, size in SIZES.items():
@@ -33,7 +48,8 @@ def test_a_force_that_depends_on_the_ranks_is_told():
     """Also one that is not a number; other materials and sizes are not compared."""
     one = {"name": "a", "material": "elastic", "dofs": 5000, "ranks": 1, "P": 0.0128}
     others = [
-        one | {"name": name, "ranks": 2, "P": P} for name, P in (("b", 0.0128), ("c", 0.0129), ("d", float("nan")))
+        one | {"name": name, "ranks": 2, "P": P}
+        for name, P in (("b", 0.0128), ("c", 0.0129), ("d", float("nan")))
     ]
     assert unlike([one, *others, one | {"name": "e", "dofs": 6000, "ranks": 2, "P": 1.0}]) == [
         "c: P differs by 7.8e-03 from that on 1 rank",
@@ -43,17 +59,24 @@ def test_a_force_that_depends_on_the_ranks_is_told():
 
 def test_the_cost_is_that_of_the_run_in_the_middle():
     """Seconds by part sum up to the time from outside."""
-    report = {"seconds": {"mesh": 1.0, "contact": 0.5, "assemble contact": 0.5, "checkpoint": 0.25}, "peak_memory": [1]}
+    report = {
+        "seconds": {"mesh": 1.0, "contact": 0.5, "assemble contact": 0.5, "checkpoint": 0.25},
+        "peak_memory": [1],
+    }
     report |= {"totals": {"newton_iterations": 1, "factorisations": 1}, "mesh": {"dofs": 5000}}
     report |= {"model": {"E_star": 2.0}, "steps": [{"P": 1.0, "coarse_iterations": 3}]}
-    found = cost_of(Setting(5000, 1), Timing(Process("a", (), None), [Run(s, s, 0, report) for s in (9.0, 5.0, 7.0)]))
+    found = cost_of(
+        Setting(5000, 1),
+        Timing(Process("a", (), None), [Run(s, s, 0, report) for s in (9.0, 5.0, 7.0)]),
+    )
     assert (found["total"], found["P"], found["coarse iterations"]) == (7.0, 0.5, 3)
     assert (found["parts"]["contact"], found["parts"]["rest"]) == (1.0, 4.75)
     assert set(found["parts"]) == {*PARTS, "rest"}
 
 
 def test_the_command_writes_its_table(tmp_path, capsys, monkeypatch):
-    """Of real runs on one rank: no part is negative, and little is in no part. A run that fails is told."""
+    """Of real runs on one rank: no part is negative, and little is in no part. A run that fails is
+    told."""
     monkeypatch.setattr(scaling, "SIZES", {5_000: 0.1})
     monkeypatch.setattr(scaling, "PLASTIC_STEPS", 2)
     assert run(["benchmark", "scaling", "--ranks", "1", "-o", str(tmp_path), "-q"]) == 0

@@ -10,7 +10,15 @@ import h5py
 
 from archord.benchmarks.case import Expected, slug
 from archord.benchmarks.stability.cases import FILE, FINE, cases, fine_scene
-from archord.benchmarks.stability.run import Check, Result, chosen, judge, not_finite, solve_case, with_references
+from archord.benchmarks.stability.run import (
+    Check,
+    Result,
+    chosen,
+    judge,
+    not_finite,
+    solve_case,
+    with_references,
+)
 from archord.cli import run
 from archord.scene.scene import Scene
 
@@ -23,7 +31,9 @@ def test_three_cases_through_the_command(tmp_path, capsys, refused):
     assert run(["benchmark", "stability", "--only", "pulled*", "-q", "-o", str(tmp_path)]) == 0
     assert capsys.readouterr().out == ""
     with (tmp_path / "stability.csv").open(newline="", encoding="utf-8") as file:
-        assert [(row["status"], row["verdict"]) for row in csv.DictReader(file)] == [("stopped", "stops, as it must")]
+        assert [(row["status"], row["verdict"]) for row in csv.DictReader(file)] == [
+            ("stopped", "stops, as it must")
+        ]
     assert "singular mode" in (tmp_path / "stability.md").read_text(encoding="utf-8")
     assert "no case has such a name or group; groups are modulus" in refused(
         ["benchmark", "stability", "--only", "no one"]
@@ -38,8 +48,9 @@ def a_case(**changes):
 
 
 def test_the_table_is_whole():
-    """At least 160 scenes, 40 of them general; what a case is compared with exists and is another. Fine scenes
-    are the same joint with smaller elements of one size, and more steps where a body can yield."""
+    """At least 160 scenes, 40 of them general; what a case is compared with exists and is another.
+    Fine scenes are the same joint with smaller elements of one size, and more steps where a body
+    can yield."""
     table, fine = cases(), json.loads(FILE.read_text(encoding="utf-8"))
     assert len({slug(name) for name in table}) == len(table) >= 160
     assert sum(not isinstance(case.scene, Scene) for case in table.values()) >= 40
@@ -50,7 +61,11 @@ def test_the_table_is_whole():
             if expected.value == FINE:
                 assert expected.quantity in fine[case.name]
                 own, scene = case.scene, fine_scene(case.scene)
-                assert (scene.pin, scene.block, scene.load.stages) == (own.pin, own.block, own.load.stages)
+                assert (scene.pin, scene.block, scene.load.stages) == (
+                    own.pin,
+                    own.block,
+                    own.load.stages,
+                )
                 assert (scene.joint.dR, scene.joint.size_ratio) == (own.joint.dR, 1)
                 assert scene.joint.h <= 0.025 * scene.joint.radius
                 assert not scene.plastic or len(scene.targets) >= 20
@@ -90,7 +105,8 @@ def test_verdicts():
 
 
 def test_blocks_of_quadrilaterals_and_triangles(tmp_path):
-    """Contact and ties between meshes that do not fit, 20:1, pass on a uniform stress; the line is as it should be."""
+    """Contact and ties between meshes that do not fit, 20:1, pass on a uniform stress; the line is
+    as it should be."""
     table = cases()
     for name in ("20:1, contact", "1:20, triangles, tied"):
         line = judge(table[name], {name: solve_case(table[name], tmp_path)}, {})
@@ -98,9 +114,14 @@ def test_blocks_of_quadrilaterals_and_triangles(tmp_path):
 
 
 def test_a_budget_ends_a_case(tmp_path):
-    """With the sentence that says so, and what was reached before: forces and energies in balance."""
+    """With the sentence that says so, and what was reached before: forces and energies in
+    balance."""
     short = solve_case(a_case(name="short", budget=5), tmp_path)
-    assert (short.status, short.message, short.steps) == ("stopped", "more than the 5 Newton iterations allowed", 1)
+    assert (short.status, short.message, short.steps) == (
+        "stopped",
+        "more than the 5 Newton iterations allowed",
+        1,
+    )
     assert short.forces.share < 1e-2
     assert short.energy.share < 1
 

@@ -25,8 +25,8 @@ def test_a_process_is_timed_from_outside(tmp_path):
 
 
 def test_failures_are_recorded_with_their_sentence(tmp_path):
-    """A crash, a process that takes too long, a command that is not there, a result that cannot be read: none is tried
-    again."""
+    """A crash, a process that takes too long, a command that is not there, a result that cannot be
+    read: none is tried again."""
 
     def unread():
         raise Failure("no result")
@@ -45,9 +45,9 @@ def test_failures_are_recorded_with_their_sentence(tmp_path):
     assert "no-such-program" in found[3].failure
     assert found[4].failure == "no result"
     assert [sentence[0] for sentence in said] == ["a", "a", *"bcde", "a"]
-    assert [sentence.endswith(("not counted", "run 1", "run 2")) for sentence in said] == [True] * 2 + [False] * 4 + [
+    assert [sentence.endswith(("not counted", "run 1", "run 2")) for sentence in said] == [
         True
-    ]
+    ] * 2 + [False] * 4 + [True]
     assert len(found[0].runs) == 2
 
 
@@ -78,7 +78,11 @@ def test_what_was_timed_before_an_interruption_is_kept(tmp_path):
     found = time_all(processes, 3, interrupted(("b", "1")))
     assert [len(timing.runs) for timing in found] == [1, 1, 0]
     assert found[2].failure == "interrupted before its first run"
-    assert [len(timing.runs) for timing in time_all(processes, 3, interrupted(("a", "2")))] == [2, 1, 1]
+    assert [len(timing.runs) for timing in time_all(processes, 3, interrupted(("a", "2")))] == [
+        2,
+        1,
+        1,
+    ]
     with pytest.raises(KeyboardInterrupt):
         time_all(processes, 3, interrupted(("a", "d")))
 

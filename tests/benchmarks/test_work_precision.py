@@ -1,4 +1,5 @@
-"""The work-precision benchmark: reference values, errors, envelopes, the codes' results, and its command."""
+"""The work-precision benchmark: reference values, errors, envelopes, the codes' results, and its
+command."""
 
 import csv
 import json
@@ -31,7 +32,10 @@ def line(code, size, seconds, P, failure="", **found):
     """A point that was run once and found this P, or failed."""
     process = Process("a", (), Path())
     point = Point("elastic", code, "1.0", "s", size, 2, lambda folder: process)
-    return Line(point, Timing(process, [Run(seconds, seconds, 10**8, {"P": P, "dofs": 100} | found)], failure))
+    return Line(
+        point,
+        Timing(process, [Run(seconds, seconds, 10**8, {"P": P, "dofs": 100} | found)], failure),
+    )
 
 
 def test_a_profile_has_no_error_against_itself_and_errors_scale():
@@ -52,8 +56,8 @@ def test_sampling_keeps_a_linear_profile():
 
 
 def test_envelopes_keep_what_nothing_beats():
-    """Straight in log-log between points; never beyond the ends. A lucky coarse mesh counts as good as the worst of
-    those that follow."""
+    """Straight in log-log between points; never beyond the ends. A lucky coarse mesh counts as good
+    as the worst of those that follow."""
     assert lasting([1e-2, 1e-6, 1e-3, 1e-4]) == [1e-2, 1e-3, 1e-3, 1e-4]
     kept = envelope([(1, 1e-2), (2, 5e-2), (10, 1e-4), (11, 1e-4), (5, 1e-3)])
     assert kept == [(1, 1e-2), (5, 1e-3), (10, 1e-4)]
@@ -63,9 +67,12 @@ def test_envelopes_keep_what_nothing_beats():
 
 
 def test_ratios_of_synthetic_codes():
-    """A code that always takes ten times as long is said to; one that stops at 1e-3 never gets beyond."""
+    """A code that always takes ten times as long is said to; one that stops at 1e-3 never gets
+    beyond."""
     ours = [(10.0**k, 10.0 ** -(k + 2)) for k in range(4)]
-    text = "\n".join(ratios({"archord": ours, "slow": [(10 * s, e) for s, e in ours], "rough": ours[:2]}))
+    text = "\n".join(
+        ratios({"archord": ours, "slow": [(10 * s, e) for s, e in ours], "rough": ours[:2]})
+    )
     (line,) = [line for line in text.splitlines() if line.startswith("| 0.0001 |")]
     assert line == "| 0.0001 | 100.00 | takes 10 times as long | never |"
     assert "rough 1.0e-03" in text
@@ -77,10 +84,21 @@ def test_errors_are_against_the_reference_of_the_codes_kinematics(tmp_path):
     exact, fixed = (CASES["elastic"][kinematics]["P"][0] for kinematics in ("current", "reference"))
     ours = [line("archord", h, 0.1 / h, exact * (1 + h**2)) for h in (0.1, 0.03, 0.01)]
     assert ours[0].errors == {"P": pytest.approx(0.01)}
-    other = line("peer", 0.1, 10.0, exact, kinematics="reference", profile=np.array(CASES["elastic"]["profile"]))
+    other = line(
+        "peer",
+        0.1,
+        10.0,
+        exact,
+        kinematics="reference",
+        profile=np.array(CASES["elastic"]["profile"]),
+    )
     assert other.errors == {"P": pytest.approx(abs(exact / fixed - 1)), "profile": 0}
     broken = line("peer", 0.01, 10.0, exact, failure="it broke")
-    assert (row(broken)["failure"], row(broken)["seconds"], row(ours[1])["seconds"]) == ("it broke", "", "3.333")
+    assert (row(broken)["failure"], row(broken)["seconds"], row(ours[1])["seconds"]) == (
+        "it broke",
+        "",
+        "3.333",
+    )
     lines = [*ours, other, broken]
     assert envelopes(lines) == {
         "archord": [(0.1 / h, pytest.approx(h**2)) for h in (0.1, 0.03, 0.01)],
@@ -89,12 +107,15 @@ def test_errors_are_against_the_reference_of_the_codes_kinematics(tmp_path):
     text, files = write(lines, tmp_path)
     assert "archord 1.0, peer 1.0" in text
     assert "takes 1" in text
-    assert [file.name for file in files] == [f"work_precision_elastic.{kind}" for kind in ("csv", "md", "png")]
+    assert [file.name for file in files] == [
+        f"work_precision_elastic.{kind}" for kind in ("csv", "md", "png")
+    ]
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_references_are_there(case):
-    """For both kinematics, with errors below what they are to judge; the force of the profile is P."""
+    """For both kinematics, with errors below what they are to judge; the force of the profile is
+    P."""
     for kinematics in ("current", "reference"):
         reference = CASES[case][kinematics]
         assert {*reference, "profile"} == set(quantities(case))
@@ -111,12 +132,21 @@ def test_every_series_makes_scenes(tmp_path, monkeypatch):
     monkeypatch.setattr(codes, "installed", list)
     monkeypatch.setattr(codes, "_calculix_version", lambda: {"CalculiX": "2.20"})
     found = points()
-    series = [(case, given) for case in CASES for given in DATA["series"] if case in given.get("cases", CASES)]
+    series = [
+        (case, given)
+        for case in CASES
+        for given in DATA["series"]
+        if case in given.get("cases", CASES)
+    ]
     assert len(found) == sum(len(given["element_size"]) for _, given in series)
     for case, given in series:
-        same = [p for p in found if (p.case, p.code, p.series) == (case, given["code"], given["name"])]
+        same = [
+            p for p in found if (p.case, p.code, p.series) == (case, given["code"], given["name"])
+        ]
         scenes = [point.prepare.args[0] for point in same]
-        assert all(len(scene.targets) == point.steps for scene, point in zip(scenes, same, strict=True))
+        assert all(
+            len(scene.targets) == point.steps for scene, point in zip(scenes, same, strict=True)
+        )
         assert all(scene.targets[-1] == pytest.approx(0.01) for scene in scenes)
         cells = [scene.joint.expected_cells for scene in scenes]
         assert cells == sorted(cells)
@@ -130,7 +160,10 @@ def test_patterns_choose_points(monkeypatch, refused):
     monkeypatch.setattr(codes, "installed", list)
     assert {point.code for point in points(["ARCHORD"])} == {"archord"}
     assert {point.case for point in points(["elastic"])} == {"elastic"}
-    assert [point.size for point in points(["*plastic: archord, growth 0.25, 0.1?*", "elastic*, 0.01 R"])] == [
+    assert [
+        point.size
+        for point in points(["*plastic: archord, growth 0.25, 0.1?*", "elastic*, 0.01 R"])
+    ] == [
         0.01,
         0.16,
         0.12,
@@ -140,21 +173,29 @@ def test_patterns_choose_points(monkeypatch, refused):
 
 
 def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
-    """Each with its own time limit or, if it is less, that of the benchmark, and its own sentence where it fails."""
+    """Each with its own time limit or, if it is less, that of the benchmark, and its own sentence
+    where it fails."""
 
     class Peer:
         label, version, time_limit = "other", "1.2", 20.0
         series = {"elastic": ((0.2, 2), (0.1, 4))}  # noqa: RUF012
 
         def command(self, case, size, order, steps, output):
-            found = {"P": size * order, "kinematics": "reference", "failed": "diverged" if order == 4 else None}
+            found = {
+                "P": size * order,
+                "kinematics": "reference",
+                "failed": "diverged" if order == 4 else None,
+            }
             found |= dict.fromkeys(("p0", "eps", "iterations"))
             text = f"open({str(output)!r}, 'w').write({json.dumps(json.dumps(found))})"
             return [sys.executable, "-S", "-c", text]
 
     monkeypatch.setattr(codes, "installed", lambda: [Peer()])
     found = points(["other"])
-    assert [point.name for point in found] == ["elastic: other, order 2, 0.2 R", "elastic: other, order 4, 0.1 R"]
+    assert [point.name for point in found] == [
+        "elastic: other, order 2, 0.2 R",
+        "elastic: other, order 4, 0.1 R",
+    ]
     assert [found[0].process(tmp_path, limit).limit for limit in (10.0, 30.0)] == [10.0, 20.0]
     solved, failed = time_all([point.process(tmp_path, 10.0) for point in found], 1)
     assert solved.runs[0].result == {"P": 0.4, "kinematics": "reference"}
@@ -163,7 +204,15 @@ def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
 
 def test_a_quick_run_through_the_command(tmp_path, capsys):
     """The coarsest mesh: CSV with every error, table, diagram, exit code 0."""
-    options = ["--only", "plastic: archord, growth 0.25, 0.16 R", "--repeats", "1", "-q", "-o", str(tmp_path / "b")]
+    options = [
+        "--only",
+        "plastic: archord, growth 0.25, 0.16 R",
+        "--repeats",
+        "1",
+        "-q",
+        "-o",
+        str(tmp_path / "b"),
+    ]
     assert run(["benchmark", "work-precision", *options]) == 0
     assert capsys.readouterr().out == ""
     with (tmp_path / "b" / "work_precision_plastic.csv").open(newline="", encoding="utf-8") as file:

@@ -1,4 +1,5 @@
-"""The slider-crank with clearance balances its energy through impacts. It runs where Exudyn is installed."""
+"""The slider-crank with clearance balances its energy through impacts. It runs where Exudyn is
+installed."""
 
 import runpy
 from pathlib import Path
@@ -16,8 +17,8 @@ def example():
 
 @pytest.mark.parametrize("name", ["elastic", "yielding", "paper"])
 def test_the_energies_of_a_mechanism_with_clearance_balance(example, name):
-    """Within 1 % of what the joint stores at most, through the impacts after a quarter of a turn; an elastic joint
-    loses nothing by its law, one that yields loses more and more."""
+    """Within 1 % of what the joint stores at most, through the impacts after a quarter of a turn;
+    an elastic joint loses nothing by its law, one that yields loses more and more."""
     _, P, energies, _ = example["study"](example["laws"]()[name], steps=20000, turns=0.3)
     stored, lost, total = energies["stored"], energies["lost, law"], sum(energies.values())
     assert np.ptp(total) < 0.01 * stored.max()

@@ -1,9 +1,10 @@
 """`archord solve` on files gone wrong, and what it must never do.
 
-Whatever is in a scene file, the command ends with 0 (solved), 2 (refused) or 3 (could not go on), without traceback or
-warning of a library, writes nothing when it refuses, and only finite numbers when it does not. Each case runs in a
-process of its own, with limits on memory, files and time; one that a signal stops in order after the time limit is
-slow, which is no fault. ``pytest tests/fuzz --cases 1000`` solves that many.
+Whatever is in a scene file, the command ends with 0 (solved), 2 (refused) or 3 (could not go on),
+without traceback or warning of a library, writes nothing when it refuses, and only finite numbers
+when it does not. Each case runs in a process of its own, with limits on memory, files and time; one
+that a signal stops in order after the time limit is slow, which is no fault. ``pytest tests/fuzz
+--cases 1000`` solves that many.
 """
 
 from __future__ import annotations
@@ -21,13 +22,17 @@ from tests.fuzz.mesh_mutations import mutate_mesh
 from tests.fuzz.mutations import GENERAL, base_scenes, mutate
 
 _MEMORY, _FILE = 8 * 2**30, 2 * 2**30  # bytes that a case may use
-_LIMIT, _GRACE = 20.0, 10.0  # seconds that a case may take, and between SIGTERM and SIGKILL after them
+_LIMIT, _GRACE = (
+    20.0,
+    10.0,
+)  # seconds that a case may take, and between SIGTERM and SIGKILL after them
 SLOW = 128 + signal.SIGTERM
 _NOISE = ("Traceback", "PETSC ERROR", "RuntimeWarning", "Error:", "Warning :", "terminate called")
 
 
 class FuzzCase(NamedTuple):
-    """The kind of a mutated scene and how ``archord solve`` ended on it; ``faults`` is empty if all is well."""
+    """The kind of a mutated scene and how ``archord solve`` ended on it; ``faults`` is empty if all
+    is well."""
 
     kind: str
     code: int
@@ -63,7 +68,9 @@ def run_mesh_case(number: int, folder: Path) -> FuzzCase:
 def _solved(kind: str, folder: Path) -> FuzzCase:
     """How ``archord solve`` ends in ``folder``."""
     arguments = ["solve", "scene.toml", "-o", "run"]
-    process = start(arguments, folder, folder / "stdout", folder / "stderr", before=_limit_resources)
+    process = start(
+        arguments, folder, folder / "stdout", folder / "stderr", before=_limit_resources
+    )
     process.join(_LIMIT)
     for end in (process.terminate, process.kill):
         if process.exitcode is None:
@@ -87,8 +94,10 @@ def faults(folder: Path, code: int) -> list[str]:
         f"exit code {code}": code not in (0, 2, 3, SLOW),
         "refused, yet a run folder was left": code == 2 and run.exists(),
         "refused without a word": code == 2 and not lines,
-        "refused in something that is no sentence": code == 2 and any(not line.endswith(".") for line in lines),
-        "refused at great length": code == 2 and (len(said) > 20000 or any(len(line) > 2000 for line in lines)),
+        "refused in something that is no sentence": code == 2
+        and any(not line.endswith(".") for line in lines),
+        "refused at great length": code == 2
+        and (len(said) > 20000 or any(len(line) > 2000 for line in lines)),
         "stopped without a reason": code == 3 and "archord: " not in said,
     }
     found = [fault for fault, seen in wrong.items() if seen]

@@ -1,4 +1,5 @@
-"""Meshes as people and programs get them wrong: numbers, rows and elements of an input file, which stays one."""
+"""Meshes as people and programs get them wrong: numbers, rows and elements of an input file, which
+stays one."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ def _rows(lines: list[str], keyword: str) -> list[int]:
     return found
 
 
-def _change(rng: Random, lines: list[str], keyword: str, change: Callable[[list[str]], list[str]]) -> None:
+def _change(
+    rng: Random, lines: list[str], keyword: str, change: Callable[[list[str]], list[str]]
+) -> None:
     """Change the entries of a row below the ``keyword``."""
     k = rng.choice(_rows(lines, keyword) or [0])
     lines[k] = ", ".join(change([entry.strip() for entry in lines[k].split(",")]))
@@ -80,7 +83,9 @@ def _collapsed(rng: Random, lines: list[str]) -> None:
 
 def _scaled(rng: Random, lines: list[str]) -> None:
     """All coordinates along one or both axes, by a power of ten or turned over."""
-    factors = rng.choice(((1e-3, 1e-3), (1e3, 1e3), (-1, 1), (1, -1), (1, 1e-6), (1e6, 1), (0, 1), (1e-200, 1e-200)))
+    factors = rng.choice(
+        ((1e-3, 1e-3), (1e3, 1e3), (-1, 1), (1, -1), (1, 1e-6), (1e6, 1), (0, 1), (1e-200, 1e-200))
+    )
     for k in _rows(lines, "NODE"):
         number, *place = lines[k].split(",")
         try:

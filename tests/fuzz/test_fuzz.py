@@ -12,7 +12,8 @@ from tests.fuzz.mutations import KINDS, base_scenes
 
 
 def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
-    """Nothing but `InputError`, in lines that end like sentences; a file that is accepted is resolved to itself."""
+    """Nothing but `InputError`, in lines that end like sentences; a file that is accepted is
+    resolved to itself."""
     path, refused, kinds = tmp_path / "scene.toml", 0, set()
     for number in range(300):
         kind, content = scene_of(number)
@@ -25,7 +26,10 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
             refused += 1
             lines = str(error).splitlines()
             assert lines, number
-            assert all(line.startswith(str(path)) and line.endswith(".") and len(line) < 1000 for line in lines), number
+            assert all(
+                line.startswith(str(path)) and line.endswith(".") and len(line) < 1000
+                for line in lines
+            ), number
         else:
             again = parse_any(tomllib.loads(resolved(scene)))
             assert tomllib.loads(resolved(again)) == tomllib.loads(resolved(scene)), number
@@ -35,7 +39,8 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
 
 
 def test_the_command_ends_in_order_on_mutated_files(tmp_path, request):
-    """Exit codes 0, 2 and 3 only, no traceback, no number that is none, nothing left of a refused scene."""
+    """Exit codes 0, 2 and 3 only, no traceback, no number that is none, nothing left of a refused
+    scene."""
     codes = set()
     for number in range(request.config.getoption("--cases")):
         case = run_case(number, tmp_path / str(number))
@@ -67,7 +72,12 @@ def test_what_is_mutated_was_a_scene():
     [
         (2, "scene.toml: is wrong.\n", None, []),
         (2, "", None, ["refused without a word"]),
-        (2, "Traceback:\n", None, ["'Traceback' on stderr", "refused in something that is no sentence"]),
+        (
+            2,
+            "Traceback:\n",
+            None,
+            ["'Traceback' on stderr", "refused in something that is no sentence"],
+        ),
         (-11, "", None, ["exit code -11"]),
         (3, "", None, ["stopped without a reason"]),
         (2, "scene.toml: is wrong.\n", "", ["refused, yet a run folder was left"]),

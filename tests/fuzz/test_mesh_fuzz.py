@@ -21,7 +21,20 @@ from tests.geometry.meshes.test_read import INPUT, MORE, draw
 CASES = 300
 _MEMORY = 8 * 2**30
 _LIMIT = 120.0  # seconds for all
-_TOKENS = (b"0", b"-1", b"1", b"3", b"1e308", b"nan", b"inf", b"2147483648", b"99999999999999999999", b"", b"x", b"1.5")
+_TOKENS = (
+    b"0",
+    b"-1",
+    b"1",
+    b"3",
+    b"1e308",
+    b"nan",
+    b"inf",
+    b"2147483648",
+    b"99999999999999999999",
+    b"",
+    b"x",
+    b"1.5",
+)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +51,10 @@ def files(tmp_path_factory) -> dict[str, tuple[bytes, str]]:
     gmsh.write(str(folder / "gmsh.inp"))
     gmsh.finalize()
     mesh = read_mesh(folder / "text.msh", MPI.COMM_SELF)
-    for name, encoding in (("text", io.XDMFFile.Encoding.ASCII), ("binary", io.XDMFFile.Encoding.HDF5)):
+    for name, encoding in (
+        ("text", io.XDMFFile.Encoding.ASCII),
+        ("binary", io.XDMFFile.Encoding.HDF5),
+    ):
         with io.XDMFFile(MPI.COMM_SELF, folder / f"{name}.xdmf", "w", encoding=encoding) as file:
             file.write_mesh(mesh.mesh)
             for tags, called in ((mesh.cells, "cell_tags"), (mesh.facets, "facet_tags")):
@@ -57,7 +73,11 @@ def mutate(rng: Random, raw: bytes) -> bytes:
         elif kind == 1:
             raw = raw[:at] + rng.choice((b"", rng.randbytes(length))) + raw[at + length :]
         elif kind == 2:
-            raw = raw[:at] if rng.random() < 0.2 else raw[:at] + raw[: rng.choice((10, 300))] + raw[at:]
+            raw = (
+                raw[:at]
+                if rng.random() < 0.2
+                else raw[:at] + raw[: rng.choice((10, 300))] + raw[at:]
+            )
         elif kind == 3:
             lines = raw.split(b"\n")
             line = lines.pop(rng.randrange(len(lines)))
@@ -94,7 +114,11 @@ def _read_all(files: dict[str, bytes], folder: str, numbers: range) -> None:
         try:
             mesh_text(path.name, gathered(read_mesh(path, MPI.COMM_SELF)))
         except ValueError as error:
-            said = "refused" if str(error).startswith(str(path)) and len(str(error)) < 1000 else f"oddly {error}"
+            said = (
+                "refused"
+                if str(error).startswith(str(path)) and len(str(error)) < 1000
+                else f"oddly {error}"
+            )
         except Exception as error:
             said = f"fault {error!r}"
         with Path(folder, "log").open("a") as log:
@@ -103,11 +127,15 @@ def _read_all(files: dict[str, bytes], folder: str, numbers: range) -> None:
 
 def test_a_mutated_mesh_is_read_or_refused(files, tmp_path):
     assert distribute  # loaded before the fork
-    process = _FORKS.Process(target=_read_all, args=(files, str(tmp_path), range(CASES)), daemon=True)
+    process = _FORKS.Process(
+        target=_read_all, args=(files, str(tmp_path), range(CASES)), daemon=True
+    )
     process.start()
     process.join(_LIMIT)
     process.kill()
-    ends = [line.partition(" ")[::2] for line in (tmp_path / "log").read_text().splitlines() if line]
+    ends = [
+        line.partition(" ")[::2] for line in (tmp_path / "log").read_text().splitlines() if line
+    ]
     assert not [(number, said) for number, said in ends if said not in ("read", "refused")]
     assert len(ends) == CASES
     assert 15 < sum(said == "read" for _, said in ends) < CASES - 100

@@ -1,4 +1,5 @@
-"""Meshes whose sets, nodes and cells are not what was meant: warned of, or refused where a load would be lost."""
+"""Meshes whose sets, nodes and cells are not what was meant: warned of, or refused where a load
+would be lost."""
 
 import tomllib
 
@@ -69,14 +70,26 @@ def test_what_was_hardly_meant_is_warned_of(tmp_path, old, new, said):
     "changes",
     [
         {"load": [PRESS, {"name": "wind", "on": "left of lower", "pressure": 1.0}]},
-        {"coupling": [{"name": "arm", "facets": "left of lower", "point": [0.0, 0.5], "kind": "distributing"}]},
+        {
+            "coupling": [
+                {
+                    "name": "arm",
+                    "facets": "left of lower",
+                    "point": [0.0, 0.5],
+                    "kind": "distributing",
+                }
+            ]
+        },
     ],
 )
 def test_a_load_on_facets_inside_a_body_is_refused(tmp_path, refused, changes):
     """The part of the load on them was lost, without a word."""
     path = written(tmp_path, "1, S4\n3, S4", "1, S2\n3, S4", **changes)
     said = refused(["solve", str(path), "-q", "-o", str(tmp_path / "run")])
-    assert "the facet set 'left of lower' has 1 of its 2 facets inside a body, as at (0.5, 0.25)" in said
+    assert (
+        "the facet set 'left of lower' has 1 of its 2 facets inside a body, as at (0.5, 0.25)"
+        in said
+    )
 
 
 def test_surfaces_that_part_are_told(tmp_path, capsys):
@@ -84,7 +97,12 @@ def test_surfaces_that_part_are_told(tmp_path, capsys):
     pull = PRESS | {"displacement": [-0.01, 0.02]}
     path = written(tmp_path, "two blocks", "blocks", load=[pull], path={"steps": 1})
     assert run(["solve", str(path), "-q", "-o", str(tmp_path / "run")]) == 0
-    assert "no surfaces touch from step 2 on, though the loads displace farther" in capsys.readouterr().err
-    path = written(tmp_path, "two blocks", "blocks", load=[PRESS | {"displacement": [-0.01, 0.005]}])
+    assert (
+        "no surfaces touch from step 2 on, though the loads displace farther"
+        in capsys.readouterr().err
+    )
+    path = written(
+        tmp_path, "two blocks", "blocks", load=[PRESS | {"displacement": [-0.01, 0.005]}]
+    )
     assert run(["solve", str(path), "-q", "-o", str(tmp_path / "back")]) == 0
     assert "no surfaces touch" not in capsys.readouterr().err

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, lagrange_element, strain, strain_matrix
+from archord.geometry.basis import (
+    TRIANGLE,
+    bulk_quadrature,
+    cell_basis,
+    lagrange_element,
+    strain,
+    strain_matrix,
+)
 from archord.geometry.shapes.pin_in_block import quarter_joint
 
 
@@ -17,32 +24,45 @@ def mesh_and_basis(X):
 
 
 def cell_by_cell(u):
-    """Nodes ``(n, a)`` and displacements ``(n a, 2)`` of cells that share none, from those of each ``(n, a, 2)``."""
+    """Nodes ``(n, a)`` and displacements ``(n a, 2)`` of cells that share none, from those of each
+    ``(n, a, 2)``."""
     n, a, _ = u.shape
     return np.arange(n * a, dtype=np.int32).reshape(n, a), np.ascontiguousarray(u).reshape(-1, 2)
 
 
 def test_gradients_of_linear_fields_are_exact_on_curved_cells():
-    """The isoparametric basis reproduces a displacement linear in x and y; rigid motions do not strain."""
+    """The isoparametric basis reproduces a displacement linear in x and y; rigid motions do not
+    strain."""
     nodes, basis = mesh_and_basis(bulk_quadrature(TRIANGLE, 2)[0])
-    for A, tolerance in (np.array([[0.1, -0.4], [0.3, 0.2]]), 1e-13), (np.array([[0.0, -1.0], [1.0, 0.0]]), 1e-12):
+    for A, tolerance in (
+        (np.array([[0.1, -0.4], [0.3, 0.2]]), 1e-13),
+        (np.array([[0.0, -1.0], [1.0, 0.0]]), 1e-12),
+    ):
         u = nodes @ A.T + [1.0, 2.0]
         gradient = np.einsum("nqaj,nai->nqij", basis.gradient, u)
         np.testing.assert_allclose(gradient, np.broadcast_to(A, gradient.shape), atol=tolerance)
         found = strain(basis.gradient, *cell_by_cell(u))
         expected = np.broadcast_to([A[0, 0], A[1, 1], A[0, 1] + A[1, 0]], found.shape)
         np.testing.assert_allclose(found, expected, atol=1e-12)
-    np.testing.assert_allclose(np.einsum("qa,nai->nqi", basis.shape, nodes), basis.point, atol=1e-14)
+    np.testing.assert_allclose(
+        np.einsum("qa,nai->nqi", basis.shape, nodes), basis.point, atol=1e-14
+    )
 
 
 def test_gradients_are_the_derivatives_of_the_shape_functions():
-    """Central differences along both axes, through the curved map, on cells of either orientation."""
+    """Central differences along both axes, through the curved map, on cells of either
+    orientation."""
     X, h = np.array([[0.2, 0.3], [0.6, 0.1]]), 1e-5
     _, basis = mesh_and_basis(X)
     chain = np.einsum("nqai,nqij->nqaj", basis.gradient, basis.jacobian)
     for j in range(2):
-        up, down = (lagrange_element(TRIANGLE, 2).tabulate(0, X + s * h * np.eye(2)[j])[0, :, :, 0] for s in (1, -1))
-        np.testing.assert_allclose(chain[..., j], np.broadcast_to((up - down) / (2 * h), chain.shape[:3]), atol=1e-9)
+        up, down = (
+            lagrange_element(TRIANGLE, 2).tabulate(0, X + s * h * np.eye(2)[j])[0, :, :, 0]
+            for s in (1, -1)
+        )
+        np.testing.assert_allclose(
+            chain[..., j], np.broadcast_to((up - down) / (2 * h), chain.shape[:3]), atol=1e-9
+        )
 
 
 def test_strain_matrix_times_displacement_is_the_strain():

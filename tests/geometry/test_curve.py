@@ -33,13 +33,20 @@ def backwards(f):
 
 
 pin = backwards(hole)
-CURVES = {"ellipse": ellipse, "ellipse from outside": backwards(ellipse), "hole": hole, "pin": pin, "wave": wave}
+CURVES = {
+    "ellipse": ellipse,
+    "ellipse from outside": backwards(ellipse),
+    "hole": hole,
+    "pin": pin,
+    "wave": wave,
+}
 CURVES["wave from below"] = backwards(wave)
 every_curve = pytest.mark.parametrize("f", CURVES.values(), ids=CURVES.keys())
 
 
 def interpolate(f, n: int, grading: float = 1.0) -> Curve:
-    """Quadratic interpolation of ``f`` on ``n`` facets, shorter towards the start for ``grading`` > 1."""
+    """Quadratic interpolation of ``f`` on ``n`` facets, shorter towards the start for ``grading`` >
+    1."""
     s = np.linspace(0, 1, n + 1) ** grading
     return Curve(f(np.sort(np.concatenate([s, (s[1:] + s[:-1]) / 2]))), 2)
 
@@ -58,7 +65,8 @@ def on_curve(c: Curve, facet, xi, displacement=0.0):
 
 
 def scatter(c: Curve, distance: float, displacement=0.0, n: int = 500, seed: int = 3):
-    """Random points up to ``distance`` off the curve, on both sides of it, and outward normals of a body facing it."""
+    """Random points up to ``distance`` off the curve, on both sides of it, and outward normals of a
+    body facing it."""
     rng = np.random.default_rng(seed)
     facet, xi = rng.integers(0, c.n_facets, n), rng.uniform(size=n)
     y, normal = on_curve(c, facet, xi, displacement)
@@ -74,7 +82,8 @@ def brute_force(c: Curve, x, displacement=0.0, per_facet: int = 200):
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_shape_functions_are_lagrange_polynomials(degree):
-    """One at their own node, zero at the others; they reproduce every power up to their degree and its derivative."""
+    """One at their own node, zero at the others; they reproduce every power up to their degree and
+    its derivative."""
     nodes, xi = np.linspace(0, 1, degree + 1), np.linspace(-0.05, 1.05, 7)
     values = np.vander(nodes, increasing=True) @ lagrange(degree).T
     np.testing.assert_allclose(values, np.eye(degree + 1), atol=1e-14)
@@ -87,8 +96,8 @@ def test_shape_functions_are_lagrange_polynomials(degree):
 
 
 def test_arc_length():
-    """Fourth order, the geometry's own: quarter circles of 4, 8 and 16 facets against pi / 2; and the end of a facet is
-    the start of the next, also on a graded wave."""
+    """Fourth order, the geometry's own: quarter circles of 4, 8 and 16 facets against pi / 2; and
+    the end of a facet is the start of the next, also on a graded wave."""
     errors = []
     for n in (4, 8, 16):
         length = interpolate(pin, n).arc_length(np.array([0.0, 1.0]))
@@ -105,8 +114,8 @@ def test_arc_length():
 @pytest.mark.parametrize(("n", "grading"), [(8, 1.0), (30, 1.0), (20, 1.5)])
 @pytest.mark.parametrize("distance", [1e-3, 0.3])
 def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
-    """No point of the curve is nearer; only a sample next to the closest point comes as near. Where it slides,
-    (x - y) . tangent = 0 and the distance is the gap; the normal is a unit vector."""
+    """No point of the curve is nearer; only a sample next to the closest point comes as near. Where
+    it slides, (x - y) . tangent = 0 and the distance is the gap; the normal is a unit vector."""
     c = interpolate(f, n, grading)
     x, outward = scatter(c, distance)
     p = closest(c, x, outward)
@@ -114,7 +123,9 @@ def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
     found, sampled = np.linalg.norm(x - p.point, axis=1), brute_force(c, x)
     assert np.all(found <= sampled + 1e-14)
     spacing = 1.1 * np.linalg.norm(p.tangent, axis=1).max() / 200
-    assert np.all((sampled**2 - found**2)[p.slides] < 1.3 * (spacing / 2) ** 2)  # 1 + distance * curvature of the hump
+    assert np.all(
+        (sampled**2 - found**2)[p.slides] < 1.3 * (spacing / 2) ** 2
+    )  # 1 + distance * curvature of the hump
     d, t, normal = (part[p.slides] for part in (x - p.point, p.tangent, p.normal))
     assert p.slides.mean() > 0.95
     assert np.abs((d * t).sum(1) / np.linalg.norm(t, axis=1)).max() < 1e-13
@@ -130,7 +141,10 @@ def test_closest_points_of_a_displaced_curve(f):
     c = interpolate(f, 12)
     u = 0.03 * np.sin(2 * c.X[:, ::-1] + 1)
     x, outward = scatter(c, 0.2, u)
-    p, q = c.closest_point(x, outward, u), Curve(c.X + u, 2).closest_point(x, outward, np.zeros_like(u))
+    p, q = (
+        c.closest_point(x, outward, u),
+        Curve(c.X + u, 2).closest_point(x, outward, np.zeros_like(u)),
+    )
     np.testing.assert_array_equal(p.point, q.point)
     assert np.all(np.linalg.norm(x - p.point, axis=1) <= brute_force(c, x, u) + 1e-14)
 
@@ -138,7 +152,8 @@ def test_closest_points_of_a_displaced_curve(f):
 @every_curve
 @pytest.mark.parametrize("shift", [-3, -2, -1, 0, 1, 2, 3, "anywhere"])
 def test_the_start_does_not_matter(f, shift):
-    """From a facet near the partner, or from any facet, the result is that of the search over the whole curve."""
+    """From a facet near the partner, or from any facet, the result is that of the search over the
+    whole curve."""
     c = interpolate(f, 24)
     x, outward = scatter(c, 0.2)
     p = closest(c, x, outward)
@@ -152,12 +167,14 @@ def test_the_start_does_not_matter(f, shift):
 
 
 def roof():
-    """Two straight facets that meet at a right angle at the origin; the body lies below, its corner points up."""
+    """Two straight facets that meet at a right angle at the origin; the body lies below, its corner
+    points up."""
     return Curve(np.array([[1.0, -1], [0.5, -0.5], [0, 0], [-0.5, -0.5], [-1, -1]]), 2)
 
 
 def test_a_corner_is_the_closest_point_of_its_cone():
-    """Points in the cone of normals find the vertex, which stands still; points beside it slide on a facet."""
+    """Points in the cone of normals find the vertex, which stands still; points beside it slide on
+    a facet."""
     c = roof()
     angle = np.radians([50.0, 80, 100, 130, 30, 150])
     x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -173,8 +190,8 @@ def test_a_corner_is_the_closest_point_of_its_cone():
 
 @every_curve
 def test_points_beyond_a_free_end_or_facing_away_have_no_partner(f):
-    """Points farther out than a twentieth of a facet have no partner; nearer ones use the end's continuation. Points
-    that face away see only the far side of a body."""
+    """Points farther out than a twentieth of a facet have no partner; nearer ones use the end's
+    continuation. Points that face away see only the far side of a body."""
     c = interpolate(f, 10)
     x, outward = scatter(c, 0.1)
     assert not closest(c, x, -outward).found.any()
@@ -189,8 +206,8 @@ def test_points_beyond_a_free_end_or_facing_away_have_no_partner(f):
 
 
 def linearisation(p, x, dx, du):
-    """Directional derivatives of gap, normal and closest point that the fields of a projection stand for; ``du``
-    ``(nodes, 2)``, or ``(2,)`` of a rigid circle."""
+    """Directional derivatives of gap, normal and closest point that the fields of a projection
+    stand for; ``du`` ``(nodes, 2)``, or ``(2,)`` of a rigid circle."""
     speed = np.linalg.norm(p.tangent, axis=1)
     d, du = x - p.point, np.atleast_2d(du)
     gap = (d * p.normal).sum(1)
@@ -208,18 +225,28 @@ def assert_derivative(project, x, u, h=1e-6):
     rng = np.random.default_rng(4)
     dx, du = rng.normal(size=x.shape), 0.1 * rng.normal(size=u.shape)
     p, plus, minus = project(x, u), project(x + h * dx, u + h * du), project(x - h * dx, u - h * du)
-    same = (plus.facet == p.facet) & (minus.facet == p.facet) & (plus.slides == p.slides) & (minus.slides == p.slides)
+    same = (
+        (plus.facet == p.facet)
+        & (minus.facet == p.facet)
+        & (plus.slides == p.slides)
+        & (minus.slides == p.slides)
+    )
     assert same.mean() > 0.98
     dgap, dn, dy = linearisation(p, x, dx, du)
     gap = [((x + s * h * dx - q.point) * q.normal).sum(1) for s, q in ((1, plus), (-1, minus))]
-    changes = (dgap, *gap, 1e-7), (dn, plus.normal, minus.normal, 1e-6), (dy, plus.point, minus.point, 1e-6)
+    changes = (
+        (dgap, *gap, 1e-7),
+        (dn, plus.normal, minus.normal, 1e-6),
+        (dy, plus.point, minus.point, 1e-6),
+    )
     for found, up, down, tolerance in changes:
         np.testing.assert_allclose(found[same], ((up - down) / (2 * h))[same], atol=tolerance)
 
 
 @every_curve
 def test_linearisation_of_the_closest_point(f):
-    """Gap, normal and closest point move as tangent, bend and slope say, for moving points on a moving curve."""
+    """Gap, normal and closest point move as tangent, bend and slope say, for moving points on a
+    moving curve."""
     c = interpolate(f, 12)
     u = 0.02 * np.sin(2 * c.X[:, ::-1] + 1)
     x, outward = scatter(c, 0.2, u)
@@ -243,7 +270,11 @@ def test_rigid_circle():
     circle = RigidCircle(np.array([0.3, -0.2]), 2.0)
     motion = np.array([0.01, -0.02])
     ray = rng.normal(size=(100, 2))
-    x = circle.centre + motion + ray / np.linalg.norm(ray, axis=1)[:, None] * rng.uniform(1.9, 2.1, (100, 1))
+    x = (
+        circle.centre
+        + motion
+        + ray / np.linalg.norm(ray, axis=1)[:, None] * rng.uniform(1.9, 2.1, (100, 1))
+    )
     p = circle.closest_point(x, -ray, motion)
     assert p.found.all()
     assert not circle.closest_point(x, ray, motion).found.any()
@@ -256,12 +287,17 @@ def test_rigid_circle():
     ("broken", "name", "value", "said"),
     [
         (curve_module, "_NEWTON_STEPS", 1, "found no closest point"),
-        (Curve, "nearest_facet", lambda self, x, u: np.full(len(x), 5), "beyond the facets searched"),
+        (
+            Curve,
+            "nearest_facet",
+            lambda self, x, u: np.full(len(x), 5),
+            "beyond the facets searched",
+        ),
     ],
 )
 def test_a_lost_point_is_an_error(monkeypatch, broken, name, value, said):
-    """A point whose projection does not converge, or is searched in the wrong place, is never taken for one without a
-    partner or left at the rim of the facets searched."""
+    """A point whose projection does not converge, or is searched in the wrong place, is never taken
+    for one without a partner or left at the rim of the facets searched."""
     c = interpolate(ellipse, 24)
     x, outward = scatter(c, 0.3)
     monkeypatch.setattr(broken, name, value)
@@ -285,9 +321,12 @@ def joined(*pieces):
     return Curve(np.concatenate(pieces), 2, np.concatenate(closed))
 
 
-@pytest.mark.parametrize(("n", "start"), [(3, "near"), (5, "near"), (12, "near"), (12, 0), (12, "other")])
+@pytest.mark.parametrize(
+    ("n", "start"), [(3, "near"), (5, "near"), (12, "near"), (12, 0), (12, "other")]
+)
 def test_closest_points_on_several_pieces(n, start):
-    """Points within two holes find the nearest point of theirs, wherever the search starts; of few facets, too."""
+    """Points within two holes find the nearest point of theirs, wherever the search starts; of few
+    facets, too."""
     c, rng = joined(circle(n), circle(n, (2.5, 0.0))), np.random.default_rng(1)
     assert c.n_pieces == 2
     lengths = c.arc_length(np.array([0.0, 1.0]))
@@ -305,14 +344,19 @@ def test_closest_points_on_several_pieces(n, start):
 
 
 def test_a_closed_curve_has_no_end():
-    """A hole run all the way round: points that slide over the node where the chain closes keep exact partners."""
-    whole = interpolate(lambda s: np.stack([np.cos(-2 * np.pi * s), np.sin(-2 * np.pi * s)], axis=-1), 12)
+    """A hole run all the way round: points that slide over the node where the chain closes keep
+    exact partners."""
+    whole = interpolate(
+        lambda s: np.stack([np.cos(-2 * np.pi * s), np.sin(-2 * np.pi * s)], axis=-1), 12
+    )
     whole = Curve(whole.X[:-1], 2, whole.connectivity % 24)
     assert (whole.before[0], whole.after[-1]) == (11, 0)
     angle = np.linspace(-0.9, 0.9, 41) * np.pi / 6
     x = 0.99 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     start = np.where(np.arange(41) % 2, 0, 11)
     found = closest(whole, x, x / 0.99, start)
-    np.testing.assert_allclose(np.linalg.norm(found.point - x, axis=1), brute_force(whole, x), atol=1e-4)
+    np.testing.assert_allclose(
+        np.linalg.norm(found.point - x, axis=1), brute_force(whole, x), atol=1e-4
+    )
     assert found.found.all()
     assert set(found.facet) == {0, 11}

@@ -1,4 +1,5 @@
-"""Nodal values from those at integration points: what is reproduced, and how fast the error falls, also at edges."""
+"""Nodal values from those at integration points: what is reproduced, and how fast the error falls,
+also at edges."""
 
 import numpy as np
 import pytest
@@ -36,7 +37,11 @@ def test_polynomials_of_the_degree_are_reproduced_at_every_node(degree, size, qu
     recovery = PatchRecovery(x, nodes.cells[:, corners], nodes.between, places, degree)
 
     def polynomial(x):
-        powers = [x[..., 0] ** i * x[..., 1] ** j for i in range(degree + 1) for j in range(degree + 1 - i)]
+        powers = [
+            x[..., 0] ** i * x[..., 1] ** j
+            for i in range(degree + 1)
+            for j in range(degree + 1 - i)
+        ]
         return np.stack([sum((k + 1) * p for k, p in enumerate(powers)), powers[-1]], axis=-1)
 
     np.testing.assert_allclose(recovery(polynomial(places)), polynomial(x), rtol=1e-9, atol=1e-9)
@@ -53,8 +58,9 @@ def recovered(system, folder):
 
 @pytest.mark.parametrize("quads", [False, True])
 def test_stress_of_lames_cylinder_converges_faster_than_that_of_its_cells(tmp_path, quads):
-    """Hoop and radial stress at all nodes: the largest error of order 2, which within cells the mean one has, and the
-    mean one of order 2.5. Errors are over the pressure; the last ones are those of the inner wall."""
+    """Hoop and radial stress at all nodes: the largest error of order 2, which within cells the
+    mean one has, and the mean one of order 2.5. Errors are over the pressure; the last ones are
+    those of the inner wall."""
     errors = []
     for size in (0.2, 0.1, 0.05):
         system = ring(size, quads=quads)
@@ -63,12 +69,21 @@ def test_stress_of_lames_cylinder_converges_faster_than_that_of_its_cells(tmp_pa
         pressure = E / (1 + NU) / (A**2 / (B**2 - A**2) * ((1 - 2 * NU) * A + B**2 / A))
         r = np.hypot(*fields.coordinates.T)
         (c, s), (xx, yy, zz, xy) = fields.coordinates.T / r, fields.stress.T
-        hoop, radial = xx * s**2 + yy * c**2 - 2 * xy * c * s, xx * c**2 + yy * s**2 + 2 * xy * c * s
+        hoop, radial = (
+            xx * s**2 + yy * c**2 - 2 * xy * c * s,
+            xx * c**2 + yy * s**2 + 2 * xy * c * s,
+        )
         lame = pressure * A**2 / (B**2 - A**2) * (1 + np.outer([1, -1], B**2 / r**2))
         misfit = np.abs([hoop - lame[0], radial - lame[1]]) / pressure
         inner = fields.edges["inner"]
         np.testing.assert_allclose(r[inner], A, rtol=1e-6)
-        errors.append([misfit.max(), np.sqrt((misfit**2).mean()), *np.sqrt((misfit[:, inner] ** 2).mean(axis=(1, 2)))])
+        errors.append(
+            [
+                misfit.max(),
+                np.sqrt((misfit**2).mean()),
+                *np.sqrt((misfit[:, inner] ** 2).mean(axis=(1, 2))),
+            ]
+        )
         np.testing.assert_allclose(zz, NU * (xx + yy), atol=1e-12)
     errors = np.array(errors)
     assert (np.log2(errors[0] / errors[-1]) / 2 > [1.9, 2.4, 2.2, 1.9]).all(), errors
@@ -84,10 +99,14 @@ def test_principal_stresses_are_eigenvalues_and_their_angle_an_eigenvector():
     np.testing.assert_allclose(values, np.linalg.eigvalsh(tensor)[:, ::-1], atol=1e-12)
     axis = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     along = np.einsum("ni,nij,nj->n", axis, tensor, axis)
-    np.testing.assert_allclose(np.einsum("nij,nj->ni", tensor, axis), along[:, None] * axis, atol=1e-12)
+    np.testing.assert_allclose(
+        np.einsum("nij,nj->ni", tensor, axis), along[:, None] * axis, atol=1e-12
+    )
     assert (along >= (stress[:, 0] + stress[:, 1]) / 2).all()
     p1, p2, p3 = values.T
-    np.testing.assert_allclose(von_mises(stress) ** 2, ((p1 - p2) ** 2 + (p2 - p3) ** 2 + (p3 - p1) ** 2) / 2)
+    np.testing.assert_allclose(
+        von_mises(stress) ** 2, ((p1 - p2) ** 2 + (p2 - p3) ** 2 + (p3 - p1) ** 2) / 2
+    )
 
 
 @pytest.mark.mpi
@@ -102,13 +121,17 @@ def test_all_ranks_together_write_what_one_writes(comm, tmp_path_factory):
     if comm.rank == 0:
         (mesh, fields, order), (alone, fields_alone, _) = found
         for name, values in (mesh | fields).items():
-            np.testing.assert_allclose(values, (alone | fields_alone)[name], atol=1e-9, err_msg=name)
+            np.testing.assert_allclose(
+                values, (alone | fields_alone)[name], atol=1e-9, err_msg=name
+            )
         assert {"edges/inner", "points/coordinates", "mesh/body"} <= set(mesh)
         folders = [tmp_path_factory.mktemp("run") for _ in found]
         read = []
         for folder, (m, f, o) in zip(folders, found, strict=True):
             writer = FieldWriter(folder, o, m, 1, points=True)
             writer.write(1.0, f)
-            read.append(read_fields(folder, type("S", (), {"output": type("O", (), {"fields": True})}), 1))
+            read.append(
+                read_fields(folder, type("S", (), {"output": type("O", (), {"fields": True})}), 1)
+            )
         np.testing.assert_allclose(read[0].stress, read[1].stress, atol=1e-9)
         np.testing.assert_array_equal(read[0].edges["inner"], read[1].edges["inner"])

@@ -16,7 +16,9 @@ def test_a_ghosted_vector_knows_the_values_of_the_other_ranks(comm):
     vector.array[:] = np.repeat(vertices.local_to_global(np.arange(n, dtype=np.int32)), 3)
     vector.ghostUpdate()
     with vector.localForm() as local:
-        assert np.array_equal(local.array[::3], vertices.local_to_global(np.arange(n + ghosts, dtype=np.int32)))
+        assert np.array_equal(
+            local.array[::3], vertices.local_to_global(np.arange(n + ghosts, dtype=np.int32))
+        )
     vector.destroy()
 
 

@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.kernels.compiled import CompilerError, _loaded, cache_folder, is_private, library, pointer, structure
+from archord.kernels.compiled import (
+    CompilerError,
+    _loaded,
+    cache_folder,
+    is_private,
+    library,
+    pointer,
+    structure,
+)
 
 
 @pytest.fixture
@@ -52,13 +60,16 @@ def test_a_cache_that_cannot_be_written_is_no_hindrance(source, monkeypatch):
     assert cache_folder() == cache_folder()
     assert list(cache_folder().glob("doubling-*.so"))
     code = "from archord.kernels.compiled import cache_folder; print(cache_folder())"
-    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    other = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.strip()
     assert Path(other).name.startswith("archord-")
     assert not Path(other).exists()
 
 
 def test_what_others_may_have_written_is_not_loaded(source, monkeypatch):
-    """A library of another user, or one that others may write, is compiled again; a folder of another is not used."""
+    """A library of another user, or one that others may write, is compiled again; a folder of
+    another is not used."""
     source.write_text("double twice(double x) { return 2 * x; }\n")
     library(source)
     (kept,) = (source.parent / "cache" / "archord").iterdir()
@@ -87,16 +98,24 @@ def test_the_own_cache_is_closed_to_others(source):
 
 def test_a_structure_has_numbers_and_pointers(source):
     """In the order of its declaration."""
-    declared = "typedef struct { int32_t n; const double *x; double by; } Sum; double last(const Sum *s);"
+    declared = (
+        "typedef struct { int32_t n; const double *x; double by; } Sum; double last(const Sum *s);"
+    )
     source.with_suffix(".h").write_text(f"#include <stdint.h>\n{declared}\n")
-    source.write_text('#include "doubling.h"\ndouble last(const Sum *s) { return s->by * s->x[s->n - 1]; }\n')
+    source.write_text(
+        '#include "doubling.h"\ndouble last(const Sum *s) { return s->by * s->x[s->n - 1]; }\n'
+    )
     x = np.array([1.0, 2.0, 4.0])
     assert library(source).last(structure(source, "Sum", [3, x, 0.5])) == 2.0
 
 
 @pytest.mark.parametrize(
     ("array", "error"),
-    [(np.zeros((4, 4)).T[1:], ValueError), (np.zeros(4)[::2], ValueError), (np.zeros(3, dtype=np.int64), KeyError)],
+    [
+        (np.zeros((4, 4)).T[1:], ValueError),
+        (np.zeros(4)[::2], ValueError),
+        (np.zeros(3, dtype=np.int64), KeyError),
+    ],
     ids=["transposed", "strided", "integers"],
 )
 def test_an_array_that_does_not_fit_is_refused(array, error):

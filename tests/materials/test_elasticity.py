@@ -18,7 +18,13 @@ def rng():
 def hooke(stress, nu=NU):
     """Strains [xx, yy, zz, gamma_xy] from Hooke's law in three dimensions."""
     xx, yy, zz, xy = stress.T
-    return np.stack([xx - nu * (yy + zz), yy - nu * (xx + zz), zz - nu * (xx + yy), 2 * (1 + nu) * xy], axis=1) / E
+    return (
+        np.stack(
+            [xx - nu * (yy + zz), yy - nu * (xx + zz), zz - nu * (xx + yy), 2 * (1 + nu) * xy],
+            axis=1,
+        )
+        / E
+    )
 
 
 def turned(xx, yy, xy):
@@ -31,7 +37,8 @@ def turned(xx, yy, xy):
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_stress_obeys_hookes_law_in_three_dimensions(plane, rng):
-    """The strain of the stress is the strain put in, and the out-of-plane strain or stress is zero."""
+    """The strain of the stress is the strain put in, and the out-of-plane strain or stress is
+    zero."""
     strain = rng.normal(size=(100, 3))
     stress, _, _ = Elastic(E, NU, plane).update(strain, None)
     back = hooke(stress)

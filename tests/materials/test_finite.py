@@ -1,4 +1,5 @@
-"""Large strain: closed forms of Hencky's elasticity and of plastic flow, rotations, the derivative of the stress."""
+"""Large strain: closed forms of Hencky's elasticity and of plastic flow, rotations, the derivative
+of the stress."""
 
 import numpy as np
 import pytest
@@ -19,7 +20,9 @@ MATERIALS = {
         for plane in ("strain", "stress")
     },
     "a table": J2Material(E, NU, "strain", TABLE),
-    "back stresses": KinematicMaterial(E, NU, "strain", LinearHardening(300.0), ((20000.0, 100.0),)),
+    "back stresses": KinematicMaterial(
+        E, NU, "strain", LinearHardening(300.0), ((20000.0, 100.0),)
+    ),
 }
 
 
@@ -31,7 +34,10 @@ def test_the_tangent_is_the_derivative_of_the_stress(name, size):
     gradient, state = size * rng.normal(size=(60, 4)), m.state(60)
     _, tangent, new = m.update(gradient, state)
     h = 1e-6 * max(size, 1e-3)
-    found = [(m.update(gradient + d, state)[0] - m.update(gradient - d, state)[0]) / (2 * h) for d in h * np.eye(4)]
+    found = [
+        (m.update(gradient + d, state)[0] - m.update(gradient - d, state)[0]) / (2 * h)
+        for d in h * np.eye(4)
+    ]
     off = np.abs(np.stack(found, axis=2) - tangent).max(axis=(1, 2)) / np.nanmax(np.abs(tangent))
     known, flows = ~np.isnan(off), np.broadcast_to(m.peeq(new), 60) > 0
     assert known.sum() > 40
@@ -47,9 +53,13 @@ def test_small_strains_are_a_limit(name):
     gradient = 1e-7 * np.random.default_rng(2).normal(size=(20, 4))
     state = m.state(20)
     stress, _, new = m.update(gradient, state)
-    expected = small.update(np.column_stack([gradient[:, :2], gradient[:, 2] + gradient[:, 3]]), state)[0]
+    expected = small.update(
+        np.column_stack([gradient[:, :2], gradient[:, 2] + gradient[:, 3]]), state
+    )[0]
     assert stress == pytest.approx(expected[:, [0, 1, 3, 3]], abs=1e-5 * np.abs(expected).max())
-    assert m.true_stress(gradient, stress, new) == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+    assert m.true_stress(gradient, stress, new) == pytest.approx(
+        expected, abs=1e-5 * np.abs(expected).max()
+    )
 
 
 def turned(angle, F):
@@ -60,7 +70,11 @@ def turned(angle, F):
 @pytest.mark.parametrize("name", MATERIALS)
 def test_a_rotation_turns_the_stress_with_it(name):
     """And makes none."""
-    m, F, R = LargeStrain(MATERIALS[name]), np.array([[1.1, 0.2], [0.0, 0.95]]), turned(0.7, np.eye(2))
+    m, F, R = (
+        LargeStrain(MATERIALS[name]),
+        np.array([[1.1, 0.2], [0.0, 0.95]]),
+        turned(0.7, np.eye(2)),
+    )
     assert np.abs(m.update(R, m.state(1))[0]).max() < 1e-12 * E
     Q = np.array([[R[0, 0] + 1, R[0, 2]], [R[0, 3], R[0, 1] + 1]])
     stresses = []
@@ -85,7 +99,8 @@ def test_simple_shear_of_hencky(g):
 
 @pytest.mark.parametrize("steps", [1, 10])
 def test_uniaxial_tension_with_a_table(steps):
-    """Nominal stresses at stretches of 1.05, 1.1 and 1.2 where Cauchy's stress is that of the table."""
+    """Nominal stresses at stretches of 1.05, 1.1 and 1.2 where Cauchy's stress is that of the
+    table."""
     m = LargeStrain(J2Material(E, NU, "stress", TABLE))
     state, found = m.state(1), []
     for stretch, last in zip((1.05, 1.1, 1.2), (1.0, 1.05, 1.1), strict=True):

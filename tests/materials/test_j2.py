@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from archord.materials.elasticity import von_mises
-from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
+from archord.materials.hardening import (
+    LinearHardening,
+    SwiftHardening,
+    TabularHardening,
+    VoceHardening,
+)
 from archord.materials.j2 import J2Material
 from archord.materials.return_map import PlasticState, return_map
 from tests.materials.test_elasticity import NU, E, hooke, turned
@@ -25,7 +30,12 @@ HARDENINGS = {
     "Voce": VoceHardening(SIGY, 2 * SIGY, 0.2 / YIELD_STRAIN),
     "Swift": SwiftHardening(SIGY / YIELD_STRAIN**0.2, YIELD_STRAIN, 0.2),
     "plateau": TabularHardening(
-        ((0, SIGY), (4 * YIELD_STRAIN, SIGY), (5 * YIELD_STRAIN, 2 * SIGY), (90 * YIELD_STRAIN, 2.5 * SIGY))
+        (
+            (0, SIGY),
+            (4 * YIELD_STRAIN, SIGY),
+            (5 * YIELD_STRAIN, 2 * SIGY),
+            (90 * YIELD_STRAIN, 2.5 * SIGY),
+        )
     ),
 }
 MATERIALS = [
@@ -42,8 +52,11 @@ def rng():
     return np.random.default_rng(2)
 
 
-def random_path(m: J2Material, rng, n: int = N, steps: int = 4, size: float = 1.0) -> tuple[np.ndarray, PlasticState]:
-    """Strains and histories after ``steps`` random increments of ``size`` yield strains: some points never yielded."""
+def random_path(
+    m: J2Material, rng, n: int = N, steps: int = 4, size: float = 1.0
+) -> tuple[np.ndarray, PlasticState]:
+    """Strains and histories after ``steps`` random increments of ``size`` yield strains: some
+    points never yielded."""
     strain, state = np.zeros((n, 3)), m.state(n)
     for _ in range(steps):
         strain = strain + size * YIELD_STRAIN * rng.normal(size=(n, 3))
@@ -58,7 +71,8 @@ def random_increment(m: J2Material, rng, size: float = 1.0) -> tuple[np.ndarray,
 
 
 def on_the_surface(m: J2Material, rng, n: int = N) -> tuple[np.ndarray, PlasticState, np.ndarray]:
-    """States on the yield surface, and strain increments (unit length) that load them plastically."""
+    """States on the yield surface, and strain increments (unit length) that load them
+    plastically."""
     strain, state = np.zeros((n, 3)), m.state(n)
     for _ in range(3):
         strain = strain + 20 * YIELD_STRAIN * rng.normal(size=(n, 3))
@@ -77,7 +91,9 @@ def on_the_surface(m: J2Material, rng, n: int = N) -> tuple[np.ndarray, PlasticS
 
 def yield_gradient(m, stress):
     """Derivative of the trial von Mises stress with respect to strain, up to a factor, at yield."""
-    deviator = stress[:, [0, 1, 3]] - stress[:, :3].mean(axis=1)[:, None] * np.array([1.0, 1.0, 0.0])
+    deviator = stress[:, [0, 1, 3]] - stress[:, :3].mean(axis=1)[:, None] * np.array(
+        [1.0, 1.0, 0.0]
+    )
     if m.plane == "strain":
         return deviator
     return (deviator * np.array([1.0, 1.0, 2.0])) @ m.elastic_tangent
@@ -88,13 +104,15 @@ def strength(m, state):
 
 
 def assert_tangent_is_derivative(m, strain, old, h, *, flowing):
-    """The consistent tangent is symmetric and the derivative of the stress, to 1e-6, by differences of step ``h``
-    where these keep to one branch."""
+    """The consistent tangent is symmetric and the derivative of the stress, to 1e-6, by differences
+    of step ``h`` where these keep to one branch."""
     _, tangent, new = m.update(strain, old)
     D, flows = np.zeros((len(strain), 3, 3)), new.peeq > old.peeq
     one_branch = np.ones(len(strain), dtype=bool)
     for j in range(3):
-        (plus, _, ahead), (minus, _, behind) = (m.update(strain + sign * h * np.eye(3)[j], old) for sign in (1, -1))
+        (plus, _, ahead), (minus, _, behind) = (
+            m.update(strain + sign * h * np.eye(3)[j], old) for sign in (1, -1)
+        )
         D[:, :, j] = (plus - minus)[:, [0, 1, 3]] / (2 * h)
         one_branch &= (flows == (ahead.peeq > old.peeq)) & (flows == (behind.peeq > old.peeq))
     assert one_branch.mean() > 0.99
@@ -109,7 +127,9 @@ def assert_tangent_is_derivative(m, strain, old, h, *, flowing):
 def test_tangent_is_the_derivative_of_the_stress(m, size, flowing, rng):
     """Any history, any increment, also far beyond what a solver takes."""
     strain, old = random_increment(m, rng, size)
-    assert_tangent_is_derivative(m, strain, old, (1e-3 if size > 10 else 1e-5) * YIELD_STRAIN, flowing=flowing)
+    assert_tangent_is_derivative(
+        m, strain, old, (1e-3 if size > 10 else 1e-5) * YIELD_STRAIN, flowing=flowing
+    )
 
 
 @every_material
@@ -136,7 +156,9 @@ def test_pressure_alone_never_yields(m):
         strain, old = np.zeros((1, 3)), m.state(1)
     else:
         e = YIELD_STRAIN * np.array([-1e3, -1.0, 0.0, 1.0, 1e3])
-        strain = np.stack([1.5 * e, 1.5 * e, 0 * e], axis=1)  # elastic strain e in all three directions
+        strain = np.stack(
+            [1.5 * e, 1.5 * e, 0 * e], axis=1
+        )  # elastic strain e in all three directions
         old = PlasticState(np.stack([e / 2, e / 2, -e, 0 * e], axis=1), np.abs(e))
     stress, tangent, new = m.update(strain, old)
     np.testing.assert_allclose(von_mises(stress), 0, atol=1e-12 * np.abs(stress).max(initial=1))
@@ -162,7 +184,8 @@ def test_stress_returns_to_the_yield_surface(m, size, rng):
 
 @every_material
 def test_flow_is_incompressible_and_peeq_is_its_length(m, rng):
-    """trace(eps_p) = 0; PEEQ never decreases and grows by sqrt(2/3) of the length of the plastic increment."""
+    """trace(eps_p) = 0; PEEQ never decreases and grows by sqrt(2/3) of the length of the plastic
+    increment."""
     strain, old = random_increment(m, rng)
     _, _, new = m.update(strain, old)
     scale = np.abs(new.plastic_strain).max()
@@ -175,11 +198,14 @@ def test_flow_is_incompressible_and_peeq_is_its_length(m, rng):
 
 @every_material
 def test_stress_is_the_elastic_stress_of_the_elastic_strain(m, rng):
-    """Stress and plastic strain belong together by Hooke's law, with s_zz = 0 or eps_zz = 0 out of the plane."""
+    """Stress and plastic strain belong together by Hooke's law, with s_zz = 0 or eps_zz = 0 out of
+    the plane."""
     strain, old = random_path(m, rng)
     stress, _, new = m.update(strain, old)
     total = hooke(stress) + new.plastic_strain * [1, 1, 1, 2]
-    np.testing.assert_allclose(total[:, [0, 1, 3]], strain, rtol=0, atol=1e-13 * np.abs(strain).max())
+    np.testing.assert_allclose(
+        total[:, [0, 1, 3]], strain, rtol=0, atol=1e-13 * np.abs(strain).max()
+    )
     if m.plane == "strain":
         assert np.abs(total[:, 2]).max() < 1e-13 * np.abs(strain).max()
     else:
@@ -188,7 +214,8 @@ def test_stress_is_the_elastic_stress_of_the_elastic_strain(m, rng):
 
 @every_material
 def test_unloading_is_elastic(m, rng):
-    """A small step back from the yield surface moves the stress by the elastic moduli and leaves the history alone."""
+    """A small step back from the yield surface moves the stress by the elastic moduli and leaves
+    the history alone."""
     strain, old, outward = on_the_surface(m, rng)
     before, _, _ = m.update(strain - 1e-9 * YIELD_STRAIN * outward, old)
     step = -0.05 * YIELD_STRAIN * outward
@@ -206,7 +233,9 @@ def test_below_yield_the_material_is_elastic(m, rng):
     """The same stress as the elastic solid, to the last bits."""
     strain = 0.2 * YIELD_STRAIN * rng.uniform(-1, 1, size=(N, 3))
     stress, _, new = m.update(strain, m.state(N))
-    np.testing.assert_allclose(stress, m.elastic().update(strain, m.state(N))[0], rtol=0, atol=1e-13 * SIGY)
+    np.testing.assert_allclose(
+        stress, m.elastic().update(strain, m.state(N))[0], rtol=0, atol=1e-13 * SIGY
+    )
     assert not new.peeq.any()
 
 
@@ -215,7 +244,10 @@ def test_return_map_is_a_pure_function(m, rng):
     """Neither strain nor old state change, and the same input gives the same output."""
     strain, old = random_increment(m, rng)
     kept = strain.copy(), old.plastic_strain.copy(), old.peeq.copy()
-    results = [(stress, C, new.plastic_strain) for stress, C, new in (m.update(strain, old) for _ in range(2))]
+    results = [
+        (stress, C, new.plastic_strain)
+        for stress, C, new in (m.update(strain, old) for _ in range(2))
+    ]
     for now, then in ((kept, (strain, old.plastic_strain, old.peeq)), results):
         for a, b in zip(now, then, strict=True):
             np.testing.assert_array_equal(a, b)
@@ -233,7 +265,9 @@ def test_the_kernel_of_linear_hardening_is_the_return_map_of_any(name, size, rng
     np.testing.assert_allclose(found[0], stress, rtol=0, atol=1e-13 * np.abs(stress).max())
     np.testing.assert_allclose(found[1], tangent, rtol=0, atol=1e-12 * np.abs(tangent).max())
     np.testing.assert_allclose(found[2].peeq, new.peeq, rtol=0, atol=1e-13 * new.peeq.max())
-    np.testing.assert_allclose(found[2].plastic_strain, new.plastic_strain, rtol=0, atol=1e-13 * new.peeq.max())
+    np.testing.assert_allclose(
+        found[2].plastic_strain, new.plastic_strain, rtol=0, atol=1e-13 * new.peeq.max()
+    )
 
 
 @every_material
@@ -253,7 +287,10 @@ def test_points_do_not_know_of_each_other(m, rng):
     strain, old = random_path(m, rng, n=200, size=5.0)
     together = m.update(strain, old)[0]
     alone = np.concatenate(
-        [m.update(strain[[i]], PlasticState(old.plastic_strain[[i]], old.peeq[[i]]))[0] for i in range(len(strain))]
+        [
+            m.update(strain[[i]], PlasticState(old.plastic_strain[[i]], old.peeq[[i]]))[0]
+            for i in range(len(strain))
+        ]
     )
     np.testing.assert_allclose(together, alone, rtol=0, atol=1e-13 * np.abs(together).max())
 
@@ -274,8 +311,12 @@ def test_units_do_not_matter(m, rng):
     stress, tangent, new = m.update(strain, old)
     stress_pa, tangent_pa, new_pa = in_pascal.update(strain, old)
     np.testing.assert_allclose(new_pa.peeq, new.peeq, rtol=0, atol=1e-14 * new.peeq.max())
-    np.testing.assert_allclose(stress_pa, 1e6 * stress, rtol=0, atol=1e-13 * np.abs(stress_pa).max())
-    np.testing.assert_allclose(tangent_pa, 1e6 * tangent, rtol=0, atol=1e-9 * np.abs(tangent_pa).max())
+    np.testing.assert_allclose(
+        stress_pa, 1e6 * stress, rtol=0, atol=1e-13 * np.abs(stress_pa).max()
+    )
+    np.testing.assert_allclose(
+        tangent_pa, 1e6 * tangent, rtol=0, atol=1e-9 * np.abs(tangent_pa).max()
+    )
 
 
 @every_material
@@ -286,7 +327,9 @@ def test_axes_do_not_matter(m, rng):
     stress, _, _ = m.update(strain, m.state(N))
     found, _, _ = m.update(np.stack([xx, yy, 2 * xy], axis=1), m.state(N))
     expected = np.stack(turned(*stress[:, [0, 1, 3]].T), axis=1)
-    np.testing.assert_allclose(found[:, [0, 1, 3]], expected, rtol=0, atol=1e-12 * np.abs(stress).max())
+    np.testing.assert_allclose(
+        found[:, [0, 1, 3]], expected, rtol=0, atol=1e-12 * np.abs(stress).max()
+    )
 
 
 def follow(m, strains):
@@ -303,27 +346,37 @@ def follow(m, strains):
 # Proportional paths: the stress per yield stress, and the strain of the yield stress s and PEEQ p.
 PATHS = {
     "uniaxial": ([1, 0, 0, 0], lambda s, p: (s / E + p, -NU * s / E - p / 2, 0 * p)),
-    "equibiaxial": ([1, 1, 0, 0], lambda s, p: ((1 - NU) * s / E + p / 2, (1 - NU) * s / E + p / 2, 0 * p)),
-    "shear": ([0, 0, 0, 3**-0.5], lambda s, p: (0 * p, 0 * p, 2 * (1 + NU) * s / E / 3**0.5 + 3**0.5 * p)),
+    "equibiaxial": (
+        [1, 1, 0, 0],
+        lambda s, p: ((1 - NU) * s / E + p / 2, (1 - NU) * s / E + p / 2, 0 * p),
+    ),
+    "shear": (
+        [0, 0, 0, 3**-0.5],
+        lambda s, p: (0 * p, 0 * p, 2 * (1 + NU) * s / E / 3**0.5 + 3**0.5 * p),
+    ),
 }
 
 
 @every_material
 @pytest.mark.parametrize("sign", [1, -1])
 def test_proportional_paths_are_exact(m, sign):
-    """Tension in one direction or two in plane stress, shear in both planes, and their opposites."""
+    """Tension in one direction or two in plane stress, shear in both planes, and their
+    opposites."""
     peeq = YIELD_STRAIN * np.linspace(0, 20, 12) ** 1.3
     sigma = m.hardening.stress(peeq)
     for path in PATHS if m.plane == "stress" else ["shear"]:
         direction, strains = PATHS[path]
         stress, found = follow(m, sign * np.stack(strains(sigma, peeq), axis=1))
         np.testing.assert_allclose(found, peeq, rtol=0, atol=1e-13 * peeq.max())
-        np.testing.assert_allclose(stress, sign * np.outer(sigma, direction), rtol=1e-12, atol=1e-12 * sigma.max())
+        np.testing.assert_allclose(
+            stress, sign * np.outer(sigma, direction), rtol=1e-12, atol=1e-12 * sigma.max()
+        )
 
 
 @every_material
 def test_energy_balance(m, rng):
-    """Work of the stress = elastic energy + plastic work, up to the second order of the time step."""
+    """Work of the stress = elastic energy + plastic work, up to the second order of the time
+    step."""
     end = 5 * YIELD_STRAIN * rng.normal(size=(50, 3))
 
     def missing(steps):
@@ -344,7 +397,9 @@ def test_energy_balance(m, rng):
 def test_elastic_energy_is_half_stress_times_elastic_strain(m, rng):
     """Of the whole stress, in three dimensions."""
     stress = SIGY * rng.normal(size=(N, 4))
-    np.testing.assert_allclose(m.energy(stress), 0.5 * (stress * hooke(stress)).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(
+        m.energy(stress), 0.5 * (stress * hooke(stress)).sum(axis=1), rtol=1e-12
+    )
 
 
 SMOOTH = pytest.mark.parametrize("name", ["H = 0.02 E", "Voce", "Swift", "plateau"])
@@ -355,7 +410,10 @@ def test_slope_is_the_derivative_and_work_the_integral_of_the_yield_stress(name)
     """By differences, away from the kinks of a table and beyond its end."""
     hardening, h = HARDENINGS[name], 1e-4 * YIELD_STRAIN
     peeq = YIELD_STRAIN * np.array([0.5, 3.0, 4.5, 20.0, 100.0])
-    for function, derivative in ((hardening.stress, hardening.slope), (hardening.work, hardening.stress)):
+    for function, derivative in (
+        (hardening.stress, hardening.slope),
+        (hardening.work, hardening.stress),
+    ):
         found = (function(peeq + h) - function(peeq - h)) / (2 * h)
         assert found == pytest.approx(derivative(peeq), rel=1e-6, abs=1e-6 * SIGY)
     assert hardening.work(np.zeros(1))[0] == pytest.approx(0.0, abs=1e-12 * SIGY)
@@ -369,7 +427,9 @@ def test_a_tension_test_becomes_a_table_of_true_stress():
     assert (end, last) == (pytest.approx(np.log(1.1) - 440 / E), pytest.approx(440.0))
 
 
-@pytest.mark.parametrize("points", [(), ((0.1, 1.0),), ((0, 2.0), (0.1, 1.0)), ((0, 1.0), (0, 2.0)), ((0, 0.0),)])
+@pytest.mark.parametrize(
+    "points", [(), ((0.1, 1.0),), ((0, 2.0), (0.1, 1.0)), ((0, 1.0), (0, 2.0)), ((0, 0.0),)]
+)
 def test_a_table_that_is_no_hardening_law_is_refused(points):
     with pytest.raises(ValueError, match="must"):
         TabularHardening(points)

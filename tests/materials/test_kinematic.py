@@ -1,4 +1,5 @@
-"""Kinematic hardening: closed forms of loops, ratcheting, and the laws that hold at every point of every path."""
+"""Kinematic hardening: closed forms of loops, ratcheting, and the laws that hold at every point of
+every path."""
 
 from __future__ import annotations
 
@@ -31,7 +32,9 @@ def on_random_paths(m, rng, n=200, steps=4, size=2.0):
 
 
 @in_both_planes
-@pytest.mark.parametrize("isotropic", [LinearHardening(SIGY), LinearHardening(SIGY, 0.02 * E), ISOTROPIC])
+@pytest.mark.parametrize(
+    "isotropic", [LinearHardening(SIGY), LinearHardening(SIGY, 0.02 * E), ISOTROPIC]
+)
 def test_without_back_stresses_it_is_isotropic(plane, isotropic, rng):
     m, j2 = KinematicMaterial(E, NU, plane, isotropic, ()), J2Material(E, NU, plane, isotropic)
     state, expected = m.state(300), j2.state(300)
@@ -42,7 +45,9 @@ def test_without_back_stresses_it_is_isotropic(plane, isotropic, rng):
         stress_j2, tangent_j2, expected = j2.update(strain, expected)
         np.testing.assert_allclose(stress, stress_j2, rtol=0, atol=1e-11 * np.abs(stress).max())
         np.testing.assert_allclose(tangent, tangent_j2, rtol=0, atol=1e-9 * E)
-        np.testing.assert_allclose(state.plastic_strain, expected.plastic_strain, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(
+            state.plastic_strain, expected.plastic_strain, rtol=0, atol=1e-11
+        )
         np.testing.assert_allclose(m.dissipation(state), j2.dissipation(expected), rtol=1e-9)
 
 
@@ -59,24 +64,33 @@ def test_tangent_is_the_derivative_of_the_stress(plane, size, nu, rng):
     D, flows = np.zeros_like(tangent), new.peeq > old.peeq
     one_branch = np.ones(len(strain), dtype=bool)
     for j in range(3):
-        (plus, _, ahead), (minus, _, behind) = (m.update(strain + sign * h * np.eye(3)[j], old) for sign in (1, -1))
+        (plus, _, ahead), (minus, _, behind) = (
+            m.update(strain + sign * h * np.eye(3)[j], old) for sign in (1, -1)
+        )
         D[:, :, j] = (plus - minus)[:, [0, 1, 3]] / (2 * h)
         one_branch &= (flows == (ahead.peeq > old.peeq)) & (flows == (behind.peeq > old.peeq))
     assert one_branch.mean() > 0.99
     assert flows.mean() > 0.1
     assert np.abs(tangent - D).max(axis=(1, 2))[one_branch].max() < 2e-6 * E
-    np.testing.assert_array_equal(tangent[~flows], np.broadcast_to(m.elastic_tangent, tangent.shape)[~flows])
+    np.testing.assert_array_equal(
+        tangent[~flows], np.broadcast_to(m.elastic_tangent, tangent.shape)[~flows]
+    )
 
 
-@pytest.mark.parametrize(("plane", "nu"), [("strain", NU), *(("stress", nu) for nu in (-0.5, NU, 0.4999, 0.499999))])
+@pytest.mark.parametrize(
+    ("plane", "nu"), [("strain", NU), *(("stress", nu) for nu in (-0.5, NU, 0.4999, 0.499999))]
+)
 def test_every_point_obeys_the_laws_of_the_model(plane, nu, rng):
-    """Hooke's law with the plane's condition; the relative stress on the yield surface; flow along it."""
+    """Hooke's law with the plane's condition; the relative stress on the yield surface; flow along
+    it."""
     m = KinematicMaterial(E, nu, plane, ISOTROPIC, BACK)
     strain, _, _, old = on_random_paths(m, rng)
     strain = strain + 2 * YIELD_STRAIN * rng.normal(size=strain.shape)
     stress, _, new = m.update(strain, old)
     total = hooke(stress, nu) + new.plastic_strain * [1, 1, 1, 2]
-    np.testing.assert_allclose(total[:, [0, 1, 3]], strain, rtol=0, atol=1e-12 * np.abs(strain).max())
+    np.testing.assert_allclose(
+        total[:, [0, 1, 3]], strain, rtol=0, atol=1e-12 * np.abs(strain).max()
+    )
     out_of_plane = total[:, 2] if plane == "strain" else stress[:, 2] / E
     assert np.abs(out_of_plane).max() < 1e-12 * np.abs(strain).max()
     twice = np.array([1, 1, 1, 2])
@@ -88,7 +102,9 @@ def test_every_point_obeys_the_laws_of_the_model(plane, nu, rng):
     assert np.abs(excess[flows]).max() < 1e-10 * SIGY
     flow = new.plastic_strain - old.plastic_strain
     grown = new.peeq - old.peeq
-    np.testing.assert_allclose(flow, 1.5 * (grown / q)[:, None] * relative, rtol=0, atol=1e-12 * grown.max())
+    np.testing.assert_allclose(
+        flow, 1.5 * (grown / q)[:, None] * relative, rtol=0, atol=1e-12 * grown.max()
+    )
     for k, (C, gamma) in enumerate(BACK):
         step = new.back_stress[:, k] - old.back_stress[:, k]
         expected = 2 / 3 * C * flow - gamma * grown[:, None] * new.back_stress[:, k]
@@ -112,7 +128,9 @@ def test_linear_kinematic_hardening_is_exact_and_shakes_down():
     m = KinematicMaterial(E, NU, "stress", LinearHardening(SIGY), ((C, 0.0),))
     strain, state = uniaxial(m, m.state(1), np.zeros((1, 3)), 1.5 * SIGY)
     assert state.peeq[0] == pytest.approx(0.5 * SIGY / C)
-    assert m.dissipation(state)[0] == pytest.approx(SIGY * state.peeq[0] + 0.5 * C * state.peeq[0] ** 2)
+    assert m.dissipation(state)[0] == pytest.approx(
+        SIGY * state.peeq[0] + 0.5 * C * state.peeq[0] ** 2
+    )
     for stress in 3 * [-0.499 * SIGY, 1.5 * SIGY]:
         strain, state = uniaxial(m, state, strain, stress)
         assert state.peeq[0] == pytest.approx(0.5 * SIGY / C)
@@ -131,7 +149,8 @@ def sheared(m, stress, strain, state):
 
 @in_both_planes
 def test_a_stable_loop_has_the_closed_form_range(plane):
-    """Armstrong and Frederick: between plastic strains -a and a the stress swings by sigY + C / gamma tanh(gamma a)."""
+    """Armstrong and Frederick: between plastic strains -a and a the stress swings by sigY + C /
+    gamma tanh(gamma a)."""
     C, gamma, steps = 0.2 * E, 300.0, 200
     m = KinematicMaterial(E, NU, plane, LinearHardening(SIGY), ((C, gamma),))
     state = m.state(1)
@@ -141,11 +160,14 @@ def test_a_stable_loop_has_the_closed_form_range(plane):
         stress, _, state = m.update(np.array([[0, 0, shear]]), state)
     amplitude = 2 / 3**0.5 * state.plastic_strain[0, 3]
     assert amplitude > 0.003
-    assert 3**0.5 * stress[0, 3] == pytest.approx(SIGY + C / gamma * np.tanh(gamma * amplitude), rel=5e-3)
+    assert 3**0.5 * stress[0, 3] == pytest.approx(
+        SIGY + C / gamma * np.tanh(gamma * amplitude), rel=5e-3
+    )
 
 
 def test_ratcheting_is_the_closed_form():
-    """Under stresses with a mean each cycle adds the same plastic strain (Chaboche and Nouailhas, 1989)."""
+    """Under stresses with a mean each cycle adds the same plastic strain (Chaboche and Nouailhas,
+    1989)."""
     C, gamma, top, bottom = 0.1 * E, 200.0, 1.3 * SIGY, -1.1 * SIGY
     limit = (C / gamma) ** 2
     expected = np.log((limit - (bottom + SIGY) ** 2) / (limit - (top - SIGY) ** 2)) / gamma
@@ -155,7 +177,10 @@ def test_ratcheting_is_the_closed_form():
         strain, state, ends = 0.0, m.state(1), []
         for _ in range(5):
             for stress in np.concatenate(
-                [np.linspace(bottom + 2 * SIGY, top, steps), np.linspace(top - 2 * SIGY, bottom, steps)]
+                [
+                    np.linspace(bottom + 2 * SIGY, top, steps),
+                    np.linspace(top - 2 * SIGY, bottom, steps),
+                ]
             ):
                 strain, state = sheared(m, stress, strain, state)
             ends.append(2 / 3**0.5 * state.plastic_strain[0, 3])
@@ -173,7 +198,12 @@ def test_energy_balance(plane, rng):
     ends = 4 * YIELD_STRAIN * rng.normal(size=(2, 20, 3))
 
     def missing(steps):
-        work, before, state, strain = np.zeros(20), np.zeros((20, 4)), m.state(20), np.zeros((20, 3))
+        work, before, state, strain = (
+            np.zeros(20),
+            np.zeros((20, 4)),
+            m.state(20),
+            np.zeros((20, 3)),
+        )
         for end in ends:
             step = (end - strain) / steps
             for _ in range(steps):

@@ -16,8 +16,14 @@ def quad_linear(fy: float, fu: float, E: float) -> np.ndarray:
     at_hardening = min(max(0.1 * fy / fu - 0.055, 0.015), 0.03)
     kink = at_hardening + 0.25 * (at_fu - at_hardening)  # C1 times the strain at fu
     slope = (fu - fy) / (0.4 * (at_fu - at_hardening))  # from the strain C2 times that at fu
-    strain = np.array([fy / E, *np.linspace(at_hardening, kink, 3), *np.linspace(kink, at_fu, 5)[1:]])
-    stress = np.interp(strain, [fy / E, at_hardening, kink, at_fu], [fy, fy, fy + slope * (kink - at_hardening), fu])
+    strain = np.array(
+        [fy / E, *np.linspace(at_hardening, kink, 3), *np.linspace(kink, at_fu, 5)[1:]]
+    )
+    stress = np.interp(
+        strain,
+        [fy / E, at_hardening, kink, at_fu],
+        [fy, fy, fy + slope * (kink - at_hardening), fu],
+    )
     return np.stack([strain, stress], axis=1)
 
 
@@ -27,12 +33,14 @@ def exponent(f: float, fu: float, strain: float) -> float:
 
 
 def at_strength(f: float) -> float:
-    """EN 1999-1-1, annex E: strain at the strength of an aluminium alloy whose proof strength is below 400 MPa."""
+    """EN 1999-1-1, annex E: strain at the strength of an aluminium alloy whose proof strength is
+    below 400 MPa."""
     return 0.30 - 0.22 * f / 400
 
 
 def ramberg_osgood(f: float, n: float, E: float, last: float) -> np.ndarray:
-    """Points (strain, stress) of plastic strains from 1e-4 to ``last``: ``strain = s/E + 0.002 (s/f)^n``."""
+    """Points (strain, stress) of plastic strains from 1e-4 to ``last``: ``strain = s/E + 0.002
+    (s/f)^n``."""
     plastic = np.array([1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1])
     plastic = np.append(plastic[plastic < last], last)
     stress = f * (plastic / 0.002) ** (1 / n)
@@ -41,7 +49,8 @@ def ramberg_osgood(f: float, n: float, E: float, last: float) -> np.ndarray:
 
 @pytest.mark.parametrize("name", metals())
 def test_tables_are_those_of_the_formulas(name):
-    """To the digits printed; true stress over PEEQ, the first point at the stress of first yield itself."""
+    """To the digits printed; true stress over PEEQ, the first point at the stress of first yield
+    itself."""
     m = metals()[name]
     f, fu = m["yield"], m["tensile"]
     if name.startswith("S"):
@@ -59,20 +68,31 @@ def test_tables_are_those_of_the_formulas(name):
 
 
 @pytest.mark.parametrize(
-    ("f", "fu", "n"), [(110, 270, 5), (140, 170, 24), (160, 195, 24), (240, 260, 55), (225, 270, 25), (200, 280, 14)]
+    ("f", "fu", "n"),
+    [(110, 270, 5), (140, 170, 24), (160, 195, 24), (240, 260, 55), (225, 270, 25), (200, 280, 14)],
 )
 def test_the_exponent_is_that_of_the_standard(f, fu, n):
     """EN 1999-1-1, table 3.2b: 5083-O, 6060-T6, 6063-T6, 6061-T6, 6005A-T6, 5083-H12."""
     assert exponent(f, fu, at_strength(f)) == pytest.approx(n, abs=0.55)
 
 
-SCALES = {"MPa": 1.0, "N/mm2": 1.0, "Pa": 1e6, "kPa": 1e3, "GPa": 1e-3, "psi": 145.03773773, "ksi": 0.14503773773}
+SCALES = {
+    "MPa": 1.0,
+    "N/mm2": 1.0,
+    "Pa": 1e6,
+    "kPa": 1e3,
+    "GPa": 1e-3,
+    "psi": 145.03773773,
+    "ksi": 0.14503773773,
+}
 
 
 @pytest.mark.parametrize(("unit", "scale"), SCALES.items())
 def test_stresses_are_in_the_unit_asked_for(unit, scale):
     found, m = metal("S355", unit), metals()["S355"]
-    assert (found["E"], found["nu"], found["yield"]) == pytest.approx((210000 * scale, 0.3, 355 * scale))
+    assert (found["E"], found["nu"], found["yield"]) == pytest.approx(
+        (210000 * scale, 0.3, 355 * scale)
+    )
     assert found["tensile"] == pytest.approx(470 * scale)
     assert np.array(found["hardening"]) == pytest.approx(np.array(m["hardening"]) * [1, scale])
 
@@ -80,9 +100,17 @@ def test_stresses_are_in_the_unit_asked_for(unit, scale):
 @pytest.mark.parametrize(
     ("name", "unit", "said"),
     [
-        ("S335", "MPa", r"is not a known material; did you mean S355\? Materials are S235, .*, C63000$"),
+        (
+            "S335",
+            "MPa",
+            r"is not a known material; did you mean S355\? Materials are S235, .*, C63000$",
+        ),
         ("cheese", "MPa", "is not a known material; Materials are S235"),
-        ("S355", "bar", "needs a units.stress that is one of MPa, N/mm2, Pa, kPa, GPa, psi, ksi, not bar"),
+        (
+            "S355",
+            "bar",
+            "needs a units.stress that is one of MPa, N/mm2, Pa, kPa, GPa, psi, ksi, not bar",
+        ),
     ],
 )
 def test_unknown_names_and_units_are_refused(name, unit, said):
@@ -90,7 +118,8 @@ def test_unknown_names_and_units_are_refused(name, unit, said):
         metal(name, unit)
 
 
-NOMINAL = {  # yield and tensile strength [MPa], and elongation, of the standards: see docs/materials.md
+# yield and tensile strength [MPa], and elongation, of the standards: see docs/materials.md
+NOMINAL = {
     "S235": (235, 360, None),
     "S275": (275, 410, None),
     "S355": (355, 470, None),
@@ -115,14 +144,16 @@ NOMINAL = {  # yield and tensile strength [MPa], and elongation, of the standard
 
 @pytest.mark.parametrize("name", metals())
 def test_every_metal_has_the_numbers_of_its_standard_and_tells_its_sources(name):
-    """The thickness too, on which they depend, but of what is cast; of E and nu, which they do not ask for, whose."""
+    """The thickness too, on which they depend, but of what is cast; of E and nu, which they do not
+    ask for, whose."""
     m = metals()[name]
     assert (m["yield"], m["tensile"], m.get("elongation")) == NOMINAL[name]
     assert m["E"] > 0
     assert 0.27 <= m["nu"] <= 0.34
     assert "thick" in m["title"] or "cast" in m["title"]
     assert re.fullmatch(
-        r"strengths: least (\(A basis\) )?of (EN|AMS|MMPDS).*; E, nu: (EN|typical).*; curve: .*", m["source"]
+        r"strengths: least (\(A basis\) )?of (EN|AMS|MMPDS).*; E, nu: (EN|typical).*; curve: .*",
+        m["source"],
     )
 
 
@@ -135,7 +166,9 @@ def test_a_scene_resolves_a_name_to_these_numbers():
     assert law.stress(np.array([0.0, 1.0])) == pytest.approx([355.0, 539.0])
 
 
-@pytest.mark.parametrize(("name", "ksi"), [(n, (m["yield"], m["tensile"])) for n, m in metals().items()])
+@pytest.mark.parametrize(
+    ("name", "ksi"), [(n, (m["yield"], m["tensile"])) for n, m in metals().items()]
+)
 def test_strengths_listed_in_ksi_are_those_of_the_source(name, ksi):
     """A source that names them, "(74 and 64 ksi)", has them to half a MPa."""
     if found := re.search(r"\((\d+) and (\d+) ksi\)", metals()[name]["source"]):

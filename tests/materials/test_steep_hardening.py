@@ -1,4 +1,5 @@
-"""Hardening laws that begin vertically (Ludwik), that give no number, and back stresses that vanish."""
+"""Hardening laws that begin vertically (Ludwik), that give no number, and back stresses that
+vanish."""
 
 from dataclasses import dataclass
 
@@ -79,13 +80,16 @@ def test_a_law_that_gives_no_number_is_refused(plane):
     """It would answer as if it never yielded."""
     strain = np.full((1, 3), 0.01)
     for m in materials(plane, SwiftHardening(np.nan, 0.01, 0.2)):
-        with pytest.raises(ValueError, match="the hardening law gives a yield stress that is not a number"):
+        with pytest.raises(
+            ValueError, match="the hardening law gives a yield stress that is not a number"
+        ):
             m.update(strain, m.state(1))
 
 
 @in_both_planes
 def test_a_vanishing_back_stress_changes_nothing_at_large_strain(plane):
-    """Both yield by Cauchy's stress, on a path with volume changes of a per cent; the tangent is the derivative."""
+    """Both yield by Cauchy's stress, on a path with volume changes of a per cent; the tangent is
+    the derivative."""
     rng = np.random.default_rng(2)
     law = LinearHardening(2000.0, 1000.0)
     one = LargeStrain(J2Material(E, NU, plane, law))
@@ -99,7 +103,9 @@ def test_a_vanishing_back_stress_changes_nothing_at_large_strain(plane):
 
 def test_back_stresses_at_large_strain_have_the_consistent_tangent():
     rng = np.random.default_rng(3)
-    m = LargeStrain(KinematicMaterial(E, NU, "strain", LinearHardening(400.0, 1000.0), ((20000.0, 0.0),)))
+    m = LargeStrain(
+        KinematicMaterial(E, NU, "strain", LinearHardening(400.0, 1000.0), ((20000.0, 0.0),))
+    )
     gradient = 0.03 * rng.standard_normal((40, 4))
     _, tangent, _ = m.update(gradient, m.state(40))
     for k, h in enumerate(1e-7 * np.eye(4)):

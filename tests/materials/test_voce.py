@@ -40,30 +40,42 @@ def test_hardening_is_the_slope_and_work_the_integral():
     peeq, h = np.linspace(0, 0.05, 7), 1e-6
     assert VOCE.stress(np.array([0.0, 1.0])) == pytest.approx([YIELD_STRESS, 2 * YIELD_STRESS])
     for function, derivative in ((VOCE.stress, VOCE.slope), (VOCE.work, VOCE.stress)):
-        assert (function(peeq + h) - function(peeq - h)) / (2 * h) == pytest.approx(derivative(peeq), rel=1e-6)
+        assert (function(peeq + h) - function(peeq - h)) / (2 * h) == pytest.approx(
+            derivative(peeq), rel=1e-6
+        )
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_blocks_pressed_together_follow_the_closed_form(plane):
-    """Two unit squares on top of each other, between walls (plane strain) or with free sides (plane stress).
+    """Two unit squares on top of each other, between walls (plane strain) or with free sides (plane
+    stress).
 
-    The deviator keeps its direction, so the steps are exact: with PEEQ ``p`` and yield stress ``s(p)`` the strain is
-    ``(s + 3 mu p) / (2 mu)`` and the pressure ``K strain + 2 s / 3`` between walls, ``s / E + p`` and ``s`` without.
+    The deviator keeps its direction, so the steps are exact: with PEEQ ``p`` and yield stress
+    ``s(p)`` the strain is ``(s + 3 mu p) / (2 mu)`` and the pressure ``K strain + 2 s / 3`` between
+    walls, ``s / E + p`` and ``s`` without.
     """
     peeq = np.linspace(0, 0.01, 2001)
     s, mu, bulk = VOCE.stress(peeq), E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
     strain = (s + 3 * mu * peeq) / (2 * mu) if plane == "strain" else s / E + peeq
     pressure = bulk * strain + 2 / 3 * s if plane == "strain" else s
     material, walls = J2Material(E, NU, plane, VOCE), ("left", "right")[: 1 + (plane == "strain")]
-    supports = [Support("base", "base", 1), Support("lid", "lid", 1, -2.0), *(Support(w, w, 0) for w in walls)]
+    supports = [
+        Support("base", "base", 1),
+        Support("lid", "lid", 1, -2.0),
+        *(Support(w, w, 0) for w in walls),
+    ]
     contact = Interaction("contact", ("upper bottom", "lower top"), kinematics="reference")
     bodies = [Body("lower", material), Body("upper", material)]
-    system = solve(Problem(blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports), strain[200::200])
-    assert -system.reaction("lid")[1] == pytest.approx(pressure[-1], rel=1e-9)
-    assert system.bulk.cell_fields(system.bulk.at_points(system.equilibrium.displacement()))["peeq"] == pytest.approx(
-        peeq[-1], rel=1e-8
+    system = solve(
+        Problem(blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports), strain[200::200]
     )
-    assert system.contact.pair_of(system.sides["upper bottom"]).pressure == pytest.approx(pressure[-1], rel=1e-8)
+    assert -system.reaction("lid")[1] == pytest.approx(pressure[-1], rel=1e-9)
+    assert system.bulk.cell_fields(system.bulk.at_points(system.equilibrium.displacement()))[
+        "peeq"
+    ] == pytest.approx(peeq[-1], rel=1e-8)
+    assert system.contact.pair_of(system.sides["upper bottom"]).pressure == pytest.approx(
+        pressure[-1], rel=1e-8
+    )
     stored, dissipated = system.energies()
     assert dissipated == pytest.approx(2 * VOCE.work(peeq[-1]), rel=1e-9)
     work = np.trapezoid(pressure, strain) + 0.5 * pressure[0] * strain[0]

@@ -30,7 +30,8 @@ def solved(scenes: dict[str, Scene], folder: Path) -> dict[str, Path]:
 
 
 def rewrite_report(folder: Path, **changes: object) -> None:
-    """Let the run in ``folder`` have these ``changes`` in its run.json, as if it had been written so."""
+    """Let the run in ``folder`` have these ``changes`` in its run.json, as if it had been written
+    so."""
     path = folder / "run.json"
     path.write_text(report_text(read_report(path) | changes))
 
@@ -40,7 +41,9 @@ def accepted_steps(folder: Path) -> int:
 
     Of the other files none is ahead of the checkpoint, and none more than one step behind.
     """
-    steps = checkpoint.read(folder / "checkpoint.h5").step if (folder / "checkpoint.h5").exists() else 0
+    steps = (
+        checkpoint.read(folder / "checkpoint.h5").step if (folder / "checkpoint.h5").exists() else 0
+    )
     found = {}
     if (folder / "scene.toml").exists():
         load_scene(folder / "scene.toml")
@@ -88,22 +91,31 @@ def _xdmf(path: Path) -> int:
     for item in (item for grid in grids for item in grid.iter("DataItem")):
         name, _, dataset = str(item.text).partition(":")
         with h5py.File(path.parent / name) as file:
-            assert file[dataset].shape == tuple(int(n) for n in item.attrib["Dimensions"].split()), item.text
+            assert file[dataset].shape == tuple(
+                int(n) for n in item.attrib["Dimensions"].split()
+            ), item.text
     return len(grids)
 
 
 def same_run(one: Path, other: Path, tolerance: float, fields: float = 0.0) -> None:
-    """All numbers of two finished runs agree, relative to the largest of their kind: tables, fields and contact.
+    """All numbers of two finished runs agree, relative to the largest of their kind: tables, fields
+    and contact.
 
     ``fields`` is the tolerance of values at points, if it is another one.
     """
     a, b = (read_history(folder / "history.csv") for folder in (one, other))
     assert set(a) == set(b)
     for name in set(a) - {"seconds", "force_balance"}:
-        _agree(name, np.array(a[name]), np.array(b[name]), max(tolerance, 1e-11))  # the table has 12 digits
+        _agree(
+            name, np.array(a[name]), np.array(b[name]), max(tolerance, 1e-11)
+        )  # the table has 12 digits
     reports = [json.loads((folder / "run.json").read_text()) for folder in (one, other)]
     for name in ("delta", "P", "p0", "eps", "peeq_max", "peeq_integral", "elastic_energy", "work"):
-        _agree(name, *(np.array([step[name] for step in report["steps"]]) for report in reports), tolerance)
+        _agree(
+            name,
+            *(np.array([step[name] for step in report["steps"]]) for report in reports),
+            tolerance,
+        )
     for name in ("fields.h5", "contact.h5"):
         assert (one / name).exists() == (other / name).exists()
         if not (one / name).exists():
@@ -113,7 +125,12 @@ def same_run(one: Path, other: Path, tolerance: float, fields: float = 0.0) -> N
             arrays = [dict(all_arrays(file)) for file in (first, second)]
             assert set(arrays[0]) == set(arrays[1])
             for key, values in arrays[0].items():
-                _agree(f"{name}/{key}", values, arrays[1][key], tolerance if key == "load" else fields or tolerance)
+                _agree(
+                    f"{name}/{key}",
+                    values,
+                    arrays[1][key],
+                    tolerance if key == "load" else fields or tolerance,
+                )
     names = [folder / "fields.vtkhdf" for folder in (one, other)]
     if all(name.exists() for name in names):
         with h5py.File(names[0]) as first, h5py.File(names[1]) as second:

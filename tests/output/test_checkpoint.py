@@ -1,4 +1,5 @@
-"""The state of a run on disk: whole on any number of ranks, and refused when it is not what was written."""
+"""The state of a run on disk: whole on any number of ranks, and refused when it is not what was
+written."""
 
 import json
 
@@ -31,7 +32,8 @@ def pressed():
 
 
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Numbers ``(n,)`` and coordinates ``(n, 2)`` of all points that may have a history, on every rank."""
+    """Numbers ``(n,)`` and coordinates ``(n, 2)`` of all points that may have a history, on every
+    rank."""
     joint, here = order.system, {}
     for place, _, number in order._points():
         kind, name = place.split()
@@ -42,18 +44,25 @@ def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
             x = cell_basis(joint.V.mesh, 2, cells, bulk_quadrature(TRIANGLE, 2)[0]).point
         here[place] = number, x.reshape(-1, 2)
     parts = joint.comm.allgather(here)
-    together = {place: [np.concatenate([p[place][i] for p in parts]) for i in (0, 1)] for place in here}
+    together = {
+        place: [np.concatenate([p[place][i] for p in parts]) for i in (0, 1)] for place in here
+    }
     return {place: (n[np.argsort(n)], x[np.argsort(n)]) for place, (n, x) in together.items()}
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("cut", ["sectors", "dealt round", "all on the last rank"])
 def test_the_state_comes_back_on_any_ranks(comm, pressed, cut):
-    """From one rank on all: every point has its number, also on facets that run against the curve, and collected again
-    the state is the very same bytes, of the points that yielded alone."""
+    """From one rank on all: every point has its number, also on facets that run against the curve,
+    and collected again the state is the very same bytes, of the points that yielded alone."""
     one = point_numbers(MeshOrder(Joint(PROBLEM, MPI.COMM_SELF)))
     joint = Joint(PROBLEM, comm, partitioner=CUTS[cut])
-    assert comm.allreduce(sum(int((side.trace[:, 0] > side.trace[:, -1]).sum()) for side in joint.sides.values())) > 0
+    assert (
+        comm.allreduce(
+            sum(int((side.trace[:, 0] > side.trace[:, -1]).sum()) for side in joint.sides.values())
+        )
+        > 0
+    )
     order = MeshOrder(joint)
     together = point_numbers(order)
     assert set(one) == set(together) == {"bulk 1", "bulk 2", "contact pin", "contact hole"}
@@ -65,7 +74,11 @@ def test_the_state_comes_back_on_any_ranks(comm, pressed, cut):
     measures, *rest = checkpoint.resume(order, "path", pressed if comm.rank == 0 else None)
     again = checkpoint.halt(order, "scene", Measures(**measures), *rest)
     if comm.rank == 0:
-        assert (again.mesh, again.scalars, set(again.arrays)) == (pressed.mesh, pressed.scalars, set(pressed.arrays))
+        assert (again.mesh, again.scalars, set(again.arrays)) == (
+            pressed.mesh,
+            pressed.scalars,
+            set(pressed.arrays),
+        )
         for name, values in pressed.arrays.items():
             assert len(values) > 0
             assert np.array_equal(again.arrays[name], values), name
@@ -84,7 +97,8 @@ def test_another_mesh_is_refused(pressed):
 
 
 def test_whatever_is_damaged_is_refused(pressed, tmp_path):
-    """Any byte changed, the number of the format among them, any part missing: one sentence with the file's name."""
+    """Any byte changed, the number of the format among them, any part missing: one sentence with
+    the file's name."""
     path = tmp_path / "checkpoint.h5"
     with pytest.raises(InputError, match=r"checkpoint\.h5: cannot be read, .*: No such file"):
         checkpoint.read(path)
@@ -93,12 +107,25 @@ def test_whatever_is_damaged_is_refused(pressed, tmp_path):
     assert len(whole) > 10_000
     random = np.random.default_rng(0)
     of_format = whole.index(b"format 1") + 7
-    places = [0, of_format, 100, 300, 511, 512, 520, 600, len(whole) - 1, *random.integers(len(whole), size=200)]
+    places = [
+        0,
+        of_format,
+        100,
+        300,
+        511,
+        512,
+        520,
+        600,
+        len(whole) - 1,
+        *random.integers(len(whole), size=200),
+    ]
     for at in places:
         changed = whole[:at] + bytes([whole[at] ^ 1 << random.integers(8)]) + whole[at + 1 :]
         for content in (changed, whole[:at]):
             path.write_bytes(content)
-            with pytest.raises(InputError, match=r"checkpoint\.h5: is damaged or of a newer archord") as error:
+            with pytest.raises(
+                InputError, match=r"checkpoint\.h5: is damaged or of a newer archord"
+            ) as error:
                 checkpoint.read(path)
             assert len(str(error.value).splitlines()) == 1
     path.write_bytes(whole)

@@ -18,10 +18,20 @@ STEEL = {"E": 210000.0, "nu": 0.3}
 
 
 def scene(steps: int = 3, thickness: float | None = None, **changes):
-    shape = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    shape = {
+        "kind": "lug",
+        "radius": 9.9,
+        "clearance": 0.1,
+        "width": 40.0,
+        "edge_distance": 20.0,
+        "length": 60.0,
+    }
     data = {
         "mesh": {"shape": shape | {"element_size": 1.5, "growth": 0.6}},
-        "body": [{"name": "pin"} | STEEL, {"name": "lug", "yield_stress": 355.0, "hardening": 2000.0} | STEEL],
+        "body": [
+            {"name": "pin"} | STEEL,
+            {"name": "lug", "yield_stress": 355.0, "hardening": 2000.0} | STEEL,
+        ],
         "interaction": [{"name": "contact", "surfaces": ["pin", "hole"]}],
         "support": [
             {"name": "clamp", "on": "clamp", "fixed": ["x", "y"]},
@@ -40,7 +50,9 @@ def run(tmp_path_factory):
     outcome = solve_scene(scene(), folder, MPI.COMM_SELF)
     off = "the work of the loads, a sum of trapezoids over accepted steps, and the energies stored and dissipated"
     assert outcome.status == "done"
-    assert outcome.warnings == [f"{off} differ by 1.7 % of the largest work: more steps bring them together"]
+    assert outcome.warnings == [
+        f"{off} differ by 1.7 % of the largest work: more steps bring them together"
+    ]
     return Run(folder)
 
 
@@ -73,13 +85,17 @@ def test_thickness_makes_forces_of_the_whole(run, tmp_path):
     thick = Run(tmp_path)
     for name in ("press force", "clamp moment", "work", "elastic_energy", "plastic_dissipation"):
         assert thick.columns[name] == pytest.approx(np.multiply(12, run.columns[name]), rel=1e-8)
-    assert thick.columns["contact largest pressure"] == pytest.approx(run.columns["contact largest pressure"])
+    assert thick.columns["contact largest pressure"] == pytest.approx(
+        run.columns["contact largest pressure"]
+    )
     assert thick.history.attrs["units"]["press force"] == "N"
 
 
 @pytest.mark.mpi
 def test_ranks_agree(comm, tmp_path_factory):
-    one, several = (Path(comm.bcast(str(tmp_path_factory.mktemp(name)))) for name in ("one", "several"))
+    one, several = (
+        Path(comm.bcast(str(tmp_path_factory.mktemp(name)))) for name in ("one", "several")
+    )
     if comm.rank == 0:
         solve_scene(scene(), one, MPI.COMM_SELF)
     solve_scene(scene(), several, comm)
@@ -87,7 +103,9 @@ def test_ranks_agree(comm, tmp_path_factory):
     a, b = Run(one).columns, Run(several).columns
     for name in a:
         if name not in ("seconds", "force_balance", "iterations"):
-            assert b[name] == pytest.approx(a[name], rel=1e-9, abs=1e-9 * max(map(abs, a[name])) + 1e-12), name
+            assert b[name] == pytest.approx(
+                a[name], rel=1e-9, abs=1e-9 * max(map(abs, a[name])) + 1e-12
+            ), name
 
 
 def pressed(*stages: float, steps: list[int]):
@@ -96,14 +114,16 @@ def pressed(*stages: float, steps: list[int]):
 
 
 def test_a_run_goes_on_with_further_stages(tmp_path):
-    """From the end of the first stage, as if there had been no end; not with another first stage."""
+    """From the end of the first stage, as if there had been no end; not with another first
+    stage."""
     for name in ("whole", "parts"):
         (tmp_path / name).mkdir()
     solve_scene(pressed(0.1, 0.15, 0.1, steps=[2, 1, 1]), tmp_path / "whole", MPI.COMM_SELF)
     parts = tmp_path / "parts"
     solve_scene(pressed(0.1, steps=[2]), parts, MPI.COMM_SELF)
     with pytest.raises(
-        InputError, match=r'steps are not the first ones of the scene\'s path; load "press" .* and its steps'
+        InputError,
+        match=r'steps are not the first ones of the scene\'s path; load "press" .* and its steps',
     ):
         plan_restart(parts, pressed(0.12, 0.15, steps=[2, 1]))
     plan = plan_restart(parts, pressed(0.1, 0.15, 0.1, steps=[2, 1, 1]), extend=True)
@@ -116,7 +136,9 @@ def test_a_run_goes_on_with_further_stages(tmp_path):
 def test_an_accuracy_is_reached_by_finer_meshes(tmp_path):
     """Of the force, against a mesh of three times as many dofs."""
     coarse, fine = scene(), pressed(0.1, steps=[1])
-    asked = coarse.model_copy(update={"analysis": coarse.analysis.model_copy(update={"accuracy": 3e-3})})
+    asked = coarse.model_copy(
+        update={"analysis": coarse.analysis.model_copy(update={"accuracy": 3e-3})}
+    )
     asked = asked.model_copy(update={"load": fine.load, "path": fine.path})
     outcome = solve_to_accuracy(asked, tmp_path, MPI.COMM_SELF)
     assert outcome.accuracy.estimated < 3e-3
@@ -132,23 +154,36 @@ def test_an_accuracy_under_a_pressure_is_that_of_the_displacement(tmp_path):
     shape = scene().mesh.shape.model_dump() | {"pin": "none", "element_size": 3.0}
     body = [{"name": "lug"} | STEEL]
     asked = scene(mesh={"shape": shape}, body=body, interaction=[], load=oil, path={"steps": 1})
-    asked = asked.model_copy(update={"analysis": asked.analysis.model_copy(update={"accuracy": 1e-2})})
+    asked = asked.model_copy(
+        update={"analysis": asked.analysis.model_copy(update={"accuracy": 1e-2})}
+    )
     found = solve_to_accuracy(asked, tmp_path, MPI.COMM_SELF)
     assert 0 < found.accuracy.estimated < 1e-2
     assert found.accuracy.levels[-1].last == found.steps[-1].values["oil displacement"]
 
 
 def test_another_load_is_refused(run):
-    other = scene(load=[{"name": "pull", "on": "flat", "direction": "x", "displacement": 0.1}], path={"steps": 3})
-    with pytest.raises(InputError, match=r'was loaded by load "press" .*; load "pull" .* cannot continue it'):
+    other = scene(
+        load=[{"name": "pull", "on": "flat", "direction": "x", "displacement": 0.1}],
+        path={"steps": 3},
+    )
+    with pytest.raises(
+        InputError, match=r'was loaded by load "press" .*; load "pull" .* cannot continue it'
+    ):
         plan_restart(run.folder, other, extend=True)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"support": [{"name": "clamp", "on": "clam", "fixed": ["x"]}]}, "there is no .* 'clam' .did you mean 'clamp'"),
-        ({"interaction": [{"name": "contact", "surfaces": ["pin", "bore"]}]}, "there is no facet set 'bore'"),
+        (
+            {"support": [{"name": "clamp", "on": "clam", "fixed": ["x"]}]},
+            "there is no .* 'clam' .did you mean 'clamp'",
+        ),
+        (
+            {"interaction": [{"name": "contact", "surfaces": ["pin", "bore"]}]},
+            "there is no facet set 'bore'",
+        ),
     ],
 )
 def test_a_set_that_is_not_there_is_named(changes, said, tmp_path):

@@ -1,4 +1,5 @@
-"""A run of a mesh given from Python: its folder holds all that it takes to go on, and to solve it again."""
+"""A run of a mesh given from Python: its folder holds all that it takes to go on, and to solve it
+again."""
 
 import json
 import shutil
@@ -17,23 +18,44 @@ from archord.geometry.meshes.stored import store_mesh, stored_mesh
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 
-CURVED = np.array([[0, 0], [1, 0], [0, 1], [0.55, 0.6], [0, 0.5], [0.5, 0], [1, 1], [0.45, 1], [1, 0.55]], dtype=float)
+CURVED = np.array(
+    [[0, 0], [1, 0], [0, 1], [0.55, 0.6], [0, 0.5], [0.5, 0], [1, 1], [0.45, 1], [1, 0.55]],
+    dtype=float,
+)
 
 
 def square(comm):
     """Squares of triangles with tags of its left (3) and right (8) side."""
     mesh = create_unit_square(comm, 4, 4)
-    sides = [locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0, 1)]
+    sides = [
+        locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0, 1)
+    ]
     facets, order = np.concatenate(sides), np.argsort(np.concatenate(sides))
     values = np.repeat([3, 8], [len(side) for side in sides]).astype(np.int32)
-    every = np.arange(mesh.topology.index_map(2).size_local + mesh.topology.index_map(2).num_ghosts, dtype=np.int32)
-    return mesh, meshtags(mesh, 2, every, np.ones_like(every)), meshtags(mesh, 1, facets[order], values[order])
+    every = np.arange(
+        mesh.topology.index_map(2).size_local + mesh.topology.index_map(2).num_ghosts,
+        dtype=np.int32,
+    )
+    return (
+        mesh,
+        meshtags(mesh, 2, every, np.ones_like(every)),
+        meshtags(mesh, 1, facets[order], values[order]),
+    )
 
 
 def problem(mesh, **sections):
     return archord.Problem(
         mesh,
-        bodies=[{"name": "plate", "cells": "1", "E": 1000.0, "nu": 0.3, "yield_stress": 5.0, "hardening": 10.0}],
+        bodies=[
+            {
+                "name": "plate",
+                "cells": "1",
+                "E": 1000.0,
+                "nu": 0.3,
+                "yield_stress": 5.0,
+                "hardening": 10.0,
+            }
+        ],
         supports=[{"name": "clamp", "on": "3", "fixed": ["x", "y"]}],
         loads=[{"name": "pull", "on": "8", "direction": "x", "displacement": [0.02, 0.0]}],
         **({"path": {"steps": [3, 1]}, "analysis": {"plane": "strain"}} | sections),
@@ -62,7 +84,9 @@ def test_the_run_goes_on_and_is_solved_again_from_its_folder(comm, tmp_path, key
     again = archord.solve(folder / "moved" / "scene.toml", folder / "again", comm=comm)
     assert again.columns["pull force"] == pytest.approx(expected, rel=1e-10)
     assert not (folder / "again" / "mesh.npz").exists()
-    into_itself = archord.solve(folder / "moved" / "scene.toml", folder / "moved", force=True, comm=comm)
+    into_itself = archord.solve(
+        folder / "moved" / "scene.toml", folder / "moved", force=True, comm=comm
+    )
     assert into_itself.columns["pull force"] == pytest.approx(expected, rel=1e-10)
     assert (folder / "moved" / "mesh.npz").exists()
     assert (folder / "moved" / "scene.toml").read_text() == said
@@ -96,7 +120,11 @@ def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):
     cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
     sets = {"b": np.array([1]), "a": np.array([0]), "both": np.array([0, 1])}
     made = PlaneMesh.of_sets(
-        CURVED, cells, sets, {"z": np.array([[0, 1]]), "é": np.array([[0, 2]])}, {"p": np.array([6])}
+        CURVED,
+        cells,
+        sets,
+        {"z": np.array([[0, 1]]), "é": np.array([[0, 2]])},
+        {"p": np.array([6])},
     )
     with (tmp_path / "mesh.npz").open("wb") as file:
         store_mesh(made, file)
@@ -113,7 +141,11 @@ def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):
 def test_curved_meshes_of_dolfinx_stay_curved(comm, tmp_path):
     folder = comm.bcast(tmp_path)
     element = basix.ufl.element("P", "triangle", 2, shape=(2,))
-    cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]]) if comm.rank == 0 else np.zeros((0, 6), dtype=int)
+    cells = (
+        np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
+        if comm.rank == 0
+        else np.zeros((0, 6), dtype=int)
+    )
     mesh = create_mesh(comm, cells=cells, x=CURVED if comm.rank == 0 else CURVED[:0], e=element)
     whole = gathered(tagged(mesh))
     if comm.rank == 0:

@@ -1,4 +1,5 @@
-"""Runs that go on: the same numbers as if never halted, longer runs, and what cannot be continued."""
+"""Runs that go on: the same numbers as if never halted, longer runs, and what cannot be
+continued."""
 
 import json
 import os
@@ -32,14 +33,25 @@ def loaded(load: dict, **options):
 CASES = {
     "elastic": (scene(0.2, 4), 2),
     "plastic": (scene(0.2, 4, **PLASTIC), 3),
-    "plane stress, hardening": (scene(0.2, 3, **PLASTIC, pin={"hardening": 0.1}, analysis={"plane": "stress"}), 1),
+    "plane stress, hardening": (
+        scene(0.2, 3, **PLASTIC, pin={"hardening": 0.1}, analysis={"plane": "stress"}),
+        1,
+    ),
     "rigid pin": (scene(0.2, 4, **PLASTIC, pin={"rigid": True}), 2),
     "one side": (scene(0.2, 3, **PLASTIC, analysis={"integration": "block"}), 2),
-    "back stresses": (scene(0.2, **PLASTIC, block={"back_stresses": [[0.5, 100.0], [0.01, 0.0]]}, load=UP_DOWN_UP), 4),
+    "back stresses": (
+        scene(
+            0.2, **PLASTIC, block={"back_stresses": [[0.5, 100.0], [0.01, 0.0]]}, load=UP_DOWN_UP
+        ),
+        4,
+    ),
     "unloading": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 4),
     "friction, unloading": (scene(0.2, **PLASTIC, load=UP_DOWN_UP, analysis={"friction": 0.3}), 4),
     "turning": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 3),
-    "force": (loaded({"relative_force": [0.004, 0.002], "steps": 3}, element_size=0.2, **PLASTIC), 4),
+    "force": (
+        loaded({"relative_force": [0.004, 0.002], "steps": 3}, element_size=0.2, **PLASTIC),
+        4,
+    ),
     "ring": (persson_joint(0.5, 0.2, 4, block={"yield_stress": 0.002}), 2),
     "ring with an interference": (persson_joint(-2.0, 0.2, 3), 1),
     "substeps": (scene(0.2, 2, **PLASTIC, stepping={"initial": 0.2, "growth": 1.5}), 1),
@@ -61,7 +73,8 @@ def crash_after(step: int):
 
 
 def run(problem, folder, comm=MPI.COMM_SELF, *, crash: int = 0, copies=None):
-    """Solve up to a crash; ``copies`` are folders by step: what a kill after that step would leave."""
+    """Solve up to a crash; ``copies`` are folders by step: what a kill after that step would
+    leave."""
 
     def copy(measures) -> None:
         if comm.rank == 0 and measures.step in (copies or {}):
@@ -135,7 +148,9 @@ def test_a_run_may_be_halted_after_every_step(tmp_path):
     same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
     report = json.loads((tmp_path / "halted" / "run.json").read_text())
     assert [r["after_step"] for r in report["restarts"]] == [1, 2, 3, 4]
-    assert report["totals"]["newton_iterations"] == sum(step["iterations"] for step in report["steps"])
+    assert report["totals"]["newton_iterations"] == sum(
+        step["iterations"] for step in report["steps"]
+    )
 
 
 CHANGES = [("all", "all", 1e-12), ("one", "all", 1e-8), ("all", "one", 1e-8)]
@@ -143,12 +158,14 @@ CHANGES = [("all", "all", 1e-12), ("one", "all", 1e-8), ("all", "one", 1e-8)]
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(("before", "after", "tolerance"), CHANGES if SEVERAL else CHANGES[:1])
-@pytest.mark.parametrize("name", ["plastic", "rigid pin", "force", "back stresses"] if SEVERAL else ["force"])
+@pytest.mark.parametrize(
+    "name", ["plastic", "rigid pin", "force", "back stresses"] if SEVERAL else ["force"]
+)
 def test_ranks_may_change(tmp_path_factory, comm, name, before, after, tolerance):
     """Halted on all ranks or one, continued on one or all.
 
-    The order in which MUMPS sums up what other ranks send is left to chance: values at points differ by 1e-12 between
-    any two runs.
+    The order in which MUMPS sums up what other ranks send is left to chance: values at points
+    differ by 1e-12 between any two runs.
     """
     problem, step = CASES[name]
     folder = comm.bcast(tmp_path_factory.mktemp("ranks") if comm.rank == 0 else None)
@@ -172,7 +189,8 @@ LONGER = scene(0.2, **PLASTIC, load={"displacement": 3.0, "steps": 6})
 @pytest.mark.parametrize("long", [LONGER, CASES["unloading"][0]], ids=["on", "back"])
 @pytest.mark.parametrize("steps", [3, 2], ids=["finished", "halted"])
 def test_an_extended_run_equals_the_long_one(tmp_path, long, steps):
-    """Further loading or unloading added to a run, which may be killed there and then is restarted like any other."""
+    """Further loading or unloading added to a run, which may be killed there and then is restarted
+    like any other."""
     run(SHORT, tmp_path / "run", crash=steps if steps < 3 else 0)
     go_on(long, tmp_path / "run", extend=True, crash=5)
     assert (tmp_path / "run" / "scene.toml").read_text() == resolved(long)
@@ -195,7 +213,10 @@ def finished(tmp_path_factory):
         ({"displacement": 2.0, "steps": 4}, "ends at 0.01 already"),
         ({"displacement": 1.0, "steps": 2}, "4 steps are not the first ones of the scene's path"),
         ({"displacement": 4.0, "steps": 4}, "4 steps are not the first ones of the scene's path"),
-        ({"displacement": [1.0, 0.5, 4.0], "steps": 2}, "4 steps are not the first ones of the scene's path"),
+        (
+            {"displacement": [1.0, 0.5, 4.0], "steps": 2},
+            "4 steps are not the first ones of the scene's path",
+        ),
         ({"relative_force": 0.1}, "was loaded by a displacement; a force cannot continue it"),
     ],
 )
@@ -215,14 +236,19 @@ def test_a_finished_run_is_left_alone(finished):
 
 
 def test_tables_of_a_finished_run_are_written_again(finished, tmp_path):
-    """A history that lacks steps is no history of the run; --restart makes it and fields.xdmf from the other files."""
+    """A history that lacks steps is no history of the run; --restart makes it and fields.xdmf from
+    the other files."""
     copy = shutil.copytree(finished, tmp_path / "run")
     history = (copy / "history.csv").read_bytes()
     (copy / "history.csv").write_bytes(b"\n".join(history.split(b"\n")[:3]) + b"\n")
     (copy / "fields.xdmf").write_text("")
-    with pytest.raises(InputError, match=r"history\.csv: has 2 of the 4 steps of run\.json: it was cut short; "):
+    with pytest.raises(
+        InputError, match=r"history\.csv: has 2 of the 4 steps of run\.json: it was cut short; "
+    ):
         Run(copy)
-    assert plan_restart(copy).said.endswith("is finished: writing history.csv and fields.xdmf again")
+    assert plan_restart(copy).said.endswith(
+        "is finished: writing history.csv and fields.xdmf again"
+    )
     go_on(None, copy)
     same_run(finished, copy, 1e-12)
     assert (copy / "fields.xdmf").read_text() == (finished / "fields.xdmf").read_text()
@@ -244,19 +270,27 @@ def halted(crashed, tmp_path):
 
 
 def test_only_step_control_may_change(halted):
-    """Another key is named with both values; [stepping] and max_iterations are free, and the run goes on with them.
-    A run without its checkpoint is not overwritten by another scene either."""
+    """Another key is named with both values; [stepping] and max_iterations are free, and the run
+    goes on with them. A run without its checkpoint is not overwritten by another scene either."""
     folder, lost = halted, shutil.copytree(halted, halted.with_name("lost"))
     (lost / "checkpoint.h5").unlink()
     own = tomllib.loads(resolved(scene(0.25, 3)))
-    for section, key, value in (("block", "nu", 0.29), ("analysis", "plane", "stress"), ("load", "core_radius", 0.2)):
+    for section, key, value in (
+        ("block", "nu", 0.29),
+        ("analysis", "plane", "stress"),
+        ("load", "core_radius", 0.2),
+    ):
         other = parse_scene(own | {section: own[section] | {key: value}})
         for there in (folder, lost):
-            with pytest.raises(InputError, match=rf"was solved with {section}\.{key} = .*, the scene says") as error:
+            with pytest.raises(
+                InputError, match=rf"was solved with {section}\.{key} = .*, the scene says"
+            ) as error:
                 plan_restart(there, other)
             assert len(str(error.value).splitlines()) == 1
     analysis = own["analysis"] | {"max_iterations": 12}
-    other = parse_scene(own | {"stepping": own["stepping"] | {"initial": 0.5}, "analysis": analysis})
+    other = parse_scene(
+        own | {"stepping": own["stepping"] | {"initial": 0.5}, "analysis": analysis}
+    )
     go_on(other, folder)
     assert load_scene(folder / "scene.toml").analysis.max_iterations == 12
 
@@ -267,7 +301,10 @@ def test_only_step_control_may_change(halted):
         (lambda run: (run / "fields" / "0001.h5").unlink(), r"fields\.h5: is missing or damaged"),
         (lambda run: (run / "contact.h5").unlink(), r"contact\.h5: is missing or damaged"),
         (lambda run: (run / "run.json").unlink(), r"run\.json: is missing"),
-        (lambda run: (run / "run.json").write_text("{"), r"run\.json: is missing, was changed, or lacks some"),
+        (
+            lambda run: (run / "run.json").write_text("{"),
+            r"run\.json: is missing, was changed, or lacks some",
+        ),
         (lambda run: os.truncate(run / "checkpoint.h5", 5000), r"checkpoint\.h5: is damaged"),
     ],
 )
@@ -283,8 +320,8 @@ def test_a_run_with_files_missing_is_refused(halted, damage, said):
 
 
 def test_a_step_that_only_the_checkpoint_has_is_written(tmp_path):
-    """Killed after the checkpoint and before all other files: they get the step from the restored state. Tables that
-    were lost are written again."""
+    """Killed after the checkpoint and before all other files: they get the step from the restored
+    state. Tables that were lost are written again."""
     problem = CASES["plastic"][0]
     run(problem, tmp_path / "whole", copies={2: tmp_path / "before", 3: tmp_path / "halted"})
     shutil.copy(tmp_path / "halted" / "checkpoint.h5", tmp_path / "before")

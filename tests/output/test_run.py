@@ -40,14 +40,29 @@ def test_all_files_are_there_and_say_done(run):
     assert report["status"] == "done"
     assert totals["accepted_steps"] == 4
     assert totals["newton_iterations"] == sum(m.iterations for m in run.steps)
-    assert sum(s["factorisations"] for s in steps) == totals["factorisations"] <= totals["newton_iterations"]
-    assert sum(s["evaluations"] for s in steps) == totals["residual_evaluations"] > totals["newton_iterations"]
+    assert (
+        sum(s["factorisations"] for s in steps)
+        == totals["factorisations"]
+        <= totals["newton_iterations"]
+    )
+    assert (
+        sum(s["evaluations"] for s in steps)
+        == totals["residual_evaluations"]
+        > totals["newton_iterations"]
+    )
     assert 8 < report["peak_memory"][0] / report["mesh"]["dofs"] < 8e6  # bytes
     assert len(report["peak_memory"]) == report["ranks"] == 1
     assert report["error_estimates"]["force_balance"] < 1e-8
-    assert report["error_estimates"]["newton_residual"] == max(s["residuals"][-1][-1] for s in steps) < 1e-10
+    assert (
+        report["error_estimates"]["newton_residual"]
+        == max(s["residuals"][-1][-1] for s in steps)
+        < 1e-10
+    )
     assert {"archord", "dolfinx", "petsc", "mpi", "numpy", "python"} <= report["versions"].keys()
-    assert sum(s for name, s in report["seconds"].items() if name != "total") <= report["seconds"]["total"] * 1.001
+    assert (
+        sum(s for name, s in report["seconds"].items() if name != "total")
+        <= report["seconds"]["total"] * 1.001
+    )
 
 
 def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
@@ -60,14 +75,25 @@ def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
     there, here = ({p.name for p in (tmp_path / name).iterdir()} for name in ("with", "without"))
     assert there - here == {"fields.vtkhdf", "fields.xdmf", "fields.h5", "fields"}
     assert not here - there
-    with pytest.raises(InputError, match=r"without: has no fields: it was solved with output\.fields = false\."):
+    with pytest.raises(
+        InputError, match=r"without: has no fields: it was solved with output\.fields = false\."
+    ):
         Run(tmp_path / "without").fields()
 
 
 def test_history_holds_units_and_dimensionless_forms(run):
     """One row a step; P [N/mm] next to P/(E* R), equal as E* R = 1 here."""
     heading = (run.folder / "history.csv").read_text().splitlines()[0].split(",")
-    assert heading[:8] == ["step", "delta [mm]", "delta/dR", "P [N/mm]", "P/(E* R)", "p0 [MPa]", "p0/E*", "eps [rad]"]
+    assert heading[:8] == [
+        "step",
+        "delta [mm]",
+        "delta/dR",
+        "P [N/mm]",
+        "P/(E* R)",
+        "p0 [MPa]",
+        "p0/E*",
+        "eps [rad]",
+    ]
     history = read_history(run.folder / "history.csv")
     assert history["delta/dR"] == pytest.approx([0.5, 1.0, 1.5, 2.0], rel=1e-11)
     assert history["P"] == pytest.approx(history["P/(E* R)"], rel=1e-11)
@@ -76,7 +102,8 @@ def test_history_holds_units_and_dimensionless_forms(run):
 
 
 def test_fields_open_with_their_steps_in_order(run):
-    """Second-order triangles, nodal displacement and cell fields at the four loads; symmetry axis at rest in x."""
+    """Second-order triangles, nodal displacement and cell fields at the four loads; symmetry axis
+    at rest in x."""
     with meshio.xdmf.TimeSeriesReader(run.folder / "fields.xdmf") as reader:
         points, cells = reader.read_points_cells()
         assert [c.type for c in cells] == ["triangle6"]
@@ -88,7 +115,14 @@ def test_fields_open_with_their_steps_in_order(run):
     assert axis.sum() > 5
     assert np.abs(u[axis, 0]).max() == 0
     last = {name: values[0] for name, values in data[-1][2].items()}
-    assert set(last) == {"von_mises", "peeq", "mean_stress", "contact_state", "contact_pressure", "body"}
+    assert set(last) == {
+        "von_mises",
+        "peeq",
+        "mean_stress",
+        "contact_state",
+        "contact_pressure",
+        "body",
+    }
     assert last["von_mises"].max() <= 0.002 * (1 + 1e-9)
     assert 0 < last["peeq"].max() <= run.steps[-1].peeq_max
     assert set(np.unique(last["body"])) == {1, 2}
@@ -101,14 +135,18 @@ def test_fields_open_with_their_steps_in_order(run):
 
 
 def test_contact_file_integrates_to_the_force(run):
-    """The projected pressure of each side carries the raw pressure's force; gaps are closed where it acts."""
+    """The projected pressure of each side carries the raw pressure's force; gaps are closed where
+    it acts."""
     with h5py.File(run.folder / "contact.h5") as file:
         assert file["accepted"][()] == 4
         assert file["load"][()] == pytest.approx([m.delta for m in run.steps])
         for k in range(1, 5):
             for side in ("pin", "hole"):
                 s, w = file[f"{side}/s"][()], file[f"{side}/weight"][()]
-                p, raw, gap = (file[f"{side}/{name}/{k:04d}"][()] for name in ("pressure", "raw_pressure", "gap"))
+                p, raw, gap = (
+                    file[f"{side}/{name}/{k:04d}"][()]
+                    for name in ("pressure", "raw_pressure", "gap")
+                )
                 assert (np.diff(s.ravel()) > 0).all()
                 assert (w * p).sum() == pytest.approx((w * raw).sum(), rel=1e-12)
                 assert file[f"{side}/coordinates/{k:04d}"].shape == (*s.shape, 2)
@@ -128,9 +166,11 @@ def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
 
 
 def test_a_stopped_run_keeps_its_accepted_steps_and_says_why(tmp_path):
-    """Four of ten steps, then no convergence: all four readable; run.json has the residuals and active-set changes of
-    every attempt at the fifth."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
+    """Four of ten steps, then no convergence: all four readable; run.json has the residuals and
+    active-set changes of every attempt at the fifth."""
+    problem = scene(
+        0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0}
+    )
     assert solve_scene(problem, tmp_path, MPI.COMM_SELF).status == "stopped"
     assert accepted_steps(tmp_path) == 4
     report = json.loads((tmp_path / "run.json").read_text())
@@ -174,10 +214,16 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
     (tmp_path / "new" / "history.csv").write_text("kept")
     with pytest.raises(InputError, match=r"is not empty; .* --force"):
         claim_folder(tmp_path / "new", False)
-    ends = {"running": "did not end, unless", "interrupted": "was interrupted", "stopped": "could not go on"}
+    ends = {
+        "running": "did not end, unless",
+        "interrupted": "was interrupted",
+        "stopped": "could not go on",
+    }
     for status, said in ends.items():
         (tmp_path / "new" / "run.json").write_text(json.dumps({"status": status}))
-        with pytest.raises(InputError, match=f"new: holds a run that {said}.*; continue it with --restart, or over"):
+        with pytest.raises(
+            InputError, match=f"new: holds a run that {said}.*; continue it with --restart, or over"
+        ):
             claim_folder(tmp_path / "new", False)
     claim_folder(tmp_path / "new", True)
     assert (tmp_path / "new" / "history.csv").read_text() == "kept"
@@ -187,8 +233,11 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
 
 @pytest.mark.parametrize(("size", "load"), [(0.08, 1e-8), (0.2, 1e-7)])
 def test_a_contact_smaller_than_the_mesh_can_see_stops_the_run(tmp_path, size, load):
-    """Pressed by less than the first contact point's gap: no force but round-off, no success, and a sentence."""
-    outcome = solve_scene(scene(size, steps=1, load={"displacement": load}), tmp_path, MPI.COMM_SELF)
+    """Pressed by less than the first contact point's gap: no force but round-off, no success, and a
+    sentence."""
+    outcome = solve_scene(
+        scene(size, steps=1, load={"displacement": load}), tmp_path, MPI.COMM_SELF
+    )
     assert outcome.status == "stopped"
     assert "no contact point was ever pressed" in outcome.message
     assert "the contact is smaller than the mesh can see" in outcome.message
@@ -199,18 +248,27 @@ def test_a_contact_that_reaches_the_end_of_the_arc_is_named(tmp_path):
     for load, said in ((2.0, False), (100.0, True)):
         thin = scene(0.2, 2, joint={"clearance": 0.001}, load={"displacement": load})
         outcome = solve_scene(thin, tmp_path, MPI.COMM_SELF)
-        assert any("contact reaches the end of the modelled quarter arc" in w for w in outcome.warnings) == said
+        assert (
+            any(
+                "contact reaches the end of the modelled quarter arc" in w for w in outcome.warnings
+            )
+            == said
+        )
 
 
-@pytest.mark.parametrize("load", [{"displacement": -0.5}, {"displacement": None, "relative_force": 0.0}])
+@pytest.mark.parametrize(
+    "load", [{"displacement": -0.5}, {"displacement": None, "relative_force": 0.0}]
+)
 def test_bodies_that_never_touch_are_named(tmp_path, load, capfd):
-    """Drawn apart, or not pressed at all: a warning in run.json and on the screen, and none of what is left of P,
-    round-off."""
+    """Drawn apart, or not pressed at all: a warning in run.json and on the screen, and none of what
+    is left of P, round-off."""
     scene_file, folder = tmp_path / "apart.toml", tmp_path / "run"
     scene_file.write_text(resolved(scene(0.3, 1, load=load)), encoding="utf-8")
     assert cli.run(["solve", str(scene_file), "-o", str(folder)]) == 0
     report = json.loads((folder / "run.json").read_text())
-    assert max(report["error_estimates"][name] for name in ("force_balance", "newton_residual")) < 1e-8
+    assert (
+        max(report["error_estimates"][name] for name in ("force_balance", "newton_residual")) < 1e-8
+    )
     (warning,) = report["warnings"]
     assert warning.startswith("the bodies never touched: ")
     assert f"archord: warning: {warning}." in capfd.readouterr().err
@@ -220,15 +278,20 @@ def test_bodies_that_touch_after_all_are_not_said_to_be_apart(tmp_path):
     """A run that is extended loses the warning."""
     for load, start, apart in (([-0.5], None, True), ([-0.5, 1.0], plan_restart, False)):
         pulled = scene(0.3, 1, load={"displacement": load})
-        outcome = solve_scene(pulled, tmp_path, MPI.COMM_SELF, start=start and start(tmp_path, pulled).start)
+        outcome = solve_scene(
+            pulled, tmp_path, MPI.COMM_SELF, start=start and start(tmp_path, pulled).start
+        )
         assert any("never touched" in w for w in outcome.warnings) == apart
 
 
 def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
-    """Where the run says nothing, P of a rigid pin is within 3 % of that on elements half as long."""
+    """Where the run says nothing, P of a rigid pin is within 3 % of that on elements half as
+    long."""
     force, said = [], []
     for size in (0.16, 0.08, 0.04, 0.02):
-        thin = scene(size, 1, joint={"clearance": 1e-6}, pin={"rigid": True}, block={"E": 0.91, "nu": 0.3})
+        thin = scene(
+            size, 1, joint={"clearance": 1e-6}, pin={"rigid": True}, block={"E": 0.91, "nu": 0.3}
+        )
         outcome = solve_scene(thin, tmp_path, MPI.COMM_SELF)
         force.append(outcome.steps[-1].P)
         said.append(any("too long for the clearance" in w for w in outcome.warnings))
@@ -239,15 +302,17 @@ def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
 
 
 def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path):
-    """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's work any more.
-    Another error is raised."""
+    """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's
+    work any more. Another error is raised."""
     half, tried = tmp_path / "libffcx_forms_0.c", []
     half.touch()
 
     def make():
         tried.append(half.exists())
         if half.exists():
-            raise TimeoutError(f"JIT compilation timed out, probably ... (e.g. remove {half}) or increase timeout.")
+            raise TimeoutError(
+                f"JIT compilation timed out, probably ... (e.g. remove {half}) or increase timeout."
+            )
         return "made"
 
     with pytest.raises(TimeoutError, match="timed out"):

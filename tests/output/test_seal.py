@@ -64,15 +64,24 @@ def _edit_the_scene(run: Path) -> None:
 DAMAGES = [
     (_cut_at_a_row, "history.csv: has 2 of the 6 steps of run.json: it was cut short"),
     (_cut_within_a_row, "history.csv: has 5 of the 6 steps of run.json: it was cut short"),
-    (lambda run: (run / "history.csv").write_text(""), "history.csv: cannot be read as the history of a run"),
+    (
+        lambda run: (run / "history.csv").write_text(""),
+        "history.csv: cannot be read as the history of a run",
+    ),
     (lambda run: (run / "history.csv").unlink(), "is not a run folder: history.csv is missing"),
     (_edit_a_number, _BY_SIZE),
     (_drop_a_column, "history.csv: cannot be read as the history of a run"),
     (_flip_a_bit("history.csv"), "history.csv: "),
     (_edit_the_scene, f"scene.toml: {_BY_SUM}"),
     (_flip_a_bit("run.json"), "run.json: cannot be read as the report of a run"),
-    (lambda run: (run / "run.json").write_text("[" * 100_000), "run.json: cannot be read as the report of a run"),
-    (lambda run: os.truncate(run / "run.json", 900), "run.json: cannot be read as the report of a run"),
+    (
+        lambda run: (run / "run.json").write_text("[" * 100_000),
+        "run.json: cannot be read as the report of a run",
+    ),
+    (
+        lambda run: os.truncate(run / "run.json", 900),
+        "run.json: cannot be read as the report of a run",
+    ),
 ]
 
 
@@ -82,18 +91,24 @@ def test_every_reader_notices_a_changed_table(runs, tmp_path, refused, damage, s
     copy = shutil.copytree(runs["coarse"], tmp_path / "run")
     damage(copy)
     readers = [["show"], ["fit"], ["picture"], ["export", "--csv", str(tmp_path / "x")]]
-    readers += [["compare", str(runs["elastic"])], ["probe", "--edge", "hole", "--quantity", "pressure"]]
+    readers += [
+        ["compare", str(runs["elastic"])],
+        ["probe", "--edge", "hole", "--quantity", "pressure"],
+    ]
     for reader, *options in readers:
         assert said in refused([reader, *options, str(copy)])
 
 
 @pytest.mark.parametrize("name", ["contact.h5", "fields.h5", "fields/0000.h5", "fields/0006.h5"])
 def test_every_reader_notices_changed_fields(runs, tmp_path, name):
-    """A flipped bit within a number is no number of the run; what does not need the file can still be read."""
+    """A flipped bit within a number is no number of the run; what does not need the file can still
+    be read."""
     copy = shutil.copytree(runs["coarse"], tmp_path / "run")
     _flip_a_bit(name)(copy)
     read = Run(copy)
-    with pytest.raises(InputError, match=rf"{name}: {_BY_SUM}: its sha256 .*solves the run again\."):
+    with pytest.raises(
+        InputError, match=rf"{name}: {_BY_SUM}: its sha256 .*solves the run again\."
+    ):
         read.contact() if name == "contact.h5" else read.fields()
     assert read.fields(3) if name in ("contact.h5", "fields/0006.h5") else read.contact()
     with pytest.raises(InputError, match=rf"{name}: {_BY_SUM}"):
@@ -121,7 +136,8 @@ def test_a_restart_writes_changed_tables_again(runs, tmp_path):
 
 
 def test_a_run_without_seals_is_compared_with_its_report(runs, tmp_path):
-    """As those of earlier versions and of kills are: one row more may be there, another number not."""
+    """As those of earlier versions and of kills are: one row more may be there, another number
+    not."""
     copy = shutil.copytree(runs["coarse"], tmp_path / "run")
     report = read_report(copy / "run.json")
     rewrite_report(copy, files={}, status="running", steps=report["steps"][:-1])
@@ -134,5 +150,7 @@ def test_a_run_without_seals_is_compared_with_its_report(runs, tmp_path):
     cells = rows[1].split(",")
     cells[_names(heading).index("P")] = "0.5"
     (copy / "history.csv").write_text("".join([heading, rows[0], ",".join(cells), *rows[2:]]))
-    with pytest.raises(InputError, match=r"has P = 0\.5 at step 2, run\.json .*: one of the two was changed; "):
+    with pytest.raises(
+        InputError, match=r"has P = 0\.5 at step 2, run\.json .*: one of the two was changed; "
+    ):
         Run(copy)

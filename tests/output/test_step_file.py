@@ -1,4 +1,5 @@
-"""Files that grow step by step: kept and continued; a full disk costs at most the step in progress."""
+"""Files that grow step by step: kept and continued; a full disk costs at most the step in
+progress."""
 
 import errno
 import os
@@ -44,7 +45,8 @@ def holds(path, steps: int) -> None:
 
 @contextmanager
 def file_size_limit(size: int):
-    """No file may grow beyond ``size``, as on a disk that is full (EFBIG in the place of ENOSPC)."""
+    """No file may grow beyond ``size``, as on a disk that is full (EFBIG in the place of
+    ENOSPC)."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
     try:
@@ -91,7 +93,8 @@ def test_a_file_of_version_0_1_goes_on(tmp_path):
 
 
 def test_what_is_written_grows_with_the_steps(file, apart):
-    """XDMF finds every array; the file of a step that lies apart never changes again, and readers see whole files."""
+    """XDMF finds every array; the file of a step that lies apart never changes again, and readers
+    see whole files."""
     file.write(0.1, values(1))
     with h5py.File(file.path) as reader:
         file.write(0.1 * 2, values(2))
@@ -121,8 +124,14 @@ def two_steps(path, fixed) -> None:
         (lambda path: path.write_bytes(b"text"), "is missing or damaged"),
         (lambda path: os.truncate(path.parent / "x" / "0001.h5", 3000), "is missing or damaged"),
         (lambda path: (path.parent / "x" / "0001.h5").unlink(), "is missing or damaged"),
-        (lambda path: two_steps(path, FIXED | {"mesh/tag": np.arange(6)}), "does not hold the first 2 steps"),
-        (lambda path: StepFile(path, FIXED).write(0.1, values(1)), "does not hold the first 2 steps"),
+        (
+            lambda path: two_steps(path, FIXED | {"mesh/tag": np.arange(6)}),
+            "does not hold the first 2 steps",
+        ),
+        (
+            lambda path: StepFile(path, FIXED).write(0.1, values(1)),
+            "does not hold the first 2 steps",
+        ),
     ],
 )
 def test_a_file_that_cannot_go_on_is_refused(tmp_path, damage, said):
@@ -135,7 +144,8 @@ def test_a_file_that_cannot_go_on_is_refused(tmp_path, damage, said):
 
 
 def test_a_file_that_cannot_be_replaced_stays(tmp_path, file):
-    """The old content, no half successor, and an error that names the file; the same for a file that grows."""
+    """The old content, no half successor, and an error that names the file; the same for a file
+    that grows."""
     path = tmp_path / "x.txt"
     replace_file(path, "old")
     with file_size_limit(10), pytest.raises(OSError, match=r"x\.txt") as error:
@@ -170,16 +180,21 @@ def sizes(tmp_path_factory):
     assert solve_scene(PROBLEM, folder, MPI.COMM_SELF).status == "done"
     assert accepted_steps(folder) == 4
     assert len(list(folder.rglob("*.*"))) == 13
-    files = sorted((path for path in folder.rglob("*") if path.is_file()), key=lambda path: path.stat().st_size)
+    files = sorted(
+        (path for path in folder.rglob("*") if path.is_file()), key=lambda path: path.stat().st_size
+    )
     return {f"{path.relative_to(folder)}": path.stat().st_size for path in files}
 
 
 @pytest.mark.parametrize("place", range(13))
 def test_a_full_disk_stops_the_run_and_keeps_its_steps(tmp_path, sizes, place, monkeypatch):
-    """One byte too few for each of the files in turn: stopped with a sentence, all that is there opens."""
+    """One byte too few for each of the files in turn: stopped with a sentence, all that is there
+    opens."""
     if (
         place < 12
-    ):  # fields.vtkhdf, the last one, has its length from the beginning: others would have their turn behind it
+        # fields.vtkhdf, the last one, has its length from the beginning: others would have their turn
+        # behind it
+    ):
         monkeypatch.setattr("archord.output.fields.VtkHdf.write", lambda *_: None)
     with file_size_limit(list(sizes.values())[place] - 1):
         outcome = solve_scene(PROBLEM, tmp_path, MPI.COMM_SELF)
@@ -199,6 +214,8 @@ def test_an_error_of_rank_0_is_raised_on_every_rank(comm):
     def fails():
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "run/fields.h5")
 
-    with pytest.raises(WriteError, match=r"^run/fields\.h5 cannot be written: No space left on device$"):
+    with pytest.raises(
+        WriteError, match=r"^run/fields\.h5 cannot be written: No space left on device$"
+    ):
         agreed(comm, fails)
     assert agreed(comm, lambda: 7) == 7

@@ -1,4 +1,5 @@
-"""Files that a user names: the old one stays until the new one is whole, and whatever can be written to is."""
+"""Files that a user names: the old one stays until the new one is whole, and whatever can be
+written to is."""
 
 from __future__ import annotations
 
@@ -89,7 +90,8 @@ def test_what_fails_half_way_leaves_the_old_file(tmp_path):
 
 
 def test_links_and_permissions_stay(tmp_path):
-    """A link goes on pointing to its file, which keeps who may read it; a new file gets what the user's are given."""
+    """A link goes on pointing to its file, which keeps who may read it; a new file gets what the
+    user's are given."""
     real, link, fresh = (tmp_path / name for name in ("real.txt", "link.txt", "fresh.txt"))
     real.write_text("old")
     real.chmod(0o640)
@@ -142,13 +144,21 @@ def test_a_full_device_is_told(tmp_path):
 
 
 def test_nothing_that_users_name_is_written_in_place():
-    """What commands, exports and pictures write, they write to the ``new`` that `writing` and `replacing` give."""
+    """What commands, exports and pictures write, they write to the ``new`` that `writing` and
+    `replacing` give."""
     tables = {"postprocess/laws/general/law_fit.py"}  # of this checkout, not of a user
-    writes = re.compile(r"(\w+)\.write_(?:text|bytes)\(|to_csv\((\w+)|\bsave\((?:figure|canvas), (\w+)")
+    writes = re.compile(
+        r"(\w+)\.write_(?:text|bytes)\(|to_csv\((\w+)|\bsave\((?:figure|canvas), (\w+)"
+    )
     for room in ("archord", "postprocess", "report", "benchmarks/paper"):
         for file in sorted((ROOT / room).rglob("*.py")):
             name = str(file.relative_to(ROOT))
             if name in tables or file.relative_to(ROOT).parts[1] in os.listdir(ROOT):
                 continue
-            found = {name for names in writes.findall(file.read_text(encoding="utf-8")) for name in names if name}
+            found = {
+                name
+                for names in writes.findall(file.read_text(encoding="utf-8"))
+                for name in names
+                if name
+            }
             assert found <= {"new"}, name

@@ -1,4 +1,5 @@
-"""fields.vtkhdf, read by VTK's own reader: every step, on the curves and with the values of the run."""
+"""fields.vtkhdf, read by VTK's own reader: every step, on the curves and with the values of the
+run."""
 
 import os
 
@@ -18,12 +19,17 @@ from tests.output.vtk_reader import VtkFile, only
 from tests.solver.solving import scene
 
 X = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.6, 0.6], [0, 0.5]])
-GRID = Grid(np.pad(X, ((0, 0), (0, 1))), [(LAGRANGE[3], np.arange(6)[None]), (VERTEX, np.array([[4]]))])
+GRID = Grid(
+    np.pad(X, ((0, 0), (0, 1))), [(LAGRANGE[3], np.arange(6)[None]), (VERTEX, np.array([[4]]))]
+)
 
 
 def values(step: int) -> dict[str, np.ndarray]:
     random = np.random.default_rng(step)
-    return {"PointData/u": random.normal(size=(6, 3)), "CellData/stress": random.normal(size=(2, 6))}
+    return {
+        "PointData/u": random.normal(size=(6, 3)),
+        "CellData/stress": random.normal(size=(2, 6)),
+    }
 
 
 def holds(path, at: list[float], steps: list[int]) -> None:
@@ -38,8 +44,8 @@ def holds(path, at: list[float], steps: list[int]) -> None:
 
 
 def test_steps_are_kept_and_continued(tmp_path):
-    """With room to spare, after fewer steps than are there, with more or too little room; the length is that of it all
-    from the first step on, on a disk that holds little of it."""
+    """With room to spare, after fewer steps than are there, with more or too little room; the
+    length is that of it all from the first step on, on a disk that holds little of it."""
     path, loads = tmp_path / "x.vtkhdf", [0.1, 0.2, 0.3, 0.4]
     file = VtkHdf(path, GRID, 5000)
     for k in (1, 2, 3):
@@ -58,7 +64,8 @@ def test_steps_are_kept_and_continued(tmp_path):
 
 @pytest.mark.parametrize("total", [3, 3000])
 def test_a_step_counts_by_one_write_within_a_page(tmp_path, total, monkeypatch):
-    """Cut off after any of its writes, the file holds the steps before; after the last one this step."""
+    """Cut off after any of its writes, the file holds the steps before; after the last one this
+    step."""
     path, put, written = tmp_path / "x.vtkhdf", vtkhdf._put, []
     file = VtkHdf(path, GRID, total)
     file.write([0.5], values(1))
@@ -84,7 +91,10 @@ def test_a_full_disk_costs_the_step_in_progress(tmp_path):
     assert not list(tmp_path.iterdir())
     file = VtkHdf(path, GRID, 2)
     file.write([0.1], values(1))
-    with file_size_limit(file._places["PointData/u"] + 200), pytest.raises(OSError, match=r"x\.vtkhdf"):
+    with (
+        file_size_limit(file._places["PointData/u"] + 200),
+        pytest.raises(OSError, match=r"x\.vtkhdf"),
+    ):
         file.write([0.1, 0.2], values(2))
     holds(path, [0.1], [1])
 
@@ -94,8 +104,14 @@ def test_a_full_disk_costs_the_step_in_progress(tmp_path):
     [
         (lambda path: path.unlink(), "is missing or damaged"),
         (lambda path: os.truncate(path, 3000), "is missing or damaged"),
-        (lambda path: VtkHdf(path, GRID, 1).write([0.1], values(1)), "does not hold the first 2 steps"),
-        (lambda path: VtkHdf(path, Grid(X, GRID.cells[:1]), 2).write([1], values(1)), "does not hold the first 2"),
+        (
+            lambda path: VtkHdf(path, GRID, 1).write([0.1], values(1)),
+            "does not hold the first 2 steps",
+        ),
+        (
+            lambda path: VtkHdf(path, Grid(X, GRID.cells[:1]), 2).write([1], values(1)),
+            "does not hold the first 2",
+        ),
     ],
 )
 def test_a_file_that_cannot_go_on_is_refused(tmp_path, damage, said):
@@ -122,14 +138,20 @@ def run(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(f"degree{request.param}")
     load = {"displacement": None, "relative_force": [0.002, 0.004], "steps": 1}
     joint = scene(
-        0.25, 2, yield_stress=0.002, analysis={"degree": request.param}, load=load, output={"fields": "points"}
+        0.25,
+        2,
+        yield_stress=0.002,
+        analysis={"degree": request.param},
+        load=load,
+        output={"fields": "points"},
     )
     assert solve_scene(joint, folder, MPI.COMM_SELF).status == "done"
     return Run(folder)
 
 
 def test_bodies_are_lagrange_cells_of_the_displacements_degree(run):
-    """Every step at its delta, though the load is a force; curved areas, and the values of fields.h5."""
+    """Every step at its delta, though the load is a force; curved areas, and the values of
+    fields.h5."""
     file, degree = VtkFile(run.folder / "fields.vtkhdf"), run.scene.analysis.degree
     assert file.times == pytest.approx(run.columns["delta"], rel=1e-12)
     grid, fields = file.at(2), run.fields(2)
@@ -141,13 +163,23 @@ def test_bodies_are_lagrange_cells_of_the_displacements_degree(run):
         np.testing.assert_array_equal(bodies.cell_data[name], getattr(fields, name))
     first = bodies.cell_connectivity.reshape(bodies.n_cells, -1)[:, :3]
     vertices = fields.cells[:, :3]
-    np.testing.assert_allclose(bodies.points[first][..., :2], fields.coordinates[vertices], atol=1e-15)
-    np.testing.assert_allclose(bodies["displacement"][first][..., :2], fields.displacement[vertices], atol=1e-15)
+    np.testing.assert_allclose(
+        bodies.points[first][..., :2], fields.coordinates[vertices], atol=1e-15
+    )
+    np.testing.assert_allclose(
+        bodies["displacement"][first][..., :2], fields.displacement[vertices], atol=1e-15
+    )
     for name, values in (("stress", fields.stress), ("plastic_strain", fields.plastic_strain)):
-        np.testing.assert_allclose(bodies.point_data[name][first][..., :4], values[vertices], atol=1e-15)
+        np.testing.assert_allclose(
+            bodies.point_data[name][first][..., :4], values[vertices], atol=1e-15
+        )
         assert not bodies.point_data[name][:, 4:].any()
-    np.testing.assert_allclose(bodies.point_data["peeq"][first], fields.peeq_nodal[vertices], atol=1e-15)
-    pin = bodies.extract_cells(np.flatnonzero(fields.body == 1)).extract_surface(nonlinear_subdivision=3)
+    np.testing.assert_allclose(
+        bodies.point_data["peeq"][first], fields.peeq_nodal[vertices], atol=1e-15
+    )
+    pin = bodies.extract_cells(np.flatnonzero(fields.body == 1)).extract_surface(
+        nonlinear_subdivision=3
+    )
     area = pin.triangulate().compute_cell_sizes()["Area"].sum()
     assert area == pytest.approx(np.pi / 4, rel=3e-3 if degree == 2 else 1e-3)
     on_hole = np.abs(np.hypot(*bodies.points[:, :2].T) - 1 - run.scene.joint.dR) < 1e-6
@@ -155,7 +187,8 @@ def test_bodies_are_lagrange_cells_of_the_displacements_degree(run):
 
 
 def test_contact_pressure_is_a_field_on_the_edge(run):
-    """Lines along the facets have the mean pressures, which add up to the force; so do the values of the nodes."""
+    """Lines along the facets have the mean pressures, which add up to the force; so do the values
+    of the nodes."""
     grid = VtkFile(run.folder / "fields.vtkhdf").at(2)
     lines, degree = only(grid, 1), run.scene.analysis.degree
     x = lines.points[lines.cell_connectivity.reshape(lines.n_cells, degree + 1)][..., :2]
@@ -192,12 +225,23 @@ def test_keys_of_older_scenes_mean_the_same():
     def level(**output):
         return scene(0.25, 1, output=output).output.fields
 
-    assert [level(), level(fields=True), level(fields=False), level(stress=True)] == ["cells", "cells", False, "nodes"]
-    assert [level(points=True), level(stress=False, points=False, fields=True)] == ["points", "cells"]
-    with pytest.raises(archord.InputError, match=r"output\.stress = true is not a known key; .*fields"):
+    assert [level(), level(fields=True), level(fields=False), level(stress=True)] == [
+        "cells",
+        "cells",
+        False,
+        "nodes",
+    ]
+    assert [level(points=True), level(stress=False, points=False, fields=True)] == [
+        "points",
+        "cells",
+    ]
+    with pytest.raises(
+        archord.InputError, match=r"output\.stress = true is not a known key; .*fields"
+    ):
         level(fields="cells", stress=True)
     with pytest.raises(
-        archord.InputError, match=r"output\.fields = \"all\" must be false, 'cells', 'nodes' or 'points'"
+        archord.InputError,
+        match=r"output\.fields = \"all\" must be false, 'cells', 'nodes' or 'points'",
     ):
         level(fields="all")
 
@@ -205,11 +249,21 @@ def test_keys_of_older_scenes_mean_the_same():
 @pytest.mark.mpi
 def test_the_file_does_not_depend_on_the_ranks(comm, tmp_path_factory):
     """Grid and values of a run on all ranks and on one."""
-    folders = [comm.bcast(tmp_path_factory.mktemp("run") if comm.rank == 0 else None) for _ in range(2)]
+    folders = [
+        comm.bcast(tmp_path_factory.mktemp("run") if comm.rank == 0 else None) for _ in range(2)
+    ]
     for folder, c in zip(folders, (comm, MPI.COMM_SELF), strict=True):
         if c == comm or comm.rank == 0:
             solve_scene(scene(0.25, 1, output={"fields": "points"}), folder, c)
     if comm.rank == 0:
         whole, alone = (h5py.File(folder / "fields.vtkhdf")["VTKHDF"] for folder in folders)
-        for name in ("Points", "Connectivity", "Types", "PointData/contact_pressure", "CellData/stress"):
-            np.testing.assert_allclose(whole[name], alone[name], atol=1e-9 * np.abs(alone[name]).max())
+        for name in (
+            "Points",
+            "Connectivity",
+            "Types",
+            "PointData/contact_pressure",
+            "CellData/stress",
+        ):
+            np.testing.assert_allclose(
+                whole[name], alone[name], atol=1e-9 * np.abs(alone[name]).max()
+            )

@@ -18,10 +18,14 @@ class VtkFile:
         self._reader.SetFileName(str(path))
         assert self._reader.CanReadFile(str(path))
         self._reader.UpdateInformation()
-        known = self._reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+        known = self._reader.GetOutputInformation(0).Get(
+            vtkStreamingDemandDrivenPipeline.TIME_STEPS()
+        )
         with h5py.File(path) as file:
             self.times = file["VTKHDF/Steps/Values"][()].tolist()
-        assert known == (tuple(self.times) if len(self.times) > 1 else None)  # to VTK, one step is no time
+        assert known == (
+            tuple(self.times) if len(self.times) > 1 else None
+        )  # to VTK, one step is no time
 
     def at(self, step: int) -> pyvista.UnstructuredGrid:
         """The grid at ``step``, from 1."""

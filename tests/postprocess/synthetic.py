@@ -12,8 +12,22 @@ from archord.postprocess.laws.general.joint import LawJoint
 LOADS = np.linspace(0.1, 2.0, 20)
 
 
-def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed=0, h=0.05, name="run", analysis=None):
-    """Steps of a joint of radius ``R`` and E* = ``modulus``; ``dR`` and ``sigY`` are relative to these.
+def curve(
+    k,
+    c=None,
+    *,
+    dR=0.005,
+    sigY=None,
+    R=1.0,
+    modulus=1.0,
+    noise=0.0,
+    seed=0,
+    h=0.05,
+    name="run",
+    analysis=None,
+):
+    """Steps of a joint of radius ``R`` and E* = ``modulus``; ``dR`` and ``sigY`` are relative to
+    these.
 
     ``noise`` is the standard deviation of P/(E* dR) and of p0 R/(E* dR).
     """
@@ -22,7 +36,9 @@ def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed
     scene = paper_joint(joint=joint, pin=material, block=material, analysis=analysis or {})
     E_star, gap = scene.E_star, dR * R
     delta = LOADS * gap
-    law = LawJoint(R, gap, E_star, block_yield=sigY * modulus if c and sigY else None, k=k, c=c or 1.0)
+    law = LawJoint(
+        R, gap, E_star, block_yield=sigY * modulus if c and sigY else None, k=k, c=c or 1.0
+    )
     state, peeq = plastic_winkler(law, delta), np.maximum(delta - law.first_yield, 0.0)
     random = np.random.default_rng(seed)
     P = state.load + noise * E_star * gap * random.standard_normal(len(delta))

@@ -4,14 +4,19 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
+from archord.postprocess.chord import (
+    arc_angle,
+    chord_coordinate,
+    chord_projection,
+    read_chord_pressure,
+)
 from archord.postprocess.run import Run
 
 
 @pytest.mark.parametrize("eps", [0.01, 0.5, 1.2, np.pi / 2])
 def test_the_chord_integral_is_the_arc_integral(eps):
-    """2 int_0^l py dx over the straight chord, py from eq. 15 at the angle found for x, equals 2 int p cos(phi) R dphi
-    to 1e-8."""
+    """2 int_0^l py dx over the straight chord, py from eq. 15 at the angle found for x, equals 2
+    int p cos(phi) R dphi to 1e-8."""
     R = 3.0
 
     def p(phi):
@@ -27,8 +32,8 @@ def test_the_chord_integral_is_the_arc_integral(eps):
 
 
 def test_the_projection_is_along_the_radius():
-    """The point of the chord at x lies on the ray at phi: the chord leaves the deepest point at eps/2 to the
-    horizontal."""
+    """The point of the chord at x lies on the ray at phi: the chord leaves the deepest point at
+    eps/2 to the horizontal."""
     R, eps = 2.0, 1.1
     phi = np.linspace(0, eps, 9)
     x = chord_coordinate(phi, eps, R)
@@ -42,8 +47,9 @@ def test_the_projection_is_along_the_radius():
 @pytest.mark.parametrize("degrees", [1, 30, 90])
 @pytest.mark.parametrize("start", [0.0, 0.3])
 def test_a_random_pressure_on_random_points_keeps_its_force(degrees, start):
-    """The default weights are the trapezoidal rule on the arc, also where the first point is past the axis; and the
-    trapezoidal rule over x, which knows nothing of weights, tends to it. Points with pressure beyond the edge stay."""
+    """The default weights are the trapezoidal rule on the arc, also where the first point is past
+    the axis; and the trapezoidal rule over x, which knows nothing of weights, tends to it. Points
+    with pressure beyond the edge stay."""
     random, eps = np.random.default_rng(degrees), np.radians(degrees)
     phi = np.sort(random.uniform(start * eps, eps, 30))
     pressure = random.uniform(0, 5, 30)
@@ -71,8 +77,9 @@ def test_an_arc_may_go_on_where_nothing_presses():
 
 @pytest.mark.parametrize("name", ["elastic", "plastic"])
 def test_a_runs_chord_carries_its_force(runs, name):
-    """Every step and side: chord = arc to 1e-8; the side's arc = P of history.csv to dR/R (undeformed arcs differ by
-    that), and so is the table of pressures; the mean of both sides is nearer than either where the joint is elastic."""
+    """Every step and side: chord = arc to 1e-8; the side's arc = P of history.csv to dR/R
+    (undeformed arcs differ by that), and so is the table of pressures; the mean of both sides is
+    nearer than either where the joint is elastic."""
     run = Run(runs[name])
     curve = run.curve
     for step in range(1, run.steps + 1):
@@ -81,7 +88,10 @@ def test_a_runs_chord_carries_its_force(runs, name):
             chord = read_chord_pressure(runs[name], step, side)
             force = 2 * (arc.weight * arc.pressure * np.cos(arc.angle)).sum()
             assert chord.resultant == pytest.approx(force, rel=1e-8)
-            assert pytest.approx({"pin": curve.R, "hole": curve.R + curve.dR}[side], rel=1e-14) == chord.R
+            assert (
+                pytest.approx({"pin": curve.R, "hole": curve.R + curve.dR}[side], rel=1e-14)
+                == chord.R
+            )
             assert chord.eps == curve.eps[step - 1]
             off[side] = chord.resultant / curve.P[step - 1] - 1
             table = run.pressure(step, side)
@@ -89,7 +99,9 @@ def test_a_runs_chord_carries_its_force(runs, name):
             assert in_table == pytest.approx(force, rel=1e-8)
         assert set(off) == {"pin", "hole"}
         assert max(map(abs, off.values())) < 2 * curve.dR / curve.R
-    np.testing.assert_array_equal(read_chord_pressure(runs[name]).py, chord.py)  # the hole in the last step
+    np.testing.assert_array_equal(
+        read_chord_pressure(runs[name]).py, chord.py
+    )  # the hole in the last step
     if name == "elastic":
         assert off["pin"] < 0 < off["hole"]
         assert abs(off["pin"] + off["hole"]) / 2 < 0.2 * max(map(abs, off.values()))

@@ -18,8 +18,12 @@ from tests.output.run_files import solved
 
 @pytest.fixture(scope="module")
 def more(tmp_path_factory):
-    """The joint of "coarse" 20 times as large and 1e5 times as stiff, with other steps, and pressed and let go."""
-    solid, joint = {"E": E * 1e5, "nu": 0.3}, {"radius": 20.0, "clearance": 0.1, "element_size": 3.0}
+    """The joint of "coarse" 20 times as large and 1e5 times as stiff, with other steps, and pressed
+    and let go."""
+    solid, joint = (
+        {"E": E * 1e5, "nu": 0.3},
+        {"radius": 20.0, "clearance": 0.1, "element_size": 3.0},
+    )
     scenes = {
         "scaled": paper_joint(0.15, 6, joint=joint, pin=solid, block=solid),
         "stepped": paper_joint(0.15, 4),
@@ -45,8 +49,11 @@ def test_a_run_does_not_differ_from_itself(runs, capsys):
     assert words.count("largest") == 3
 
 
-def test_the_same_joint_larger_and_stiffer_is_the_same_in_dimensionless_form(runs, more, tmp_path, capsys):
-    """R, dR and E* differ by factors: dimensionless curves do not. The command tells both, and draws them."""
+def test_the_same_joint_larger_and_stiffer_is_the_same_in_dimensionless_form(
+    runs, more, tmp_path, capsys
+):
+    """R, dR and E* differ by factors: dimensionless curves do not. The command tells both, and
+    draws them."""
     comparison = compare_runs([Run(runs["coarse"]), Run(more["scaled"])])
     assert comparison.labels["P"] == "P/(E* dR)"
     for name in comparison.values:
@@ -63,7 +70,10 @@ def test_the_same_joint_larger_and_stiffer_is_the_same_in_dimensionless_form(run
 
 def test_other_steps_are_interpolated(runs, more):
     """Exactly at common displacements, and to a percent and between the neighbours elsewhere."""
-    comparison, steps = compare_runs([Run(runs["coarse"]), Run(more["stepped"])]), Run(more["stepped"]).curve
+    comparison, steps = (
+        compare_runs([Run(runs["coarse"]), Run(more["stepped"])]),
+        Run(more["stepped"]).curve,
+    )
     assert not comparison.step_by_step
     at_step = np.isclose(comparison.load[:, None], steps.delta, rtol=1e-9).any(axis=1)
     np.testing.assert_array_equal(comparison.interpolated[1], ~at_step)
@@ -75,8 +85,8 @@ def test_other_steps_are_interpolated(runs, more):
 
 
 def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
-    """Against itself step by step; against another run up to where the pin first goes back, also if it later goes
-    further than before; runs that share no range of that are not compared."""
+    """Against itself step by step; against another run up to where the pin first goes back, also if
+    it later goes further than before; runs that share no range of that are not compared."""
     released, stepped = Run(more["released"]), Run(more["stepped"])
     assert len(compare_runs([released, released]).load) == 6
     for pair in ([stepped, released], [released, stepped]):
@@ -95,17 +105,22 @@ def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
 
 
 def test_nothing_has_no_relative_difference(runs):
-    """Round-off over round-off says nothing: no difference where both are nothing, none known where one is."""
+    """Round-off over round-off says nothing: no difference where both are nothing, none known where
+    one is."""
     values = np.array([[1e-14, 0.0, 1.0, 2.0], [-1e-14, 0.5, 1.1, 2.0]])
     changed = replace(compare_runs([Run(runs["coarse"])] * 2), values={"P": values})
     np.testing.assert_allclose(changed.relative("P")[1], [0, np.nan, 0.1, 0], atol=1e-12)
 
 
 def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
-    """Not by the force, which the load prescribes: three times the force moves a body three times as stiff as far."""
+    """Not by the force, which the load prescribes: three times the force moves a body three times
+    as stiff as far."""
     runs = []
     for name, modulus in (("soft", 70000.0), ("stiff", 210000.0)):
-        lug, steel = {"radius": 10.0, "clearance": 0.1, "width": 40.0, "element_size": 3.0}, {"E": modulus, "nu": 0.3}
+        lug, steel = (
+            {"radius": 10.0, "clearance": 0.1, "width": 40.0, "element_size": 3.0},
+            {"E": modulus, "nu": 0.3},
+        )
         load = {"force": modulus / 140, "steps": 2}
         scene = parse_any({"lug": lug, "pin": steel, "plate": steel, "load": load})
         runs.append(archord.solve(scene, tmp_path / name))
@@ -116,8 +131,8 @@ def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
 
 
 def test_joints_under_the_same_forces_are_compared_by_the_displacement(tmp_path):
-    """At the forces, step by step, unloading included: twice as stiff a joint goes as deep under twice the force. With
-    one that a displacement loads it is P over delta as ever."""
+    """At the forces, step by step, unloading included: twice as stiff a joint goes as deep under
+    twice the force. With one that a displacement loads it is P over delta as ever."""
     load = {"displacement": None, "relative_force": [0.004, 0.002], "steps": 2}
     stiff = {"E": 2 * E, "nu": 0.3}
     scenes = {"soft": paper_joint(0.2, load=load), "pressed": paper_joint(0.2, 8)}
@@ -129,4 +144,6 @@ def test_joints_under_the_same_forces_are_compared_by_the_displacement(tmp_path)
     assert found.labels["load"] == "P/(E* dR)"
     assert np.abs(found.relative("delta")).max() < 1e-6
     assert list(compare_runs([soft, pressed]).values) == ["P", "p0", "eps"]
-    assert command(["compare", str(soft.folder), str(same.folder), "-o", str(tmp_path / "x.png")]) == 0
+    assert (
+        command(["compare", str(soft.folder), str(same.folder), "-o", str(tmp_path / "x.png")]) == 0
+    )

@@ -9,7 +9,8 @@ from archord.postprocess.convergence import mesh_error, observed_order, richards
 @pytest.mark.parametrize("order", [0.3, 1.5, 2.0, 3.7])
 @pytest.mark.parametrize("sizes", [(1.0, 1.5, 2.25), (0.03, 0.05, 0.1)])
 def test_three_sizes_show_their_order(order, sizes):
-    """And `richardson` with it is the error of the finest; orders that no three meshes show are infinite."""
+    """And `richardson` with it is the error of the finest; orders that no three meshes show are
+    infinite."""
     first, second, third = (7 * h**order for h in sizes)
     found = observed_order(sizes, second - first, third - second)
     assert found == pytest.approx(order, rel=1e-9)
@@ -19,7 +20,8 @@ def test_three_sizes_show_their_order(order, sizes):
 
 @pytest.mark.parametrize("order", [1.5, 2.0, 3.0, 4.0])
 def test_estimates_of_a_known_order_are_cautious(order):
-    """Never below the error from order 1.5 on if there are three meshes; at most 5 times as large."""
+    """Never below the error from order 1.5 on if there are three meshes; at most 5 times as
+    large."""
     h = 1.5 ** -np.arange(3.0)
     curves = [[0.5, 2.0 * (1 + 0.1 * size**order)] for size in h]
     error = 0.1 * h[-1] ** order
@@ -37,8 +39,10 @@ def test_a_singular_corner_is_estimated_at_its_order(ratio):
 
 
 def test_errors_of_two_curves():
-    """Two meshes that happen to agree say no more than the two before. Steps are of first order: the error of the finer
-    curve is their difference, over the largest value."""
+    """Two meshes that happen to agree say no more than the two before. Steps are of first order:
+    the error of the finer curve is their difference, over the largest value."""
     assert mesh_error([[1.1], [1.0], [1.0]], 1.5) == pytest.approx(0.1 / 1.5**3 / 1.25)
     assert mesh_error([[0.0], [0.0]], 1.5) == 0
-    assert step_error(*([1 + 0.2 / m, -4 - 0.4 / m] for m in (4, 8))) == pytest.approx(0.4 / 8 / 4.05)
+    assert step_error(*([1 + 0.2 / m, -4 - 0.4 / m] for m in (4, 8))) == pytest.approx(
+        0.4 / 8 / 4.05
+    )

@@ -1,4 +1,5 @@
-"""The input deck, read back by a small parser of keyword blocks: what another solver is told of the joint."""
+"""The input deck, read back by a small parser of keyword blocks: what another solver is told of the
+joint."""
 
 from __future__ import annotations
 
@@ -40,9 +41,11 @@ def written_deck(data):
 
 
 def read(text):
-    """The deck's ``blocks`` (keyword, parameters, rows), ``nodes`` ``{label: (x, y)}``, ``elements`` ``{label: nodes}``
-    and their ``bodies``, node ``sets`` and ``surfaces``."""
-    found = SimpleNamespace(text=text, blocks=[], nodes={}, elements={}, bodies={}, sets={}, surfaces={})
+    """The deck's ``blocks`` (keyword, parameters, rows), ``nodes`` ``{label: (x, y)}``,
+    ``elements`` ``{label: nodes}`` and their ``bodies``, node ``sets`` and ``surfaces``."""
+    found = SimpleNamespace(
+        text=text, blocks=[], nodes={}, elements={}, bodies={}, sets={}, surfaces={}
+    )
     for line in text.splitlines():
         first, *words = (word.strip() for word in line.split(","))
         if line.startswith("*"):
@@ -68,8 +71,9 @@ def written():
 
 
 def test_counts(written):
-    """Two separate discs by Euler's formula: vertices - edges + faces = 1 each, and every node in some element. Every
-    condition of docs/theory.md has its edges, and no line more than CalculiX reads."""
+    """Two separate discs by Euler's formula: vertices - edges + faces = 1 each, and every node in
+    some element. Every condition of docs/theory.md has its edges, and no line more than CalculiX
+    reads."""
     elements = written.elements.values()
     assert {n for e in elements for n in e} == set(written.nodes)
     assert {len(e) for e in elements} == {6}
@@ -85,8 +89,9 @@ def test_counts(written):
 
 
 def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
-    """Positive corners' area each; with parabolic edges the bodies' exact areas to O(h^4). Node 4 is between 1 and 2, 5
-    between 2 and 3, 6 between 3 and 1: nearer to the middle than the arc's height."""
+    """Positive corners' area each; with parabolic edges the bodies' exact areas to O(h^4). Node 4
+    is between 1 and 2, 5 between 2 and 3, 6 between 3 and 1: nearer to the middle than the arc's
+    height."""
     x = np.array([[written.nodes[n] for n in element] for element in written.elements.values()])
     sides = np.roll(x[:, :3], -1, axis=1) - x[:, :3]
     assert (np.linalg.det(sides[:, :2]) > 0).all()
@@ -99,19 +104,26 @@ def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
 
 
 def test_surfaces_cover_the_arcs(written):
-    """Sides chain from the axis to the top without gap, over exactly the arc's nodes, on elements of their body. Arcs
-    lie on their circles to the digits that the format holds: the clearance is a small difference of large numbers."""
+    """Sides chain from the axis to the top without gap, over exactly the arc's nodes, on elements
+    of their body. Arcs lie on their circles to the digits that the format holds: the clearance is a
+    small difference of large numbers."""
     nodes = written.nodes
     for name, body, radius, centre in (("PIN", "PIN", 1.0, -DR), ("HOLE", "BLOCK", 1 + DR, 0.0)):
-        elements = [(written.elements[label], side) for label, side in written.surfaces[f"{name}_SURFACE"]]
+        elements = [
+            (written.elements[label], side) for label, side in written.surfaces[f"{name}_SURFACE"]
+        ]
         assert {written.bodies[label] for label, _ in written.surfaces[f"{name}_SURFACE"]} == {body}
         ends = [element[k % 3] for element, side in elements for k in (side - 1, side)]
         middle = [element[side + 2] for element, side in elements]
         assert {*ends, *middle} == written.sets[name]
         n = len(elements)
-        chords = sum(math.dist(nodes[a], nodes[b]) for a, b in zip(ends[::2], ends[1::2], strict=True))
+        chords = sum(
+            math.dist(nodes[a], nodes[b]) for a, b in zip(ends[::2], ends[1::2], strict=True)
+        )
         assert chords == pytest.approx(2 * n * radius * math.sin(math.pi / 4 / n), rel=1e-7)
-        assert sorted(nodes[n][0] for n in set(ends) if ends.count(n) == 1) == pytest.approx([0, radius], abs=1e-14)
+        assert sorted(nodes[n][0] for n in set(ends) if ends.count(n) == 1) == pytest.approx(
+            [0, radius], abs=1e-14
+        )
         for place in written.sets[name]:
             assert math.dist(nodes[place], (0, centre)) == pytest.approx(radius, rel=0, abs=2e-14)
 
@@ -120,8 +132,15 @@ def test_sets_lie_where_their_names_say(written):
     """Supports and loaded edge, on both bodies where both are cut."""
     nodes, sets = written.nodes, written.sets
     for name, height in (("PIN_TOP", -DR), ("BLOCK_HELD", 0.0)):
-        assert [nodes[n][1] for n in sets[name]] == pytest.approx([height] * len(sets[name]), abs=1e-14)
-    pin = {n for element, body in written.bodies.items() if body == "PIN" for n in written.elements[element]}
+        assert [nodes[n][1] for n in sets[name]] == pytest.approx(
+            [height] * len(sets[name]), abs=1e-14
+        )
+    pin = {
+        n
+        for element, body in written.bodies.items()
+        if body == "PIN"
+        for n in written.elements[element]
+    }
     assert sets["SYMMETRY"] & pin
     assert sets["SYMMETRY"] - pin
     assert sets["SYMMETRY"] == {n for n in nodes if abs(nodes[n][0]) < 1e-12}
@@ -132,26 +151,36 @@ def test_steps_push_the_pin_down_in_equal_parts(written):
     """One step each, the last at delta; reactions of pin and block in all of them."""
     first = next(i for i, block in enumerate(written.blocks) if block[0] == "*STEP")
     assert written.blocks[first - 1][2] == [
-        [*held, "0.0"] for held in (["SYMMETRY", "1", "1"], ["BLOCK_HELD", "1", "1"], ["BLOCK_HELD", "2", "2"])
+        [*held, "0.0"]
+        for held in (["SYMMETRY", "1", "1"], ["BLOCK_HELD", "1", "1"], ["BLOCK_HELD", "2", "2"])
     ]
     loads = [rows for keyword, _, rows in written.blocks[first:] if keyword == "*BOUNDARY"]
     assert [row[0][:3] for row in loads] == [["PIN_TOP", "2", "2"]] * STEPS
-    assert [float(row[0][3]) for row in loads] == pytest.approx([-2 * DR * k / STEPS for k in (1, 2, 3)])
-    printed = [parameters["NSET"] for keyword, parameters, _ in written.blocks if keyword == "*NODE PRINT"]
+    assert [float(row[0][3]) for row in loads] == pytest.approx(
+        [-2 * DR * k / STEPS for k in (1, 2, 3)]
+    )
+    printed = [
+        parameters["NSET"] for keyword, parameters, _ in written.blocks if keyword == "*NODE PRINT"
+    ]
     assert printed == ["SYMMETRY", "BLOCK_HELD", "PIN_TOP"] * STEPS
 
 
 @pytest.mark.parametrize(("plane", "family"), [("strain", "CPE"), ("stress", "CPS")])
 def test_materials_and_elements_of_the_plane(plane, family):
-    """Each body its own constants; a hardening curve with the slope H; an elastic body has no *PLASTIC."""
+    """Each body its own constants; a hardening curve with the slope H; an elastic body has no
+    *PLASTIC."""
     data = scene(None, block={"yield_stress": 0.003, "hardening": 0.1}, analysis={"plane": plane})
     found = written_deck(data).blocks
     assert {p["TYPE"] for keyword, p, _ in found if keyword == "*ELEMENT"} == {family + "6"}
     materials = ("*SOLID SECTION", "*PLASTIC", "*ELASTIC")
     sections, ((first, second),), elastic = (
-        [np.array(rows, float).tolist() for keyword, _, rows in found if keyword == name] for name in materials
+        [np.array(rows, float).tolist() for keyword, _, rows in found if keyword == name]
+        for name in materials
     )
-    assert sections == [[[1.0 if plane == "strain" else pytest.approx(0.1 * data.joint.h, rel=0.2)]]] * 2
+    assert (
+        sections
+        == [[[1.0 if plane == "strain" else pytest.approx(0.1 * data.joint.h, rel=0.2)]]] * 2
+    )
     assert first == [0.003, 0]
     assert (second[0] - first[0]) / second[1] == pytest.approx(0.1)
     assert elastic == [[[data.pin.E, 0.3]], [[data.block.E, 0.3]]]
@@ -165,7 +194,9 @@ def test_a_table_of_hardening_is_that_of_the_deck():
     pin, block = (np.array(rows, float) for keyword, _, rows in found if keyword == "*PLASTIC")
     assert pin.tolist() == [[0.002, 0], [0.003, 0.1]]
     peeq = np.linspace(0, 1, 10000)
-    assert np.interp(peeq, block[:, 1], block[:, 0]) == pytest.approx(data.block.law.stress(peeq), rel=1e-3)
+    assert np.interp(peeq, block[:, 1], block[:, 0]) == pytest.approx(
+        data.block.law.stress(peeq), rel=1e-3
+    )
 
 
 def test_friction_and_large_strain_are_told():
@@ -188,18 +219,29 @@ def test_a_rigid_pin_moves_as_a_whole():
     boundary = [row for keyword, _, rows in found.blocks if keyword == "*BOUNDARY" for row in rows]
     assert ["CONTACT_DISC", "1", "1", "0.0"] in boundary
     assert boundary[-1][:3] == ["CONTACT_DISC", "2", "2"]
-    ring = {n for e in found.elements if found.bodies[e] == "CONTACT_DISC" for n in found.elements[e]}
+    ring = {
+        n for e in found.elements if found.bodies[e] == "CONTACT_DISC" for n in found.elements[e]
+    }
     assert found.sets["CONTACT_DISC"] == ring
     radii = [math.dist(found.nodes[n], (0, -DR)) for n in ring]
     assert sorted({round(r, 12) for r in radii}) == [0.8, 0.9, 1.0]
 
 
 def press_fit(drawn):
-    """The deck of a pin in a sleeve, which interferes with its housing by 0.02: drawn so, or to be drawn so."""
-    joint = bushing(MPI.COMM_SELF, 10.0, [(10.05, 14.0), (13.98 if drawn else 14.0, 30.0)], 2.0, 0.5)
+    """The deck of a pin in a sleeve, which interferes with its housing by 0.02: drawn so, or to be
+    drawn so."""
+    joint = bushing(
+        MPI.COMM_SELF, 10.0, [(10.05, 14.0), (13.98 if drawn else 14.0, 30.0)], 2.0, 0.5
+    )
     bodies = [Body(name, Elastic(2e5, 0.3, "strain")) for name in ("pin", "sleeve 1", "housing")]
-    fit = Interaction("fit", ("sleeve 1 outside", "bore"), **{"overlap" if drawn else "interference": 0.02})
-    supports = [Support("held", "outer edge", 0), Support("held", "outer edge", 1), Support("axis", "axis", 1)]
+    fit = Interaction(
+        "fit", ("sleeve 1 outside", "bore"), **{"overlap" if drawn else "interference": 0.02}
+    )
+    supports = [
+        Support("held", "outer edge", 0),
+        Support("held", "outer edge", 1),
+        Support("axis", "axis", 1),
+    ]
     drives = [Drive("press", (0.0, 0.0, 100.0), "force")]
     problem = Problem(
         joint, bodies, [Interaction("inside", ("pin", "sleeve 1 inside")), fit],
@@ -212,11 +254,15 @@ def press_fit(drawn):
 
 
 def test_an_interference_is_drawn_and_what_floats_hangs_on_springs():
-    """Radii of the sleeve's outer nodes; springs in two directions for bodies that no support holds sideways. Half the
-    force on a node of its own, of which the nodes of the flat side are equals."""
+    """Radii of the sleeve's outer nodes; springs in two directions for bodies that no support holds
+    sideways. Half the force on a node of its own, of which the nodes of the flat side are
+    equals."""
     for drawn in (False, True):
         found, _ = press_fit(drawn)
-        radii = {name: [math.hypot(*found.nodes[n]) for n in found.sets[name]] for name in ("SLEEVE_1_OUTSIDE", "BORE")}
+        radii = {
+            name: [math.hypot(*found.nodes[n]) for n in found.sets[name]]
+            for name in ("SLEEVE_1_OUTSIDE", "BORE")
+        }
         apart = np.mean(radii["SLEEVE_1_OUTSIDE"]) - np.mean(radii["BORE"])
         assert apart == pytest.approx(0.02, rel=1e-3)
     springs = [p["ELSET"] for keyword, p, _ in found.blocks if keyword == "*SPRING"]
@@ -231,8 +277,8 @@ def test_an_interference_is_drawn_and_what_floats_hangs_on_springs():
 
 
 def test_nodal_forces_on_quadrilaterals():
-    """Those of bodies and reference points sum to half the forces on the whole although the middles of nine nodes are
-    gone, and are written where they vanish again, or they would stay."""
+    """Those of bodies and reference points sum to half the forces on the whole although the middles
+    of nine nodes are gone, and are written where they vanish again, or they would stay."""
 
     def build(gmsh):
         face = gmsh.model.occ.addRectangle(0, 0, 0, 4, 1)
@@ -253,7 +299,9 @@ def test_nodal_forces_on_quadrilaterals():
     found = read(deck(system, mesh, [1.0, 2.0]))
     assert {len(nodes) for nodes in found.elements.values()} == {8}
     assert sum(areas(mesh.x[mesh.elements["bar"]])) == pytest.approx(4)
-    first, last = (np.array(rows, float) for keyword, _, rows in found.blocks if keyword == "*CLOAD")
+    first, last = (
+        np.array(rows, float) for keyword, _, rows in found.blocks if keyword == "*CLOAD"
+    )
     assert [first[first[:, 1] == axis, 2].sum() for axis in (1, 2)] == pytest.approx([4.0, 1.5])
     assert last[:, :2].tolist() == first[:, :2].tolist()
     assert not last[:, 2].any()
@@ -268,13 +316,20 @@ def test_the_deck_does_not_depend_on_the_unit_of_length(unit):
     lengths = {"radius": 1.0, "clearance": DR, "element_size": 0.2, "block_size": W}
     scaled = scene(joint={key: unit * value for key, value in lengths.items()} | {"growth": 0.5})
     a, b = (written_deck(s) for s in (scene(), scaled))
-    np.testing.assert_allclose(np.array(list(b.nodes.values())) / unit, list(a.nodes.values()), rtol=0, atol=1e-12)
-    stiff, stiffer = (contact_stiffness(d.system.problem, d.mesh, d.system.problem.interactions[0]) for d in (a, b))
+    np.testing.assert_allclose(
+        np.array(list(b.nodes.values())) / unit, list(a.nodes.values()), rtol=0, atol=1e-12
+    )
+    stiff, stiffer = (
+        contact_stiffness(d.system.problem, d.mesh, d.system.problem.interactions[0])
+        for d in (a, b)
+    )
     assert stiffer * unit == pytest.approx(stiff)
     assert stiff == pytest.approx(2500)
 
 
-def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monkeypatch, capsys, refused):
+def test_the_command_writes_a_deck_and_nothing_over_what_is_there(
+    tmp_path, monkeypatch, capsys, refused
+):
     """Named after the scene, refused where one is, and never over an input of the command."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "joint.toml").write_text(resolved(paper_joint(0.3, pin={"rigid": True})))
@@ -282,9 +337,13 @@ def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monk
     assert capsys.readouterr() == ("joint.inp\n", "")
     text = (tmp_path / "joint.inp").read_text()
     assert (text.count("*STEP"), text.count("TYPE=CPE6"), text.count("TYPE=CPE8")) == (2, 1, 1)
-    assert refused(["export-deck", "joint.toml"]).startswith("joint.inp: is there already; choose another file")
+    assert refused(["export-deck", "joint.toml"]).startswith(
+        "joint.inp: is there already; choose another file"
+    )
     cyclic = ["--set=block.yield_stress=300", "--set=block.back_stresses=[[1000, 10]]", "--force"]
-    assert "the material of 'block' cannot be exported" in refused(["export-deck", "joint.toml", *cyclic])
+    assert "the material of 'block' cannot be exported" in refused(
+        ["export-deck", "joint.toml", *cyclic]
+    )
     (tmp_path / "path.csv").write_text("displacement\n0.01\n")
     with_path = [f"--set=load.{key}=none" for key in ("displacement", "displacement_absolute")] + [
         "--set=load.path=path.csv"

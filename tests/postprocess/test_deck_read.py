@@ -15,7 +15,8 @@ from archord.scene.shapes import general_joint
 STEEL = {"E": 210000.0, "nu": 0.3}
 SIZES = {"element_size": 1.5, "growth": 0.6}
 LUG = {
-    "lug": {"radius": 10.0, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0} | SIZES,
+    "lug": {"radius": 10.0, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    | SIZES,
     "pin": {"rigid": False} | STEEL,
     "plate": STEEL,
 }
@@ -23,7 +24,12 @@ LUG = {
 
 def joint():
     data = {
-        "joint": {"radius": 10.0, "clearance": 0.05, "relative_element_size": 0.15, "block_size": 60.0},
+        "joint": {
+            "radius": 10.0,
+            "clearance": 0.05,
+            "relative_element_size": 0.15,
+            "block_size": 60.0,
+        },
         "pin": STEEL,
         "block": STEEL,
         "load": {"displacement": 0.04, "steps": 2},
@@ -32,7 +38,14 @@ def joint():
 
 
 def lug():
-    shape = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    shape = {
+        "kind": "lug",
+        "radius": 9.9,
+        "clearance": 0.1,
+        "width": 40.0,
+        "edge_distance": 20.0,
+        "length": 60.0,
+    }
     data = {
         "mesh": {"shape": shape | SIZES},
         "body": [{"name": "pin"} | STEEL, {"name": "lug"} | STEEL],

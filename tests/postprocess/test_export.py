@@ -14,8 +14,9 @@ _QUADRATIC_TRIANGLE = 22  # VTK's number
 
 
 def test_vtk_reads_back_fields_and_contact(runs, tmp_path):
-    """pyvista finds every step at its delta: nodes, curved triangles, displacement, stress and PEEQ of fields.h5; and
-    lines along both arcs, which warped by their displacement are where contact.h5 has them."""
+    """pyvista finds every step at its delta: nodes, curved triangles, displacement, stress and PEEQ
+    of fields.h5; and lines along both arcs, which warped by their displacement are where contact.h5
+    has them."""
     run = Run(runs["plastic"])
     export_vtk(run, tmp_path)
     bodies, contact = (VtkFile(tmp_path / f"{name}.vtkhdf") for name in ("bodies", "contact"))
@@ -30,7 +31,8 @@ def test_vtk_reads_back_fields_and_contact(runs, tmp_path):
             for name in ("peeq", "von_mises", "mean_stress", "contact_pressure"):
                 np.testing.assert_array_equal(mesh[name], file[f"{name}/{step:04d}"][()])
     assert mesh["peeq"].max() > 0
-    # the curved quarters: the area of the pin is that of a quarter circle, which straight triangles miss by 1.7e-3
+    # the curved quarters: the area of the pin is that of a quarter circle, which straight triangles
+    # miss by 1.7e-3
     pin = mesh.threshold([1, 1], scalars="body").triangulate().compute_cell_sizes()["Area"].sum()
     assert pin == pytest.approx(np.pi / 4, rel=6e-4)
     for number, arc in enumerate(run.contact().values(), 1):
@@ -51,7 +53,9 @@ def test_csv_reads_back_the_tables(runs, tmp_path):
     assert contact.groupby("step").size().tolist() == [len(run.pressure())] * run.steps
     third = contact[contact["step"] == 3]
     np.testing.assert_allclose(third["delta [mm]"], run.columns["delta"][2], rtol=1e-12)
-    np.testing.assert_allclose(third["pressure [MPa]"], run.pressure(3)["pressure"], rtol=1e-11, atol=1e-300)
+    np.testing.assert_allclose(
+        third["pressure [MPa]"], run.pressure(3)["pressure"], rtol=1e-11, atol=1e-300
+    )
 
 
 def test_a_step_alone_and_nothing_overwritten_without_force(runs, tmp_path, capsys, refused):

@@ -1,4 +1,5 @@
-"""Margins of safety: closed forms by hand, the steps of a run by finite elements, and what is said of both."""
+"""Margins of safety: closed forms by hand, the steps of a run by finite elements, and what is said
+of both."""
 
 import math
 
@@ -33,7 +34,8 @@ def lug(load: dict, plate: dict, **sections) -> dict:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """A lug in plane stress, 5 mm thick, that is pulled twice and let go; and one that stays elastic."""
+    """A lug in plane stress, 5 mm thick, that is pulled twice and let go; and one that stays
+    elastic."""
     cycle = {"displacement": [0.4, 0.0, 0.45, 0.0], "steps": [10, 2, 2, 2]}
     thick = {"analysis": {"plane": "stress", "thickness": 5.0}}
     scenes = {
@@ -41,12 +43,15 @@ def runs(tmp_path_factory):
         "elastic": lug({"displacement": 0.1, "steps": 1}, {}),
         "pushed": lug({"displacement": -0.05, "steps": 1}, {"hardening": CURVE}),
     }
-    found = solved({name: parse_any(s) for name, s in scenes.items()}, tmp_path_factory.mktemp("runs"))
+    found = solved(
+        {name: parse_any(s) for name, s in scenes.items()}, tmp_path_factory.mktemp("runs")
+    )
     return {name: Run(folder) for name, folder in found.items()}
 
 
 def test_hand_formulas_are_those_of_the_sections():
-    """A plate of width 40 and edge distance 20 with a hole of 20.2 and a pin of 20, 5 thick, at 100 MPa."""
+    """A plate of width 40 and edge distance 20 with a hole of 20.2 and a pin of 20, 5 thick, at 100
+    MPa."""
     found = by_hand(LugShape(**SHAPE, edge_distance=20.0), 100.0, 5.0)
     assert found["net section"] == pytest.approx(100 * (40 - 20.2) * 5)
     assert found["bearing"] == pytest.approx(1.5 * 100 * 20 * 5)
@@ -58,11 +63,19 @@ def test_hand_formulas_are_those_of_the_sections():
 
 
 def test_strengths_are_those_of_the_tension_test_behind_the_curve():
-    """0.2 % proof and largest engineering stress; of metals with a plateau the yield strength; of named ones the listed
-    strengths."""
-    power = Body(name="lug", **STEEL, yield_stress=200.0, hardening={"offset": 0.002, "exponent": 0.2})
-    assert tensile_strength(power) == pytest.approx(200 / 0.002**0.2 * 0.2**0.2 * math.exp(-0.198), rel=0.01)
-    for name, proof, tensile in (("S355", 355, 470), ("CuSn12-C", 150, 300), ("Ti-6Al-4V", 827, 896)):
+    """0.2 % proof and largest engineering stress; of metals with a plateau the yield strength; of
+    named ones the listed strengths."""
+    power = Body(
+        name="lug", **STEEL, yield_stress=200.0, hardening={"offset": 0.002, "exponent": 0.2}
+    )
+    assert tensile_strength(power) == pytest.approx(
+        200 / 0.002**0.2 * 0.2**0.2 * math.exp(-0.198), rel=0.01
+    )
+    for name, proof, tensile in (
+        ("S355", 355, 470),
+        ("CuSn12-C", 150, 300),
+        ("Ti-6Al-4V", 827, 896),
+    ):
         metal = Body(name="lug", material=name)
         assert proof_strength(metal) == pytest.approx(proof, rel=1e-3)
         assert tensile_strength(metal) == pytest.approx(tensile, rel=2e-3)
@@ -77,7 +90,12 @@ def test_strengths_are_those_of_the_tension_test_behind_the_curve():
         ([10, 20, 30], [0.0, 0.01, 0.03], 0.0, (10.0, True)),
         ([10, 20, 30], [0.0, 0.01, 0.03], 0.05, (30.0, False)),
         ([10, 30, 0], [0.0, 0.01, 0.01], 0.05, (30.0, False)),  # let go: the largest, not the last
-        ([30, 0, 30, 0, 30], [0.01, 0.01, 0.02, 0.02, 0.03], 0.025, (30.0, True)),  # in a later cycle
+        (
+            [30, 0, 30, 0, 30],
+            [0.01, 0.01, 0.02, 0.02, 0.03],
+            0.025,
+            (30.0, True),
+        ),  # in a later cycle
         ([20, 0, 30], [0.01, 0.01, 0.03], 0.01, (20.0, True)),
         ([10, 20], [0.02, 0.03], 0.01, (5.0, True)),  # within the first step
         ([0, 10], [0.01, 0.02], 0.0, (0.0, True)),  # in a press fit
@@ -89,7 +107,8 @@ def test_the_force_at_a_plastic_strain_is_the_largest_reached(force, peeq, limit
 
 
 def test_margins_of_a_cycled_lug(runs):
-    """By finite elements from the largest force, though the last row has none; in the total force of 5 mm."""
+    """By finite elements from the largest force, though the last row has none; in the total force
+    of 5 mm."""
     run = runs["cycled"]
     largest = max(run.columns["pull force"])
     assert run.columns["pull force"][-1] == pytest.approx(0.0, abs=1e-6 * largest)
@@ -103,13 +122,16 @@ def test_margins_of_a_cycled_lug(runs):
     ultimate = checks["ultimate", "FE", "PEEQ of 0.1"]
     assert (ultimate.bound, ultimate.allowable) == (True, largest)
     assert ultimate.margin == pytest.approx(1 / 0.75 - 1)
-    first, limit = (checks["yield", "FE", name].allowable for name in ("first yield", "PEEQ of 0.01"))
+    first, limit = (
+        checks["yield", "FE", name].allowable for name in ("first yield", "PEEQ of 0.01")
+    )
     assert 0 < first < limit <= largest
     assert "> +0.333" in margin_text(found)
 
 
 def test_nothing_is_extrapolated(runs):
-    """Beyond the largest force that was solved there is no margin of a limit that was not reached."""
+    """Beyond the largest force that was solved there is no margin of a limit that was not
+    reached."""
     largest = max(runs["cycled"].columns["pull force"])
     found = margins(runs["cycled"], 2 * largest)
     assert [check.margin for check in found.checks if check.bound] == [None]
@@ -133,7 +155,9 @@ def test_the_command_prints_what_the_function_finds(runs, capsys):
     """From the folder; ``--help`` explains."""
     folder = str(runs["cycled"].folder)
     assert command(["margin", folder, "--load", "9000", "--factor", "1.5"]) == 0
-    assert capsys.readouterr().out == margin_text(margins(runs["cycled"], 9000.0, factor=1.5)) + "\n"
+    assert (
+        capsys.readouterr().out == margin_text(margins(runs["cycled"], 9000.0, factor=1.5)) + "\n"
+    )
     assert command(["margin", "--help"]) == 0
     assert "net section, bearing" in capsys.readouterr().out
 
@@ -153,7 +177,8 @@ def test_what_has_no_margin_is_refused(runs, capsys, name, asked, said):
 
 
 def test_plates_of_a_clevis_have_the_margins_of_lugs_under_their_share(tmp_path, capsys):
-    """The inner plate under P, and an outer plate under P/2: forces of both are told as those of the whole."""
+    """The inner plate under P, and an outer plate under P/2: forces of both are told as those of
+    the whole."""
     plates = {
         "inner": {"thickness": 5.0, "width": 40.0},
         "outer": {"thickness": 4.0, "width": 44.0, "edge_distance": 21.0},
@@ -176,7 +201,11 @@ def test_plates_of_a_clevis_have_the_margins_of_lugs_under_their_share(tmp_path,
         lug = margins(Run(folders[name]), 15000.0)
         assert (found.plate, found.unit, found.strengths) == (name, "N", lug.strengths)
         for check, expected in zip(found.checks, lug.checks, strict=True):
-            assert (check.kind, check.name, check.bound) == (expected.kind, expected.name, expected.bound)
+            assert (check.kind, check.name, check.bound) == (
+                expected.kind,
+                expected.name,
+                expected.bound,
+            )
             tolerance = 1e-12 if check.by == "hand" else 0.02  # the meshes differ
             assert check.allowable == pytest.approx(expected.allowable, rel=tolerance)
     clevis = str(folders["clevis"])
@@ -191,7 +220,12 @@ def test_plates_of_a_clevis_have_the_margins_of_lugs_under_their_share(tmp_path,
 
 def test_runs_of_other_problems_are_refused(tmp_path):
     shape = {"radius": 10.0, "relative_clearance": 0.01, "relative_element_size": 0.2}
-    joint = {"joint": shape, "pin": STEEL, "block": STEEL, "load": {"displacement": 0.2, "steps": 1}}
+    joint = {
+        "joint": shape,
+        "pin": STEEL,
+        "block": STEEL,
+        "load": {"displacement": 0.2, "steps": 1},
+    }
     run = Run(solved({"joint": parse_any(joint)}, tmp_path)["joint"])
     with pytest.raises(InputError, match=r"is no run of a \[lug\] or a \[clevis\]"):
         margins(run, 1.0)

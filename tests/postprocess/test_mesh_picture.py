@@ -10,11 +10,14 @@ from archord.scene.errors import InputError
 
 
 def ring(n=12, order=1):
-    """Two rings of radii 1 to 2 and 2 to 3 in one mesh that share no node; the middle one closed, "seam" on a line."""
+    """Two rings of radii 1 to 2 and 2 to 3 in one mesh that share no node; the middle one closed,
+    "seam" on a line."""
     angle = np.arange(n) * 2 * np.pi / n
     x = np.concatenate([r * np.stack([np.cos(angle), np.sin(angle)], axis=1) for r in (1, 2, 2, 3)])
     k, after = np.arange(n), (np.arange(n) + 1) % n
-    cells = np.concatenate([np.stack([k, after, k + n, after + n], axis=1) + shift for shift in (0, 2 * n)])
+    cells = np.concatenate(
+        [np.stack([k, after, k + n, after + n], axis=1) + shift for shift in (0, 2 * n)]
+    )
     sets = {"inner": np.arange(n), "outer": n + np.arange(n), "all": np.arange(2 * n)}
     facets = {"bore": cells[:n, :2], "half": cells[: n // 2, :2], "seam": cells[:1, [0, 2]]}
     made = PlaneMesh.of_sets(x, cells, sets, facets, {"east": np.array([0])})

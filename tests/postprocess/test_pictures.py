@@ -1,4 +1,5 @@
-"""Pictures of chosen steps, fields and edges; reports; and what is drawn where there is nothing to colour."""
+"""Pictures of chosen steps, fields and edges; reports; and what is drawn where there is nothing to
+colour."""
 
 import re
 import shutil
@@ -64,12 +65,15 @@ def test_the_scale_of_colours_has_the_fields_name_unit_and_range(unloaded, field
 
 
 @pytest.mark.parametrize(
-    ("stress", "said"), [(0.0, "0 everywhere"), (3.5, "3.5 everywhere"), (np.nan, "no finite number")]
+    ("stress", "said"),
+    [(0.0, "0 everywhere"), (3.5, "3.5 everywhere"), (np.nan, "no finite number")],
 )
 def test_a_field_without_a_range_is_told_and_not_coloured(unloaded, stress, said):
     """A body that is held all over has no stress: no scale that would end at nothing."""
     fields = unloaded.fields(2)
-    axes = _drawn(unloaded, replace(fields, von_mises=np.full(len(fields.cells), stress), peeq=None))
+    axes = _drawn(
+        unloaded, replace(fields, von_mises=np.full(len(fields.cells), stress), peeq=None)
+    )
     assert len(axes) == 1
     assert axes[0].texts[0].get_text() == f"von Mises stress [MPa]: {said}"
 
@@ -100,13 +104,16 @@ def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, 
     assert "has no field 'strain'; its fields are stress, " in refused(
         ["picture", str(unloaded.folder), "--field", "strain", *target]
     )
-    assert "has no edge 'rim'" in refused(["picture", str(unloaded.folder), "--edge", "rim", *target])
+    assert "has no edge 'rim'" in refused(
+        ["picture", str(unloaded.folder), "--edge", "rim", *target]
+    )
     assert "has no step 9" in refused(["picture", str(unloaded.folder), "--step", "9", *target])
     assert not (tmp_path / "no.png").exists()
 
 
 def test_show_cuts_no_word(unloaded):
-    """In a terminal of 80 characters every line fits, and what is said is what is said without one."""
+    """In a terminal of 80 characters every line fits, and what is said is what is said without
+    one."""
     wide, narrow = run_text(unloaded), run_text(unloaded, 80)
     assert " ... " not in wide
     assert max(map(len, narrow.splitlines())) <= 80
@@ -131,7 +138,9 @@ def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refus
         assert command(["report", str(folder), "-o", str(target), "--force"]) == 0
     assert not list(tmp_path.glob("*.new"))
     capsys.readouterr()
-    assert "cannot be written" in refused(["report", str(bare), "-o", str(tmp_path / "no" / "x.pdf")])
+    assert "cannot be written" in refused(
+        ["report", str(bare), "-o", str(tmp_path / "no" / "x.pdf")]
+    )
 
 
 def test_a_report_that_fails_keeps_the_old_one(unloaded, tmp_path, refused):
@@ -147,4 +156,6 @@ def test_a_report_that_fails_keeps_the_old_one(unloaded, tmp_path, refused):
 
 
 def test_the_command_is_a_public_function(unloaded, tmp_path):
-    assert archord.draw_run(unloaded, tmp_path / "a.png", steps=[1, 2], field="stress", edges=["hole"]).is_file()
+    assert archord.draw_run(
+        unloaded, tmp_path / "a.png", steps=[1, 2], field="stress", edges=["hole"]
+    ).is_file()

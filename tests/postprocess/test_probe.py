@@ -13,14 +13,22 @@ from archord.postprocess.export import export_csv, export_vtk
 from archord.postprocess.tables import run_text
 from tests.output.vtk_reader import VtkFile
 
-# Hoop stress at the hole's edge over P/(40 - 20): at 90 degrees and the largest, of two codes, one of them CalculiX
-# 2.20 (elements of order two), each refined until the digits stood.
+# Hoop stress at the hole's edge over P/(40 - 20): at 90 degrees and the largest, of two codes, one
+# of them CalculiX 2.20 (elements of order two), each refined until the digits stood.
 REFERENCE = {0.1: (3.424, 3.78), 0.3: (3.072, 3.190)}
 
 
 def solved(folder, size, displacement, analysis=None, lug=None, **shape):
-    """An elastic lug with a hole of radius 10, its half or whole, in as many steps as there are displacements."""
-    lug_shape = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    """An elastic lug with a hole of radius 10, its half or whole, in as many steps as there are
+    displacements."""
+    lug_shape = {
+        "kind": "lug",
+        "radius": 9.9,
+        "clearance": 0.1,
+        "width": 40.0,
+        "edge_distance": 20.0,
+        "length": 60.0,
+    }
     lug_shape |= {"element_size": size, "growth": 0.3, **shape}
     steel = {"E": 210000.0, "nu": 0.3}
     half = shape.get("half", True)
@@ -60,7 +68,8 @@ def test_hoop_stress_at_the_hole_is_that_of_other_codes(lug, step):
 
 
 def test_the_stress_normal_to_an_edge_is_its_traction(lug):
-    """None beyond the contact and on the free end, but for the error of the recovery; the contact pressure within."""
+    """None beyond the contact and on the free end, but for the error of the recovery; the contact
+    pressure within."""
     hoop, normal, pressure = (lug.probe("hole", name) for name in ("hoop", "normal", "pressure"))
     free = (normal.angle > 110) & (normal.angle < 170)
     assert np.abs(normal.values[free]).max() < 0.01 * hoop.values.max()
@@ -77,7 +86,8 @@ def test_the_stress_normal_to_an_edge_is_its_traction(lug):
 
 
 def test_arc_length_on_a_circle_is_the_radius_times_the_angle(lug, runs):
-    """Counterclockwise, of stresses and of the contact, of a lug and of a joint, from the body's free end."""
+    """Counterclockwise, of stresses and of the contact, of a lug and of a joint, from the body's
+    free end."""
     for quantity in ("hoop", "pressure", "facet_pressure", "gap"):
         for edge, radius in (("hole", 10.0), ("pin", 9.9)):
             probe = lug.probe(edge, quantity)
@@ -89,21 +99,27 @@ def test_arc_length_on_a_circle_is_the_radius_times_the_angle(lug, runs):
     assert 270 < angle[0] < angle[-1] < 360
 
 
-def test_before_the_first_touch_there_is_nothing_to_see_and_nothing_breaks(tmp_path, capsys, refused):
-    """No pressure, no stress, and no factor over a force that is round-off; afterwards all of it."""
+def test_before_the_first_touch_there_is_nothing_to_see_and_nothing_breaks(
+    tmp_path, capsys, refused
+):
+    """No pressure, no stress, and no factor over a force that is round-off; afterwards all of
+    it."""
     run = solved(tmp_path / "run", 2.0, [-0.02, 0.1])
     for quantity in ("hoop", "pressure", "facet_pressure"):
         asked = ["probe", str(run.folder), "--edge", "hole", "--quantity", quantity, "--step", "1"]
         assert command([*asked, "-o", str(tmp_path / f"{quantity}.png")]) == 0
         assert not run.probe("hole", quantity, step=1).values.any()
     assert "pull = 0 per unit thickness" in capsys.readouterr().out
-    assert "has no factor over a section of 20 under a force of 0" in refused([*asked, "--over", "20"])
+    assert "has no factor over a section of 20 under a force of 0" in refused(
+        [*asked, "--over", "20"]
+    )
     assert command(["compare", *2 * [str(run.folder)], "-o", str(tmp_path / "compare.png")]) == 0
     assert command(["show", str(run.folder), "-o", str(tmp_path / "show.png")]) == 0
 
 
 def test_a_line_crosses_bodies_and_leaves_gaps_out(lug):
-    """From the hole's edge to the side of the lug, where it meets what the edges have; the void is not counted."""
+    """From the hole's edge to the side of the lug, where it meets what the edges have; the void is
+    not counted."""
     line = lug.probe(line=(-20.0, 0.0, 20.0, 0.0), quantity="stress_yy")
     np.testing.assert_allclose(line.s, line.x[:, 0] + 20)
     assert line.x[np.argmax(np.diff(line.x[:, 0])), 0] == pytest.approx(-10.0, abs=0.2)
@@ -113,8 +129,8 @@ def test_a_line_crosses_bodies_and_leaves_gaps_out(lug):
 
 
 def test_a_whole_hole_runs_round_once(tmp_path):
-    """From 0 to 360 degrees, symmetric about the axis of the load. Of several arcs on it stresses and pressures begin
-    at the same one, behind the largest gap, wherever the x axis is."""
+    """From 0 to 360 degrees, symmetric about the axis of the load. Of several arcs on it stresses
+    and pressures begin at the same one, behind the largest gap, wherever the x axis is."""
     run = solved(tmp_path / "run", 2.0, 0.1, half=False)
     hoop = run.probe("hole")
     assert hoop.angle[[0, -1]] == pytest.approx([0, 360], abs=1e-3)
@@ -158,7 +174,19 @@ def test_what_cannot_be_probed_is_said(lug, asked, said):
 
 def test_the_command_prints_and_draws(lug, tmp_path, capsys):
     """The table, the largest value and where, the factor at an angle; a CSV file or a picture."""
-    asked = ["probe", str(lug.folder), "--edge", "hole", "--step", "2", "--over", "20", "--angle", "90", "-o"]
+    asked = [
+        "probe",
+        str(lug.folder),
+        "--edge",
+        "hole",
+        "--step",
+        "2",
+        "--over",
+        "20",
+        "--angle",
+        "90",
+        "-o",
+    ]
     for name in ("probe.csv", "probe.png"):
         assert command([*asked, str(tmp_path / name)]) == 0
     out = capsys.readouterr().out
@@ -173,7 +201,8 @@ def test_the_command_prints_and_draws(lug, tmp_path, capsys):
 
 
 def test_residual_stress_is_told_where_it_is_compressive(tmp_path, capsys):
-    """A hole that yielded in tension is pressed together when unloaded: the smallest value says so."""
+    """A hole that yielded in tension is pressed together when unloaded: the smallest value says
+    so."""
     plastic = {"E": 210000.0, "nu": 0.3, "yield_stress": 355.0, "hardening": 1000.0}
     run = solved(tmp_path / "run", 2.0, [0.35, 0.0], lug=plastic)
     assert command(["probe", str(run.folder), "--edge", "hole"]) == 0
@@ -182,7 +211,10 @@ def test_residual_stress_is_told_where_it_is_compressive(tmp_path, capsys):
     k = hoop.smallest
     assert hoop.values[k] == hoop.values.min() < -100 < hoop.values[hoop.largest]
     assert 60 < hoop.angle[k] < 95  # where the largest stress of the loaded hole was
-    assert f"smallest: {hoop.values[k]:.6g} MPa at {hoop.angle[k]:.4g}°, x = {hoop.x[k, 0]:.6g}, y = " in printed
+    assert (
+        f"smallest: {hoop.values[k]:.6g} MPa at {hoop.angle[k]:.4g}°, x = {hoop.x[k, 0]:.6g}, y = "
+        in printed
+    )
     line = run.probe(line=[0.0, 10.0, 0.0, 20.0], quantity="stress_xx")
     assert line.where(line.smallest).startswith(f"at s = {line.s[line.smallest]:.6g}, x = 0, y = 1")
 
@@ -218,7 +250,9 @@ def test_a_joint_is_probed_too_but_for_what_it_did_not_write(runs):
     assert pressure.force == joint.columns["P"][-1]
     assert pressure.at(-90) == pytest.approx(joint.columns["p0"][-1], rel=0.02)
     assert np.abs(joint.probe("hole", "ux").values).max() > 0
-    with pytest.raises(archord.InputError, match=r"has no 'hoop' there, but ux, uy .*output.fields = \"cells\""):
+    with pytest.raises(
+        archord.InputError, match=r"has no 'hoop' there, but ux, uy .*output.fields = \"cells\""
+    ):
         joint.probe("hole")
 
 
@@ -238,7 +272,10 @@ def test_a_plate_without_contact_is_shown_and_exported_too(tmp_path, capsys):
         scene = archord.Problem(
             gmsh,
             bodies=[{"name": "plate", "E": 1000.0, "nu": 0.3}],
-            supports=[{"name": side, "on": side, "fixed": [f]} for side, f in (("left", "x"), ("bottom", "y"))],
+            supports=[
+                {"name": side, "on": side, "fixed": [f]}
+                for side, f in (("left", "x"), ("bottom", "y"))
+            ],
             loads=[{"name": "pull", "on": "right", "direction": "x", "displacement": 0.02}],
             path={"steps": 1},
             analysis={"plane": "stress"},
@@ -253,7 +290,12 @@ def test_a_plate_without_contact_is_shown_and_exported_too(tmp_path, capsys):
     )
     for name in ("show", "picture"):
         assert command([name, str(run.folder), "-o", str(tmp_path / f"{name}.png")]) == 0
-    assert command(["export", str(run.folder), "--csv", str(tmp_path / "c"), "--vtk", str(tmp_path / "v")]) == 0
+    assert (
+        command(
+            ["export", str(run.folder), "--csv", str(tmp_path / "c"), "--vtk", str(tmp_path / "v")]
+        )
+        == 0
+    )
     assert [file.name for file in (tmp_path / "c").iterdir()] == ["history.csv"]
     with pytest.raises(archord.InputError, match="has no contact"):
         run.pressure()

@@ -1,4 +1,5 @@
-"""A run from Python is what its files hold; gaps are drawn as many times as wide as displacements are."""
+"""A run from Python is what its files hold; gaps are drawn as many times as wide as displacements
+are."""
 
 import csv
 import shutil
@@ -31,20 +32,28 @@ def test_the_history_is_history_csv(runs):
 
 @pytest.mark.parametrize("name", ["elastic", "plastic"])
 def test_the_fields_are_those_of_the_scene(runs, name):
-    """The axis stays, the pin's top goes down by delta, the block's top is held; PEEQ only where a body can yield."""
+    """The axis stays, the pin's top goes down by delta, the block's top is held; PEEQ only where a
+    body can yield."""
     run = archord.load(runs[name])
     fields = run.fields(3)
-    (x, y), (ux, uy), pin = fields.coordinates.T, fields.displacement.T, fields.body_of_node == BODIES["pin"]
+    (x, y), (ux, uy), pin = (
+        fields.coordinates.T,
+        fields.displacement.T,
+        fields.body_of_node == BODIES["pin"],
+    )
     assert fields.delta == pytest.approx(run.history["delta"][2], rel=1e-11)
     assert np.abs(ux[np.abs(x) < 1e-12]).max() < 1e-14
-    np.testing.assert_allclose(uy[pin & (np.abs(y + run.scene.joint.dR) < 1e-12)], -fields.delta, rtol=1e-12)
+    np.testing.assert_allclose(
+        uy[pin & (np.abs(y + run.scene.joint.dR) < 1e-12)], -fields.delta, rtol=1e-12
+    )
     assert np.abs(fields.displacement[~pin & (np.abs(y) < 1e-12)]).max() == 0
     assert (fields.peeq is not None) == run.scene.plastic
     assert set(fields.cell_fields()) >= {"von_mises", "mean_stress", "contact_pressure"}
 
 
 def test_the_contact_lies_on_the_deformed_outline(runs):
-    """Undeformed points of the table, displaced, are on the boundary of the deformed mesh, as curved as that."""
+    """Undeformed points of the table, displaced, are on the boundary of the deformed mesh, as
+    curved as that."""
     run = archord.load(runs["elastic"])
     fields, R = run.fields(), run.scene.joint.radius
     t = np.linspace(0, 1, 41)
@@ -54,8 +63,12 @@ def test_the_contact_lies_on_the_deformed_outline(runs):
     for side, depth in (("pin", run.scene.joint.dR), ("hole", 0.0)):
         table = run.pressure(side=side)
         deformed = table[["x", "y"]].to_numpy() + table[["ux", "uy"]].to_numpy()
-        assert np.linalg.norm(deformed[:, None] - outline, axis=2).min(axis=1).max() < 0.1 / 40  # half a sample of it
-        np.testing.assert_allclose(np.hypot(table["x"], table["y"] + depth), run.contact()[side].radius, rtol=1e-12)
+        assert (
+            np.linalg.norm(deformed[:, None] - outline, axis=2).min(axis=1).max() < 0.1 / 40
+        )  # half a sample of it
+        np.testing.assert_allclose(
+            np.hypot(table["x"], table["y"] + depth), run.contact()[side].radius, rtol=1e-12
+        )
     normal = np.stack([np.sin(table["angle"]), -np.cos(table["angle"])], axis=1)
     touching = (table["raw_pressure"] > 0).to_numpy()
     assert (deformed * normal).sum(axis=1)[touching].min() > R  # the hole is pushed outward
@@ -68,7 +81,9 @@ def test_what_a_run_does_not_have(runs):
     asked += [(run.pressure, 1, "block"), (partial(read_chord_pressure, run.folder), 1, "block")]
     for ask, *arguments in asked:
         said = (
-            "side 'block'; its sides are pin, hole" if arguments[1:] else f"step {arguments[0]}; its accepted steps are"
+            "side 'block'; its sides are pin, hole"
+            if arguments[1:]
+            else f"step {arguments[0]}; its accepted steps are"
         )
         with pytest.raises(archord.InputError, match=f"has no {said}"):
             ask(*arguments)
@@ -81,16 +96,20 @@ def test_a_step_that_the_fields_do_not_hold_yet(runs, tmp_path):
     rewrite_report(tmp_path / "run", files={}, status="running", steps=[])
     run = archord.load(tmp_path / "run")
     assert run.steps == 8
-    with pytest.raises(archord.InputError, match=r"fields\.h5: cannot be read as the fields of a run at step 8\."):
+    with pytest.raises(
+        archord.InputError, match=r"fields\.h5: cannot be read as the fields of a run at step 8\."
+    ):
         run.fields()
-    with pytest.raises(archord.InputError, match=r"contact\.h5: cannot be read as the contact of a run at step 8\."):
+    with pytest.raises(
+        archord.InputError, match=r"contact\.h5: cannot be read as the contact of a run at step 8\."
+    ):
         run.pressure()
 
 
 @pytest.mark.parametrize("factor", [1.0, 5.0, 20.0])
 def test_the_clearance_grows_by_the_factor(runs, factor):
-    """Before loading the pin keeps its circle, touches at the bottom, and the hole's radius is R + factor dR. Factor 1
-    is the deformed mesh itself."""
+    """Before loading the pin keeps its circle, touches at the bottom, and the hole's radius is R +
+    factor dR. Factor 1 is the deformed mesh itself."""
     run = archord.load(runs["elastic"])
     fields, (R, dR) = run.fields(), (run.scene.joint.radius, run.scene.joint.dR)
     x = magnified(run.scene, fields, factor, displaced=False)
@@ -103,13 +122,21 @@ def test_the_clearance_grows_by_the_factor(runs, factor):
     np.testing.assert_allclose(np.hypot(*x[hole].T), R + factor * dR, rtol=1e-12)
     np.testing.assert_allclose(np.hypot(*(x[arc] - factor * down).T), R, rtol=1e-12)
     assert x[arc, 1].min() == pytest.approx(x[hole, 1].min(), rel=1e-12)
-    np.testing.assert_allclose(np.hypot(*magnified(run.scene, fields, 0.0)[arc | hole].T), R, rtol=1e-12)
+    np.testing.assert_allclose(
+        np.hypot(*magnified(run.scene, fields, 0.0)[arc | hole].T), R, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("clearance", [1e-5, 1e-3, 0.05, 0.4])
 def test_the_factor_shows_the_clearance_and_no_more(runs, clearance):
-    """1 or more, never so large that clearance or displacement exceed a fifth of the radius as drawn."""
-    scene = paper_joint(0.2, 1, joint={"clearance": clearance}, load={"displacement": 0.2 if clearance > 0.1 else 2.0})
+    """1 or more, never so large that clearance or displacement exceed a fifth of the radius as
+    drawn."""
+    scene = paper_joint(
+        0.2,
+        1,
+        joint={"clearance": clearance},
+        load={"displacement": 0.2 if clearance > 0.1 else 2.0},
+    )
     fields = archord.load(runs["elastic"]).fields()
     times = clearance / 0.005
     scaled = replace(fields, displacement=times * fields.displacement, delta=times * fields.delta)

@@ -20,11 +20,20 @@ def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
     printed, run = capsys.readouterr().out, Run(runs["plastic"])
     rows = {row[0]: row for line in printed.splitlines() if len(row := line.split()) == 13}
     for k in range(run.steps):
-        for place, name in ((1, "delta"), (3, "P"), (5, "p0"), (9, "contact peeq_max"), (10, "iterations")):
+        for place, name in (
+            (1, "delta"),
+            (3, "P"),
+            (5, "p0"),
+            (9, "contact peeq_max"),
+            (10, "iterations"),
+        ):
             assert float(rows[str(k + 1)][place]) == pytest.approx(run.columns[name][k], rel=1e-5)
     assert f"P = {max(run.columns['P']):.6g} " in printed
     first = next(k for k, peeq in enumerate(run.columns["peeq_max"]) if peeq > 0)
-    assert f"contact peeq_max = {run.columns['contact peeq_max'][-1]:.6g} at step {run.steps}, x = " in printed
+    assert (
+        f"contact peeq_max = {run.columns['contact peeq_max'][-1]:.6g} at step {run.steps}, x = "
+        in printed
+    )
     assert f"plastic strain first at step {first + 1}\n" in printed
     assert printed.endswith(f"\n{target}\n")
     assert matplotlib.image.imread(target).std() > 0.05
@@ -33,7 +42,10 @@ def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
 def test_the_field_of_a_joint_is_its_stress_until_it_yields(tmp_path):
     """A picture of PEEQ that is zero everywhere tells nothing."""
     run = Run(
-        solved({"run": paper_joint(0.2, 2, 0.005, load={"displacement": [0.2, 2.0], "steps": 1})}, tmp_path)["run"]
+        solved(
+            {"run": paper_joint(0.2, 2, 0.005, load={"displacement": [0.2, 2.0], "steps": 1})},
+            tmp_path,
+        )["run"]
     )
     labels = []
     for step in (1, 2):
@@ -63,7 +75,8 @@ def test_show_draws_what_there_is_of_other_runs(tmp_path, capsys):
 
 
 def test_a_long_history_is_thinned_and_a_killed_run_shown_as_far_as_it_came(runs, tmp_path, capsys):
-    """Forty rows, first and last included, and where the others are; half a row at the end does not count."""
+    """Forty rows, first and last included, and where the others are; half a row at the end does not
+    count."""
     copy = shutil.copytree(runs["coarse"], tmp_path / "run")
     rewrite_report(copy, files={}, status="running", steps=[])
     heading, *rows = (copy / "history.csv").read_text().splitlines()
@@ -73,7 +86,11 @@ def test_a_long_history_is_thinned_and_a_killed_run_shown_as_far_as_it_came(runs
     printed = capsys.readouterr().out
     assert printed.startswith(f"{copy}: running, or killed (if no archord works there, --restart ")
     assert f"40 of 100 rows; {copy}/history.csv has all of them" in printed
-    shown = [line.split()[0] for line in printed.splitlines() if line.split() and line.split()[0].isdigit()]
+    shown = [
+        line.split()[0]
+        for line in printed.splitlines()
+        if line.split() and line.split()[0].isdigit()
+    ]
     assert (len(shown), shown[0], shown[39]) == (41, "1", "100")
 
 

@@ -19,7 +19,9 @@ SIZES = [f"[[list]]\njoint.relative_element_size = {size}\n" for size in (0.3, 0
 def sweep(tmp_path_factory):
     """Four cases: two that share a run, one on another mesh, one that stops at its first step."""
     folder = tmp_path_factory.mktemp("sweep")
-    design = "".join([*SIZES, STUCK, '[grid]\nanalysis.plane = ["strain"]\noutput.fields = [true]\n'])
+    design = "".join(
+        [*SIZES, STUCK, '[grid]\nanalysis.plane = ["strain"]\noutput.fields = [true]\n']
+    )
     parts.sweep(parts.written(folder, design), "-o", folder / "out", "-q")
     return folder / "out"
 
@@ -44,7 +46,9 @@ def test_the_tables_are_those_of_the_folder(sweep):
 
 
 def test_names_of_runs_may_look_like_numbers(tmp_path):
-    (tmp_path / "cases.csv").write_text("case,run,message,P [N]\n1,000123456789,,1.5\n2,48976689e411,nan,\n")
+    (tmp_path / "cases.csv").write_text(
+        "case,run,message,P [N]\n1,000123456789,,1.5\n2,48976689e411,nan,\n"
+    )
     table = read_frame(tmp_path / "cases.csv")
     assert table["run"].tolist() == ["000123456789", "48976689e411"]
     assert table["message"].tolist() == ["", "nan"]
@@ -56,7 +60,9 @@ def test_show_prints_the_cases_and_draws_them(sweep, tmp_path, capsys):
     copy = shutil.copytree(sweep, tmp_path / "sweep")
     assert command(["show", str(copy)]) == 0
     printed, loaded = capsys.readouterr().out, archord.load(copy)
-    assert printed.startswith(f"{copy}: 4 cases: 3 done, 1 stopped\nin all cases: analysis.plane = strain")
+    assert printed.startswith(
+        f"{copy}: 4 cases: 3 done, 1 stopped\nin all cases: analysis.plane = strain"
+    )
     rows = {line.split()[0]: line.split() for line in printed.splitlines() if line.split()[:1]}
     assert f"{loaded.cases['P'][0]:.6g}" in rows["1"]
     assert rows["1"][1:] == rows["3"][1:]
@@ -72,7 +78,10 @@ def test_broken_tables_are_one_sentence(tmp_path, refused, text):
     """No table, or another one."""
     (tmp_path / "sweep.toml").write_text("")
     (tmp_path / "cases.csv").write_text(text)
-    assert refused(["show", str(tmp_path)]) == f"{tmp_path}/cases.csv: cannot be read as a table of a sweep.\n"
+    assert (
+        refused(["show", str(tmp_path)])
+        == f"{tmp_path}/cases.csv: cannot be read as a table of a sweep.\n"
+    )
     (tmp_path / "cases.csv").unlink()
     said = f"is not the folder of a sweep: cases.csv is missing; archord sweep {tmp_path} --gather writes it."
     assert said in refused(["show", str(tmp_path)])
@@ -85,7 +94,8 @@ def test_a_sweep_is_no_run(sweep, refused, command):
 
 
 def test_a_legend_has_the_varied_values(sweep, tmp_path, capsys):
-    """Not the names of cases; a case that is done and cannot be read is told, not left out in silence."""
+    """Not the names of cases; a case that is done and cannot be read is told, not left out in
+    silence."""
     copy = shutil.copytree(sweep, tmp_path / "sweep")
     loaded = archord.load(copy)
     assert len(loaded.moving) > 0

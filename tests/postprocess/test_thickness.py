@@ -1,4 +1,5 @@
-"""A joint of a given thickness is the joint per unit thickness, its forces that many times as large."""
+"""A joint of a given thickness is the joint per unit thickness, its forces that many times as
+large."""
 
 import archord
 from archord.benchmarks.case import paper_joint, quantities
@@ -15,7 +16,8 @@ THICK = 8.0
 
 
 def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
-    """N where they were N/mm; what is dimensionless, the curve and the second axis of the picture stay."""
+    """N where they were N/mm; what is dimensionless, the curve and the second axis of the picture
+    stay."""
     scenes = {str(t): paper_joint(0.2, 2, analysis={"thickness": t}) for t in (None, THICK)}
     thin, thick = (archord.load(folder) for folder in solved(scenes, tmp_path).values())
     assert (thin.units["P"], thick.units["P"]) == ("N/mm", "N")
@@ -30,7 +32,10 @@ def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
         axes.figure.draw_without_rendering()
         assert axes.get_ylabel() == f"P [{run.units['P']}]"
         second = next(axis for axis in axes.child_axes if axis.get_ylabel())
-        assert abs(second.get_ylim()[1] / axes.get_ylim()[1] * P / run.columns["P/(E* R)"][-1] - 1) < 1e-9
+        assert (
+            abs(second.get_ylim()[1] / axes.get_ylim()[1] * P / run.columns["P/(E* R)"][-1] - 1)
+            < 1e-9
+        )
     last = type("Step", (), {name: values[-1] for name, values in thick.columns.items()})
     assert abs(quantities(thick.scene, last)["P/(E* R)"] / thick.columns["P/(E* R)"][-1] - 1) < 1e-9
     assert command(["compare", str(thin.folder), str(thick.folder), "--no-pictures"]) == 0
@@ -45,7 +50,9 @@ def test_a_deck_under_force_pulls_a_slice_of_half_the_joint():
             system = system_of(scene)
             text = deck(system, deck_mesh(system), scene.targets)
             slice_of = float(text.splitlines()[1].partition("thickness ")[2].partition(",")[0])
-            forces = [float(block.splitlines()[1].split(",")[2]) for block in text.split("*CLOAD")[1:]]
+            forces = [
+                float(block.splitlines()[1].split(",")[2]) for block in text.split("*CLOAD")[1:]
+            ]
             assert abs(forces[-1] / (0.004 / 2 * slice_of) - 1) < 1e-9
             assert (slice_of == 1) == (plane == "strain")
 
@@ -53,7 +60,9 @@ def test_a_deck_under_force_pulls_a_slice_of_half_the_joint():
 def test_general_runs_of_other_units_of_force_are_not_compared(tmp_path, refused):
     """N beside N/mm."""
     runs = [lug(tmp_path / str(t), 3.0, 0.1, {"thickness": t}) for t in (None, THICK)]
-    assert abs(runs[1].columns["pull force"][0] / runs[0].columns["pull force"][0] / THICK - 1) < 1e-9
+    assert (
+        abs(runs[1].columns["pull force"][0] / runs[0].columns["pull force"][0] / THICK - 1) < 1e-9
+    )
     assert "pull force [N]" in run_text(runs[1])
     assert "has other units" in refused(["compare", *(str(run.folder) for run in runs)])
     assert abs(runs[1].probe("hole").force / runs[0].probe("hole").force - 1) < 1e-9

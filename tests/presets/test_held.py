@@ -21,7 +21,9 @@ def squares(tmp_path_factory):
         face = gmsh.model.occ.addRectangle(0, 10 * k, 0, 10, 10)
         gmsh.model.occ.synchronize()
         gmsh.model.addPhysicalGroup(2, [face], name=name)
-        for side, (_, line) in zip("brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True):
+        for side, (_, line) in zip(
+            "brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True
+        ):
             gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
     gmsh.option.setNumber("Mesh.MeshSizeMax", 5)
     gmsh.model.mesh.generate(2)
@@ -64,10 +66,19 @@ def test_two_squares_are_no_fault(squares):
             {"support": [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]},
             "nothing holds the body 'upper': it is free in x; add a ..support...$",
         ),
-        ({"body": [{"name": "lower"} | STEEL]}, "the facet set .upper .. is of no body: give that body, too[.]$"),
-        ({"interaction": [{"name": "c", "surfaces": ["lower t", "upper bb"]}]}, "'upper bb' .did you mean 'upper b'"),
+        (
+            {"body": [{"name": "lower"} | STEEL]},
+            "the facet set .upper .. is of no body: give that body, too[.]$",
+        ),
+        (
+            {"interaction": [{"name": "c", "surfaces": ["lower t", "upper bb"]}]},
+            "'upper bb' .did you mean 'upper b'",
+        ),
         ({"units": {"length": "mm"}, "mesh": {"scale": 0.001}}, "large; is it in metres"),
-        ({"load": [{"name": "p", "on": "top", "direction": "y", "displacement": 1.0}]}, "there is no .* 'top'"),
+        (
+            {"load": [{"name": "p", "on": "top", "direction": "y", "displacement": 1.0}]},
+            "there is no .* 'top'",
+        ),
     ],
 )
 def test_a_fault_is_said(squares, changes, said):
@@ -78,22 +89,32 @@ def test_a_fault_is_said(squares, changes, said):
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_hinge_does_not_hold_a_rotation(squares, turned):
-    """A reference point that is held turns its body, unless something else keeps it, or it is itself turned."""
+    """A reference point that is held turns its body, unless something else keeps it, or it is
+    itself turned."""
     hinge = {"name": "hinge", "facets": "lower b", "point": [5.0, 0.0]}
-    supports = [{"name": "h", "on": "hinge", "fixed": ["x", "y"]}, {"name": "u", "on": "upper b", "fixed": ["x", "y"]}]
+    supports = [
+        {"name": "h", "on": "hinge", "fixed": ["x", "y"]},
+        {"name": "u", "on": "upper b", "fixed": ["x", "y"]},
+    ]
     turn = {"displacement": 0.01} if turned else {"force": 10.0}
     load = [{"name": "turn", "on": "hinge", "direction": "rotation"} | turn]
     given = {"interaction": [], "coupling": [hinge], "support": supports, "load": load}
     if turned:
         assert account(squares, **given).warnings() == []
     else:
-        with pytest.raises(InputError, match="nothing holds the body 'lower': it is free in rotation"):
+        with pytest.raises(
+            InputError, match="nothing holds the body 'lower': it is free in rotation"
+        ):
             account(squares, **given)
 
 
 def test_an_overlap_that_is_not_drawn_is_told(squares):
     """Here with a disc above the upper square; drawn as it says, it is not."""
-    disc = {"name": "disc", "surfaces": ["upper t"], "rigid": {"centre": [5.0, 20020.05], "radius": 20000.0}}
+    disc = {
+        "name": "disc",
+        "surfaces": ["upper t"],
+        "rigid": {"centre": [5.0, 20020.05], "radius": 20000.0},
+    }
     load = [{"name": "press", "on": "disc", "direction": "y", "displacement": -0.1}]
     tie = {"name": "contact", "surfaces": ["lower t", "upper b"], "law": "tied"}
     (said,) = account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings()
@@ -126,7 +147,9 @@ def drawn(tmp_path_factory):
             face = gmsh.model.occ.addRectangle(0, k * (10 + gap), 0, 10, 10)
             gmsh.model.occ.synchronize()
             gmsh.model.addPhysicalGroup(2, [face], name=name)
-            for side, (_, line) in zip("brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True):
+            for side, (_, line) in zip(
+                "brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True
+            ):
                 gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
         gmsh.option.setNumber("Mesh.MeshSizeMax", 5)
         gmsh.option.setNumber("Mesh.ElementOrder", 2)
@@ -145,10 +168,18 @@ def fit(file: str, **fits) -> GeneralAccount:
 @pytest.mark.parametrize(
     ("gap", "fits", "said"),
     [
-        (-0.1, {"interference": 0.1}, "'fit' are drawn 0.1 deep in each other, and its interference of 0.1 would push"),
+        (
+            -0.1,
+            {"interference": 0.1},
+            "'fit' are drawn 0.1 deep in each other, and its interference of 0.1 would push",
+        ),
         (-0.1, {"interference": 0.1, "overlap": 0.1}, "give overlap = 0.1 alone"),
         (-0.1, {"interference": 0.06, "overlap": 0.1}, "give overlap = 0.1 alone"),
-        (-0.1, {}, "'lower' lies 0.1 deep in the body 'upper' .* give their interaction overlap = 0.1"),
+        (
+            -0.1,
+            {},
+            "'lower' lies 0.1 deep in the body 'upper' .* give their interaction overlap = 0.1",
+        ),
     ],
 )
 def test_a_fit_is_not_counted_twice(drawn, gap, fits, said):
@@ -162,8 +193,16 @@ def test_a_fit_is_not_counted_twice(drawn, gap, fits, said):
         (-0.1, {"overlap": 0.1}, []),
         (0.0, {"interference": 0.1}, []),
         (-0.1, {"overlap": 0.1, "interference": 0.02}, []),
-        (-0.02, {"interference": 0.1}, ["drawn 0.02 deep in each other, which adds to its interference of 0.1"]),
-        (0.04, {"interference": 0.1}, ["drawn 0.04 apart: of its interference of 0.1 only 0.06 presses"]),
+        (
+            -0.02,
+            {"interference": 0.1},
+            ["drawn 0.02 deep in each other, which adds to its interference of 0.1"],
+        ),
+        (
+            0.04,
+            {"interference": 0.1},
+            ["drawn 0.04 apart: of its interference of 0.1 only 0.06 presses"],
+        ),
     ],
 )
 def test_a_fit_that_is_not_as_drawn_is_said(drawn, gap, fits, said):
@@ -173,7 +212,10 @@ def test_a_fit_that_is_not_as_drawn_is_said(drawn, gap, fits, said):
 
 
 def by_force_on_an_edge(order):
-    parts = [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}, {"name": "wall", "on": "upper l", "fixed": ["x"]}]
+    parts = [
+        {"name": "base", "on": "lower b", "fixed": ["x", "y"]},
+        {"name": "wall", "on": "upper l", "fixed": ["x"]},
+    ]
     pull = {"name": "pull", "on": "upper b", "direction": "x", "force": 1.0}
     press = {"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}
     return {"support": parts[::order], "load": [pull, press][::order]}
@@ -191,7 +233,9 @@ def test_a_displacement_of_a_body_leaves_its_support_at_rest(squares, order):
     loads = [{"name": "all", "on": "upper", "direction": "x", "displacement": 0.1}]
     loads += [{"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}]
     (said,) = account(squares, load=loads[::order]).warnings()
-    assert said.startswith("'wall' (on 'upper l') fixes nodes that 'all' (on 'upper') would move in x, as at (0, 10)")
+    assert said.startswith(
+        "'wall' (on 'upper l') fixes nodes that 'all' (on 'upper') would move in x, as at (0, 10)"
+    )
 
 
 def test_a_displacement_beyond_the_mesh_is_refused_before_the_solve(squares):
@@ -202,10 +246,14 @@ def test_a_displacement_beyond_the_mesh_is_refused_before_the_solve(squares):
     assert account(squares, load=far, analysis={"strain": "large"})
 
 
-@pytest.mark.parametrize(("friction", "asked"), [(0.3, False), (1.5, False), (15.0, True), (1e3, False)])
+@pytest.mark.parametrize(
+    ("friction", "asked"), [(0.3, False), (1.5, False), (15.0, True), (1e3, False)]
+)
 def test_friction_in_per_cent_is_asked_about(squares, friction, asked):
     warnings = fit(squares, friction=friction).warnings()
-    assert [warning.endswith("is it in per cent? Then give 0.15") for warning in warnings] == [True][:asked]
+    assert [warning.endswith("is it in per cent? Then give 0.15") for warning in warnings] == [
+        True
+    ][:asked]
 
 
 def test_a_turn_about_a_held_point_moves_no_farther_than_the_mesh_is_large(squares):
@@ -218,12 +266,16 @@ def test_a_turn_about_a_held_point_moves_no_farther_than_the_mesh_is_large(squar
     base = {"name": "base", "on": "lower b", "fixed": ["x", "y"]}
     free = {"name": "pivot", "on": "arm", "fixed": ["x"]}
     account(squares, support=[base, free], **far)
-    with pytest.raises(InputError, match="the load 'turn' turns 'arm' about a point so far away that it moves by 49"):
+    with pytest.raises(
+        InputError,
+        match="the load 'turn' turns 'arm' about a point so far away that it moves by 49",
+    ):
         account(squares, support=[base, held], **far)
 
 
 def test_a_force_on_a_bent_edge_is_told_to_stiffen_it(tmp_path):
-    """It moves by one displacement. A force on a straight edge changes nothing that it does not say."""
+    """It moves by one displacement. A force on a straight edge changes nothing that it does not
+    say."""
     path = str(tmp_path / "disc.msh")
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
@@ -232,7 +284,10 @@ def test_a_force_on_a_bent_edge_is_told_to_stiffen_it(tmp_path):
         [(2, gmsh.model.occ.addDisk(0, 0, 0, 10, 10))],
     )
     gmsh.model.occ.synchronize()
-    edges = {line: gmsh.model.occ.getCenterOfMass(1, line) for _, line in gmsh.model.getBoundary(ring, oriented=False)}
+    edges = {
+        line: gmsh.model.occ.getCenterOfMass(1, line)
+        for _, line in gmsh.model.getBoundary(ring, oriented=False)
+    }
     gmsh.model.addPhysicalGroup(2, [tag for _, tag in ring], name="plate")
     for name, (x, y) in {"bore": (0, 0), "left": (-20, 0), "right": (20, 0)}.items():
         line = next(line for line, at in edges.items() if abs(at[0] - x) + abs(at[1] - y) < 1e-6)
@@ -246,8 +301,12 @@ def test_a_force_on_a_bent_edge_is_told_to_stiffen_it(tmp_path):
         "support": [{"name": "clamp", "on": "left", "fixed": ["x", "y"]}],
     }
     said = {
-        on: account(path, **parts, load=[{"name": "pull", "on": on, "direction": "x", "force": 1.0}]).warnings()
+        on: account(
+            path, **parts, load=[{"name": "pull", "on": on, "direction": "x", "force": 1.0}]
+        ).warnings()
         for on in ("right", "bore")
     }
     assert said["right"] == []
-    assert said["bore"][0].startswith("the force 'pull' moves all of 'bore' by one displacement in x, and that edge is")
+    assert said["bore"][0].startswith(
+        "the force 'pull' moves all of 'bore' by one displacement in x, and that edge is"
+    )

@@ -13,14 +13,30 @@ from archord.solver.stepping import Step, march
 from tests.solver.solving import solve
 
 STEEL = {"E": 210000.0, "nu": 0.3}
-SHAPE = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+SHAPE = {
+    "kind": "lug",
+    "radius": 9.9,
+    "clearance": 0.1,
+    "width": 40.0,
+    "edge_distance": 20.0,
+    "length": 60.0,
+}
 SHAPE |= {"element_size": 2.0, "growth": 0.8}
 CLAMP = {"name": "clamp", "on": "clamp", "fixed": ["x", "y"]}
 SYMMETRY = {"name": "symmetry", "on": "axis", "fixed": ["y"]}
 CONTACT = {"name": "contact", "surfaces": ["pin", "hole"]}
 
 
-def solved(loads, *, pin: str = "half", interactions=(), couplings=(), supports=(CLAMP, SYMMETRY), steps=1, half=True):
+def solved(
+    loads,
+    *,
+    pin: str = "half",
+    interactions=(),
+    couplings=(),
+    supports=(CLAMP, SYMMETRY),
+    steps=1,
+    half=True,
+):
     """The account of the last step, and its record."""
     bodies = [{"name": "lug"} | STEEL] + ([{"name": "pin"} | STEEL] if pin != "none" else [])
     scene = parse_any(
@@ -56,16 +72,23 @@ def pressed():
 
 def test_a_force_moves_a_straight_edge_as_far_as_it_takes(pressed):
     found = solved([load(force=pressed["press force"])], interactions=[CONTACT])[1]
-    assert found["press displacement"] == pytest.approx(0.1, rel=1e-6)  # springs hold the pin by 1e-7 of its force
+    assert found["press displacement"] == pytest.approx(
+        0.1, rel=1e-6
+    )  # springs hold the pin by 1e-7 of its force
     assert found["clamp x"] == pytest.approx(-pressed["press force"], rel=1e-6)
 
 
 def test_loads_in_turn_end_where_loads_together_do():
     """Of an elastic body without contact."""
     on = {"pin": "none", "supports": [CLAMP], "half": False}
-    pull, side = load(on="hole", force=100.0), load("side", on="end", direction="y", displacement=0.01)
+    pull, side = (
+        load(on="hole", force=100.0),
+        load("side", on="end", direction="y", displacement=0.01),
+    )
     together = solved([pull, side], **on)[1]
-    in_turn = solved([pull | {"force": [100.0, 100.0]}, side | {"displacement": [0.0, 0.01]}], **on)[1]
+    in_turn = solved(
+        [pull | {"force": [100.0, 100.0]}, side | {"displacement": [0.0, 0.01]}], **on
+    )[1]
     for name, value in together.items():
         assert in_turn[name] == pytest.approx(value, rel=1e-8, abs=1e-8), name
 
@@ -74,13 +97,18 @@ def test_loads_in_turn_end_where_loads_together_do():
 def test_a_reference_point_carries_force_and_moment(kind):
     """The hole's, with the force the clamp takes, and its moment about the origin."""
     point = {"name": "pin", "facets": "hole", "point": [0.0, 5.0], "kind": kind}
-    loads = [load(on="pin", force=300.0), load("turn", on="pin", direction="rotation", force=2000.0)]
+    loads = [
+        load(on="pin", force=300.0),
+        load("turn", on="pin", direction="rotation", force=2000.0),
+    ]
     found = solved(loads, pin="none", couplings=[point], supports=[CLAMP], half=False)[1]
     assert found["clamp x"] == pytest.approx(-300, rel=1e-9)
     assert found["clamp y"] == pytest.approx(0, abs=1e-6)
     assert found["clamp moment"] == pytest.approx(5 * 300 - 2000, rel=1e-8)
     back = [load(on="pin", displacement=found["press displacement"])]
-    back.append(load("turn", on="pin", direction="rotation", displacement=found["turn displacement"]))
+    back.append(
+        load("turn", on="pin", direction="rotation", displacement=found["turn displacement"])
+    )
     again = solved(back, pin="none", couplings=[point], supports=[CLAMP], half=False)[1]
     assert (again["press force"], again["turn force"]) == pytest.approx((300, 2000), rel=1e-7)
 
@@ -101,7 +129,9 @@ def test_a_reference_point_that_turns_far_is_told(angle, told):
 def test_a_held_reference_point_does_not_move():
     point = {"name": "bore", "facets": "hole", "point": [0.0, 0.0]}
     held = {"name": "held", "on": "bore", "fixed": ["x", "y", "rotation"]}
-    account, found = solved([load(on="end", force=50.0)], pin="none", couplings=[point], supports=[held], half=False)
+    account, found = solved(
+        [load(on="end", force=50.0)], pin="none", couplings=[point], supports=[held], half=False
+    )
     assert found["bore x"] == pytest.approx(-50, rel=1e-9)
     nodes = account.system.problem.mesh.dofs_in(account.system.V, "hole")
     assert np.abs(account.system.equilibrium.displacement()[nodes]).max() < 1e-12
@@ -109,16 +139,22 @@ def test_a_held_reference_point_does_not_move():
 
 @pytest.mark.parametrize(("line", "axis"), [("axis", "y"), ("clamp", "x")])
 def test_a_rigid_coupling_keeps_to_the_line_of_symmetry_that_it_meets(line, axis):
-    """The loaded end meets the axis, the sides the clamp, as they would another line of symmetry."""
+    """The loaded end meets the axis, the sides the clamp, as they would another line of
+    symmetry."""
     point = {"name": "end", "facets": "end" if axis == "y" else "sides", "point": [20.0, 0.0]}
-    lines = [SYMMETRY | {"on": line, "fixed": [axis]}, {"name": "hole", "on": "hole", "fixed": ["x", "y"]}]
+    lines = [
+        SYMMETRY | {"on": line, "fixed": [axis]},
+        {"name": "hole", "on": "hole", "fixed": ["x", "y"]},
+    ]
     pull = [load(on="end", direction="x" if axis == "y" else "y", force=100.0)]
 
     def held(*freedoms):
         return [*lines, {"name": "guide", "on": "end", "fixed": list(freedoms)}]
 
     for freedoms, missing in (([axis], "rotation"), (["rotation"], axis)):
-        with pytest.raises(InputError, match=rf"meets '{line}', which is held in {axis}: hold its {missing}, too"):
+        with pytest.raises(
+            InputError, match=rf"meets '{line}', which is held in {axis}: hold its {missing}, too"
+        ):
             solved(pull, pin="none", couplings=[point], supports=held(*freedoms))
     found = solved(pull, pin="none", couplings=[point], supports=held(axis, "rotation"))[1]
     assert found["hole x" if axis == "y" else "hole y"] == pytest.approx(-100, rel=1e-8)
@@ -151,13 +187,25 @@ def test_a_force_on_cells_is_spread_over_them():
     [
         {},
         {"pin": {"rigid": True}, "analysis": {"thickness": 5.0, "coarse_start": False}},
-        {"load": {"displacement": None, "relative_force": [0.003, 0.001], "steps": 2}, "analysis": {"thickness": 5.0}},
-        {"joint": {"radius": 1.0, "clearance": -0.002, "block_size": 4.0, "model": "ring", "element_size": 0.2}}
+        {
+            "load": {"displacement": None, "relative_force": [0.003, 0.001], "steps": 2},
+            "analysis": {"thickness": 5.0},
+        },
+        {
+            "joint": {
+                "radius": 1.0,
+                "clearance": -0.002,
+                "block_size": 4.0,
+                "model": "ring",
+                "element_size": 0.2,
+            }
+        }
         | {"load": {"displacement": None, "relative_force": 0.003, "steps": 2}},
     ],
 )
 def test_a_joint_stands_for_a_general_scene(changes):
-    """Which has the same force and displacement, step by step, after the stage in which an interference arises."""
+    """Which has the same force and displacement, step by step, after the stage in which an
+    interference arises."""
     scene = paper_joint(0.2, 2, **changes)
     general = parse_any(general_joint(scene))
     account, steps = GeneralAccount(general, MPI.COMM_SELF), []
@@ -171,9 +219,13 @@ def test_a_joint_stands_for_a_general_scene(changes):
     assert np.array(steps)[general.fits :] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize("core", [{"centre": [0.0, 0.0], "radius": 1e-3}, {"centre": [500.0, 0.0], "radius": 1.0}])
+@pytest.mark.parametrize(
+    "core", [{"centre": [0.0, 0.0], "radius": 1e-3}, {"centre": [500.0, 0.0], "radius": 1.0}]
+)
 def test_a_core_without_integration_points_is_refused(core):
     """Its force has nowhere to act."""
     press = load(on="pin", force=100.0) | {"core": core}
-    with pytest.raises(InputError, match=r"load 'press': core.radius = .* integration points of the cells 'pin'"):
+    with pytest.raises(
+        InputError, match=r"load 'press': core.radius = .* integration points of the cells 'pin'"
+    ):
         solved([press], pin="whole", interactions=[CONTACT])

@@ -1,5 +1,5 @@
-"""What a run is warned of: strains that are not small, cells turned over, work that energies do not bear out, and
-forces that balance after unloading."""
+"""What a run is warned of: strains that are not small, cells turned over, work that energies do not
+bear out, and forces that balance after unloading."""
 
 from dataclasses import replace
 
@@ -13,11 +13,19 @@ from archord.scene.file import parse_any
 from archord.solver.stepping import Step, march
 
 STEEL = {"E": 210000.0, "nu": 0.3}
-SHAPE = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+SHAPE = {
+    "kind": "lug",
+    "radius": 9.9,
+    "clearance": 0.1,
+    "width": 40.0,
+    "edge_distance": 20.0,
+    "length": 60.0,
+}
 
 
 def lug(pull, E=210000.0, **analysis):
-    """A lug without a pin, clamped at one end, whose hole is pulled along x by ``pull``, step by step."""
+    """A lug without a pin, clamped at one end, whose hole is pulled along x by ``pull``, step by
+    step."""
     data = {
         "mesh": {"shape": SHAPE | {"element_size": 4.0, "growth": 0.8, "pin": "none"}},
         "body": [{"name": "lug", "E": E, "nu": 0.3}],
@@ -49,7 +57,9 @@ def warnings_of(account):
 def test_elastic_strain_that_is_not_small_is_told_with_its_size():
     none, (first, *_) = warnings_of(lug([0.1, 10.0]))
     assert none == []
-    assert "too much for small-strain theory, which makes stresses and forces wrong by about" in first
+    assert (
+        "too much for small-strain theory, which makes stresses and forces wrong by about" in first
+    )
     assert "in 'lug'" in first
     assert first.size > 0.05
     assert warnings_of(lug([5.0], strain="large")) == [[]]
@@ -81,8 +91,11 @@ def test_an_element_that_turns_is_told():
 
 
 def test_work_that_the_energies_do_not_bear_out_is_told():
-    """Friction that reverses within a step, of which trapezoids count nothing. One per cent is borne."""
-    zeros = dict.fromkeys(Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0)
+    """Friction that reverses within a step, of which trapezoids count nothing. One per cent is
+    borne."""
+    zeros = dict.fromkeys(
+        Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0
+    )
     slid = Measures(**zeros | {"work": 10.0, "contact_area": 1.0}, friction_dissipation=10.0)
     assert work_doubts([replace(slid, friction_dissipation=10.09)]) == []
     (said,) = work_doubts([slid, replace(slid, friction_dissipation=12.0)])
@@ -92,7 +105,9 @@ def test_work_that_the_energies_do_not_bear_out_is_told():
 
 def test_work_that_is_round_off_is_not_told():
     """Of loads that move nothing beside a press fit, and of a body that turns without a strain."""
-    zeros = dict.fromkeys(Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0)
+    zeros = dict.fromkeys(
+        Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0
+    )
     fit = Measures(**zeros | {"elastic_energy": 100.0, "contact_area": 1.0})
     loaded = replace(fit, elastic_energy=100.0 + 1e-7, work=1e-12)
     assert work_doubts([fit, loaded], fit=1) == []
@@ -103,15 +118,19 @@ def test_work_that_is_round_off_is_not_told():
 
 
 def test_facets_that_unloading_leaves_in_contact_are_not_told():
-    """They carry nothing. The first step that touches on few facets is told, however little it carries."""
+    """They carry nothing. The first step that touches on few facets is told, however little it
+    carries."""
     assert told_of_facets(1e-9, [])
     assert told_of_facets(1.0, [100.0])
     assert not told_of_facets(1e-10, [100.0, 50.0])
 
 
 def test_the_work_after_the_contact_opened_counts():
-    """A fit that opened: only the work of its stage counted, which is none, and it differed by 1e24 per cent."""
-    zeros = dict.fromkeys(Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0)
+    """A fit that opened: only the work of its stage counted, which is none, and it differed by 1e24
+    per cent."""
+    zeros = dict.fromkeys(
+        Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0
+    )
     fit = Measures(**zeros | {"work": -1e-25, "contact_area": 1.0, "elastic_energy": 1.0})
     opened = Measures(**zeros | {"work": -2.0})
     (said,) = work_doubts([fit, opened], fit=1)
@@ -132,5 +151,8 @@ def test_forces_after_unloading_balance_to_the_largest_force_of_the_run():
     largest, last = (abs(m["clamp x"]) for m in records)
     assert last < 1e-4 * largest
     system.equilibrium.largest_reaction = 0.0  # as of a run that begins here
-    alone, of_run = (account.step(before, Step(2.0), account.profiles(), 0.0, 0.0) for before in ([], records[:1]))
+    alone, of_run = (
+        account.step(before, Step(2.0), account.profiles(), 0.0, 0.0)
+        for before in ([], records[:1])
+    )
     assert 0 < of_run.force_balance < 1e-3 * alone.force_balance

@@ -18,7 +18,13 @@ BODIES = [{"name": name, "E": 1000.0, "nu": 0.3} for name in ("lower", "upper")]
 
 def ring(**load):
     like = {"E": 1.82, "nu": 0.3}
-    joint = {"model": "ring", "radius": 1.0, "clearance": 0.001, "relative_element_size": 0.2, "growth": 1.0}
+    joint = {
+        "model": "ring",
+        "radius": 1.0,
+        "clearance": 0.001,
+        "relative_element_size": 0.2,
+        "growth": 1.0,
+    }
     return parse_scene({"joint": joint, "pin": like, "block": like, "load": {"steps": 1} | load})
 
 
@@ -26,7 +32,9 @@ def block(**analysis):
     like = {"E": 1.82, "nu": 0.3}
     joint = {"radius": 1.0, "clearance": 0.005, "relative_element_size": 0.1, "growth": 1.0}
     load = {"displacement": 2.0, "steps": 1}
-    return parse_scene({"joint": joint, "pin": like, "block": like, "load": load, "analysis": analysis})
+    return parse_scene(
+        {"joint": joint, "pin": like, "block": like, "load": load, "analysis": analysis}
+    )
 
 
 def told(scene, folder):
@@ -38,9 +46,12 @@ def told(scene, folder):
 
 
 def test_a_ring_pressed_the_other_way_has_no_peak_on_the_axis(tmp_path):
-    """Under the opposite force it touches on the other side: p0 was -0 and eps pi, without a word."""
+    """Under the opposite force it touches on the other side: p0 was -0 and eps pi, without a
+    word."""
     assert not any("axis" in said for said in told(ring(relative_force=0.001), tmp_path / "down"))
-    (said,) = [said for said in told(ring(relative_force=-0.001), tmp_path / "up") if "axis" in said]
+    (said,) = [
+        said for said in told(ring(relative_force=-0.001), tmp_path / "up") if "axis" in said
+    ]
     assert said.startswith("step 1: the bodies touch, but not on the contact axis")
 
 
@@ -51,7 +62,9 @@ def test_a_tolerance_that_was_asked_for_is_no_round_off(tmp_path):
 
 def test_a_gamma_that_is_not_coercive_is_told(tmp_path):
     """P is 5 % and more off there."""
-    (said,) = [said for said in told(block(gamma_factor=0.001), tmp_path / "run") if "coercive" in said]
+    (said,) = [
+        said for said in told(block(gamma_factor=0.001), tmp_path / "run") if "coercive" in said
+    ]
     assert said.startswith("analysis.gamma_factor = 0.001 is below 0.25, where")
 
 
@@ -59,7 +72,10 @@ def problem(interactions, gap=0.0, **changes):
     """Two squares, the upper one drawn ``gap`` above the lower one and pulled along x."""
     mesh = blocks(MPI.COMM_SELF, 4, 3)
     mesh.mesh.geometry.x[np.unique(mesh.mesh.geometry.dofmap[mesh.cells_in("upper")]), 1] += gap
-    sets = mesh.facet_sets | {"again": mesh.facet_sets["lower top"], "other": mesh.facet_sets["upper bottom"]}
+    sets = mesh.facet_sets | {
+        "again": mesh.facet_sets["lower top"],
+        "other": mesh.facet_sets["upper bottom"],
+    }
     data = {
         "bodies": BODIES,
         "interactions": interactions,
@@ -102,7 +118,8 @@ def test_tied_surfaces_that_are_pulled_are_no_open_contact(tmp_path):
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_partners_of_the_beginning_are_told_of_where_surfaces_slide_far(tmp_path, kinematics):
-    """At two facets' slip P was that of surfaces which still cover each other: four times too much."""
+    """At two facets' slip P was that of surfaces which still cover each other: four times too
+    much."""
     press = {"name": "press", "on": "lid", "direction": "y", "displacement": -0.01}
     slide = {"name": "slide", "on": "lid", "direction": "x", "displacement": [0.0, 0.4]}
     scene = problem([CONTACT], loads=[press, slide], analysis={"kinematics": kinematics})

@@ -33,6 +33,8 @@ def test_csv_gives_the_rows_again(tmp_path):
     assert [file.name for file in files] == ["costs.csv", "costs.md", "costs.png"]
     assert drawn == files[2:]
     with files[0].open(newline="", encoding="utf-8") as file:
-        assert list(csv.DictReader(file)) == [{name: str(value) for name, value in row.items()} for row in ROWS]
+        assert list(csv.DictReader(file)) == [
+            {name: str(value) for name, value in row.items()} for row in ROWS
+        ]
     assert files[1].read_text(encoding="utf-8") == "words\n"
     assert len(write_report(tmp_path, "costs", ROWS, "words\n")) == 2

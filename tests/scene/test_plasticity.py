@@ -1,4 +1,5 @@
-"""Where a body yields: what a named metal brings, what the scene gives beside it, and what is said of both."""
+"""Where a body yields: what a named metal brings, what the scene gives beside it, and what is said
+of both."""
 
 import pytest
 
@@ -8,7 +9,9 @@ from archord.scene.file import load_scene, parse_any, parse_scene, resolved
 from archord.scene.sections import Solid, Units
 
 STEEL = {"E": 206000.0, "nu": 0.29}
-TEST = {"engineering": [[0.0061972, 440.0], [0.0092, 503.0], [0.02, 530.0]]}  # 440 MPa: 442.727 MPa of true stress
+TEST = {
+    "engineering": [[0.0061972, 440.0], [0.0092, 503.0], [0.02, 530.0]]
+}  # 440 MPa: 442.727 MPa of true stress
 ALUMINIUM = {"E": 71000.0, "nu": 0.33, "hardening": TEST}
 
 
@@ -24,12 +27,16 @@ def block(keys: dict, **sections) -> Solid:
 @pytest.mark.parametrize("name", metals())
 @pytest.mark.parametrize("unit", ["MPa", "Pa", "ksi"])
 def test_a_number_for_the_hardening_begins_at_the_listed_yield_strength(name, unit):
-    """Not at the first point of the metal's curve, whose place a number takes; 0 is perfect plasticity there."""
+    """Not at the first point of the metal's curve, whose place a number takes; 0 is perfect
+    plasticity there."""
     units = {"length": "in", "stress": unit}
     listed = metal(name, unit)["yield"]
     flat = block({"material": name, "hardening": 0.0}, units=units)
     assert (flat.yield_stress, flat.perfectly_plastic) == (listed, True)
-    assert block({"material": name, "hardening": listed}, units=units).law.linear == (listed, listed)
+    assert block({"material": name, "hardening": listed}, units=units).law.linear == (
+        listed,
+        listed,
+    )
     voce = {"saturation": 2 * listed, "rate": 10.0}
     assert block({"material": name, "hardening": voce}, units=units).yield_stress == listed
 
@@ -38,7 +45,9 @@ def test_what_stands_beside_a_metal_wins():
     """A table says where it begins; a yield stress drops the curve; a modulus leaves it."""
     table = [[0.0, 100.0], [0.1, 200.0]]
     assert block({"material": "CuSn12-C", "hardening": table}).yield_stress == 100.0
-    assert block({"material": "CuSn12-C", "hardening": TEST}).yield_stress == pytest.approx(442.727, abs=1e-3)
+    assert block({"material": "CuSn12-C", "hardening": TEST}).yield_stress == pytest.approx(
+        442.727, abs=1e-3
+    )
     given = block({"material": "CuSn12-C", "yield_stress": 170.0})
     assert (given.yield_stress, given.perfectly_plastic) == (170.0, True)
     softer = block({"material": "CuSn12-C", "E": 90000.0})
@@ -48,7 +57,9 @@ def test_what_stands_beside_a_metal_wins():
 def test_back_stresses_do_not_add_to_the_curve_of_a_metal(tmp_path):
     """Which is all of its hardening: what of it is left must be said, by --set, too."""
     back = {"back_stresses": [[20000.0, 200.0]]}
-    with pytest.raises(InputError, match=r"^scene: block\.back_stresses = .* would add to the curve"):
+    with pytest.raises(
+        InputError, match=r"^scene: block\.back_stresses = .* would add to the curve"
+    ):
         block({"material": "S355"} | back)
     assert block({"material": "S355", "hardening": 0.0} | back).yield_stress == 355.0
     assert block({"material": "S355", "yield_stress": 200.0} | back).yield_stress == 200.0
@@ -56,7 +67,9 @@ def test_back_stresses_do_not_add_to_the_curve_of_a_metal(tmp_path):
     path.write_text(resolved(parse_scene(joint(STEEL | {"yield_stress": 250.0} | back))))
     with pytest.raises(InputError, match="would add to the curve"):
         load_scene(path, ["block.material=S355"])
-    assert load_scene(path, ["block.material=S355", "block.hardening=0.0"]).block.yield_stress == 355.0
+    assert (
+        load_scene(path, ["block.material=S355", "block.hardening=0.0"]).block.yield_stress == 355.0
+    )
 
 
 @pytest.mark.parametrize("said", [440.0, 442.727, 442.72676799999994, 443.0])
@@ -67,7 +80,9 @@ def test_a_tension_test_goes_with_either_stress_of_its_first_point(said):
 
 
 def test_another_yield_stress_is_refused_with_both():
-    said = "block.hardening must begin at yield_stress (450), not at 442.727, the true stress of 440."
+    said = (
+        "block.hardening must begin at yield_stress (450), not at 442.727, the true stress of 440."
+    )
     with pytest.raises(InputError) as error:
         block(ALUMINIUM | {"yield_stress": 450.0})
     assert str(error.value) == f"scene: {said}"
@@ -76,7 +91,13 @@ def test_another_yield_stress_is_refused_with_both():
 
 
 def test_a_table_of_no_numbers_is_refused_in_a_sentence():
-    for wrong in ([[0.0, "a"]], [["b"]], [[]], {"engineering": [[10**400, 1.0]]}, {"engineering": "x"}):
+    for wrong in (
+        [[0.0, "a"]],
+        [["b"]],
+        [[]],
+        {"engineering": [[10**400, 1.0]]},
+        {"engineering": "x"},
+    ):
         with pytest.raises(InputError, match=r"^scene: block\.hardening"):
             block(STEEL | {"yield_stress": 300.0, "hardening": wrong})
 
@@ -86,9 +107,18 @@ def test_a_table_of_no_numbers_is_refused_in_a_sentence():
     [
         ({}, "elastic"),
         ({"yield_stress": 300.0}, "yields at 300 MPa, perfectly plastic"),
-        ({"yield_stress": 300.0, "hardening": 900.0}, "yields at 300 MPa, hardens by 900 MPa times PEEQ"),
-        ({"hardening": [[0.0, 300.0], [0.1, 400.0]]}, "yields at 300 MPa, hardens to 400 MPa at PEEQ 0.1"),
-        ({"yield_stress": 300.0, "back_stresses": [[1e4, 0.0]]}, "yields at 300 MPa, back stresses: 1"),
+        (
+            {"yield_stress": 300.0, "hardening": 900.0},
+            "yields at 300 MPa, hardens by 900 MPa times PEEQ",
+        ),
+        (
+            {"hardening": [[0.0, 300.0], [0.1, 400.0]]},
+            "yields at 300 MPa, hardens to 400 MPa at PEEQ 0.1",
+        ),
+        (
+            {"yield_stress": 300.0, "back_stresses": [[1e4, 0.0]]},
+            "yields at 300 MPa, back stresses: 1",
+        ),
     ],
 )
 def test_the_strength_that_is_used_is_said(keys, said):
@@ -113,17 +143,23 @@ def test_the_strength_that_is_used_is_said(keys, said):
 def test_headings_know_the_unit_of_force(stress, length, force):
     units = Units(length=length, stress=stress)
     assert units.force_of(2.0) == force
-    assert units.force_of(None) == (f"{force}/{length}" if " " not in force else f"{stress} {length}")
+    assert units.force_of(None) == (
+        f"{force}/{length}" if " " not in force else f"{stress} {length}"
+    )
     assert units.energy_of(2.0) == f"{force} {length}"
 
 
 def test_inches_beside_metric_stresses_are_doubted():
-    """Of any scene, as a default may be the other half; own names of units are nobody's business."""
+    """Of any scene, as a default may be the other half; own names of units are nobody's
+    business."""
     lug = {"lug": {"radius": 0.4, "clearance": 0.01, "width": 2.0}, "pin": STEEL, "plate": STEEL}
     cases = ("psi", "in", 0), ("ksi", "mm", 1), ("MPa", "in", 1), ("MPa", "mm", 0), ("-", "R", 0)
     for stress, length, doubted in cases:
         units = {"length": length, "stress": stress}
-        for scene in (joint(STEEL, units=units), lug | {"units": units, "load": {"displacement": 0.01}}):
+        for scene in (
+            joint(STEEL, units=units),
+            lug | {"units": units, "load": {"displacement": 0.01}},
+        ):
             found = [doubt for doubt in parse_any(scene).doubts if "the unit of force" in doubt]
             assert len(found) == doubted
 

@@ -62,9 +62,16 @@ def test_bodies_may_name_their_material(tmp_path):
     path.write_text(LUG.replace("E = 210000.0\nnu = 0.3\n", 'material = "S355"\n'))
     pin, plate = load_scene(path, ["body.pin.material=6082-T6"]).body
     assert (pin.E, pin.yield_stress) == (70000.0, 230.42)
-    assert (plate.E, plate.nu, plate.yield_stress, plate.perfectly_plastic) == (210000.0, 0.3, 300.0, True)
+    assert (plate.E, plate.nu, plate.yield_stress, plate.perfectly_plastic) == (
+        210000.0,
+        0.3,
+        300.0,
+        True,
+    )
     assert parse_any(tomllib.loads(resolved(load_scene(path)))).body[0].yield_stress == 355.0
-    with pytest.raises(InputError, match=r'body "lug"\.material.* is not a known material; did you mean S275'):
+    with pytest.raises(
+        InputError, match=r'body "lug"\.material.* is not a known material; did you mean S275'
+    ):
         load_scene(path, ["body.lug.material=S253"])
 
 
@@ -102,35 +109,90 @@ def test_an_interference_has_a_stage_of_its_own():
     [
         ("body.0.E", -1, 'body "pin".E = -1 must be greater than 0'),
         ("body.1.foo", 1, 'body "lug".foo = 1 is not a known key'),
-        ("body.0.name", "lug", 'body "lug".name = "lug" must not be the name of another body, too.'),
-        ("interaction.0.name", "pin", 'interaction "pin".name = "pin" must not be the name of a body, too.'),
-        ("interaction.0.name", "point", 'interaction "point".name = "point" must not be the name of a coupling, too.'),
-        ("support.0.name", "point", 'support "point".name = "point" must not be the name of a coupling, too.'),
-        ("body.1.hardening", [[0.0, 300.0], [0.1, 200.0]], 'body "lug".hardening = .* is no hardening law'),
+        (
+            "body.0.name",
+            "lug",
+            'body "lug".name = "lug" must not be the name of another body, too.',
+        ),
+        (
+            "interaction.0.name",
+            "pin",
+            'interaction "pin".name = "pin" must not be the name of a body, too.',
+        ),
+        (
+            "interaction.0.name",
+            "point",
+            'interaction "point".name = "point" must not be the name of a coupling, too.',
+        ),
+        (
+            "support.0.name",
+            "point",
+            'support "point".name = "point" must not be the name of a coupling, too.',
+        ),
+        (
+            "body.1.hardening",
+            [[0.0, 300.0], [0.1, 200.0]],
+            'body "lug".hardening = .* is no hardening law',
+        ),
         ("body", 5, "body = 5 must be a list"),
         ("body", None, "body is missing"),
         ("support.0.fixed", ["z"], 'support "clamp".fixed = ."z".: entry 1 must be'),
-        ("support.0.fixed", ["rotation"], 'support "clamp".fixed = .* must be "x" or "y": .clamp. is no coupling'),
-        ("support.0.name", "press", 'support "press".name = "press" must not be the name of a load, too.'),
-        ("load.0.force", 1.0, 'load "press".displacement = .* must not be given together with force'),
+        (
+            "support.0.fixed",
+            ["rotation"],
+            'support "clamp".fixed = .* must be "x" or "y": .clamp. is no coupling',
+        ),
+        (
+            "support.0.name",
+            "press",
+            'support "press".name = "press" must not be the name of a load, too.',
+        ),
+        (
+            "load.0.force",
+            1.0,
+            'load "press".displacement = .* must not be given together with force',
+        ),
         ("load.0.displacement", None, 'load "press".displacement is missing'),
-        ("load.0.displacement", [0.1, "x"], 'load "press".displacement = .0.1, "x".: entry 2 must be a number'),
+        (
+            "load.0.displacement",
+            [0.1, "x"],
+            'load "press".displacement = .0.1, "x".: entry 2 must be a number',
+        ),
         ("load.0.displacement", {"a": 1}, 'load "press".displacement must be a number'),
         ("path.steps", [0, 1], "path.steps = .0, 1.: entry 1 must be at least 1"),
         ("load.0.direction", None, 'load "press".direction is missing'),
         ("load.1.force", "4 kN", 'load "side".force = "4 kN" must be a number.$'),
         ("load.1.force", float("nan"), 'load "side".force = NaN must be a finite number.$'),
         ("load.1.steps", 4, 'load "side".steps = 4 is not a known key; did you mean path.steps. '),
-        ("load.1", {"name": "p", "on": "clamp", "pressure": 1.0}, 'load "p".on = .clamp. must not be held in x and y'),
+        (
+            "load.1",
+            {"name": "p", "on": "clamp", "pressure": 1.0},
+            'load "p".on = .clamp. must not be held in x and y',
+        ),
         (
             "interaction",
-            [{"name": "a", "surfaces": ["pin", "hole"]}, {"name": "b", "surfaces": ["bore", "pin"]}],
+            [
+                {"name": "a", "surfaces": ["pin", "hole"]},
+                {"name": "b", "surfaces": ["bore", "pin"]},
+            ],
             'interaction "b".surfaces = .* must not name .pin., which .a. has already.$',
         ),
         ("load.1.direction", "z", 'load "side".direction = "z" must be'),
-        ("interaction.0.surfaces", ["pin"], 'interaction "contact".surfaces = ."pin". must name two facet sets'),
-        ("interaction.0.integrated", "end", 'interaction "contact".integrated = "end" must be one of the surfaces'),
-        ("interaction.0.rigid", {"centre": [0.0], "radius": 1.0}, 'interaction "contact".rigid.centre'),
+        (
+            "interaction.0.surfaces",
+            ["pin"],
+            'interaction "contact".surfaces = ."pin". must name two facet sets',
+        ),
+        (
+            "interaction.0.integrated",
+            "end",
+            'interaction "contact".integrated = "end" must be one of the surfaces',
+        ),
+        (
+            "interaction.0.rigid",
+            {"centre": [0.0], "radius": 1.0},
+            'interaction "contact".rigid.centre',
+        ),
         ("mesh.file", None, "mesh.file is missing"),
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
@@ -146,20 +208,26 @@ def test_a_fault_is_said_in_a_sentence(place, value, said):
 
 
 @pytest.mark.parametrize(
-    ("section", "key", "typed"), [("body", "E", "Ee"), ("load", "on", "onn"), ("mesh", "file", "fil")]
+    ("section", "key", "typed"),
+    [("body", "E", "Ee"), ("load", "on", "onn"), ("mesh", "file", "fil")],
 )
 def test_a_misspelled_key_is_one_fault(section, key, typed):
     data = lug()
     table = data[section][0] if isinstance(data[section], list) else data[section]
     table[typed] = table.pop(key)
-    with pytest.raises(InputError, match=rf"^scene: {section}[^\n]*{typed}[^\n]* did you mean {key}\?[^\n]*$"):
+    with pytest.raises(
+        InputError, match=rf"^scene: {section}[^\n]*{typed}[^\n]* did you mean {key}\?[^\n]*$"
+    ):
         parse_any(data)
 
 
 def test_what_is_loaded_twice_is_refused():
     twice = lug()
     twice["load"].append(twice["load"][1] | {"name": "again"})
-    with pytest.raises(InputError, match=r'load "again".direction = "y" repeats .y. of .point., which the load .side.'):
+    with pytest.raises(
+        InputError,
+        match=r'load "again".direction = "y" repeats .y. of .point., which the load .side.',
+    ):
         parse_any(twice)
 
 
@@ -171,7 +239,8 @@ def test_a_scene_loads_as_it_is_resolved(tmp_path):
     assert scene.mesh.file == str(tmp_path / "lug.msh")
     assert parse_any(tomllib.loads(resolved(scene))) == scene
     with pytest.raises(
-        InputError, match=r"must read body.NAME.key=value, like .body.pin.E=1., with a name among pin, lug"
+        InputError,
+        match=r"must read body.NAME.key=value, like .body.pin.E=1., with a name among pin, lug",
     ):
         load_scene(path, ["body.plate.E=1"])
 
@@ -198,7 +267,11 @@ def test_the_example_is_a_scene():
 
 
 NAMED = {
-    ("load", 0, "x [mm]"): 'load "x [mm]".name = "x [mm]" must not hold " [", which begins the unit',
+    (
+        "load",
+        0,
+        "x [mm]",
+    ): 'load "x [mm]".name = "x [mm]" must not hold " [", which begins the unit',
     ("load", 0, " press"): "must not begin or end with a space",
     ("support", 0, "a\u2028b"): "must be text on one line",
     ("support", 0, "contact force"): (
@@ -206,8 +279,16 @@ NAMED = {
         "as the support 'contact force' does: rename one of them"
     ),
     ("load", 0, "lug at"): None,
-    ("support", 0, "point x"): "is what results call a motion of the coupling 'point': rename one of them",
-    ("load", 0, "point rotation"): "is what results call a motion of the coupling 'point': rename one of them",
+    (
+        "support",
+        0,
+        "point x",
+    ): "is what results call a motion of the coupling 'point': rename one of them",
+    (
+        "load",
+        0,
+        "point rotation",
+    ): "is what results call a motion of the coupling 'point': rename one of them",
     ("load", 0, 'a, "b"/δ'): None,
     ("load", 0, "step"): None,
 }
@@ -236,7 +317,9 @@ def test_a_surface_has_a_name_that_contact_h5_can_hold(name):
 
 def test_a_coupling_turns_by_a_right_angle_at_most():
     data = lug()
-    data["load"].append({"name": "turn", "on": "point", "direction": "rotation", "displacement": 90.0})
+    data["load"].append(
+        {"name": "turn", "on": "point", "direction": "rotation", "displacement": 90.0}
+    )
     with pytest.raises(InputError, match=r"must be at most 1.5708, a right angle in radians"):
         parse_any(data)
 

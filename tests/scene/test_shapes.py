@@ -42,7 +42,10 @@ def changed(data: dict, place: str, value) -> dict:
     return data
 
 
-OTHERS = {"units": {"length": "m", "stress": "Pa"}, "analysis": {"thickness": 5.0, "accuracy": 1e-3}}
+OTHERS = {
+    "units": {"length": "m", "stress": "Pa"},
+    "analysis": {"thickness": 5.0, "accuracy": 1e-3},
+}
 
 
 BUSHED = LUG | {"bushing": {"thickness": 2.0, "interference": 0.01, "E": 110000.0, "nu": 0.34}}
@@ -57,14 +60,20 @@ CLEVIS = {
 }
 
 
-@pytest.mark.parametrize("data", [LUG, BUSHED, CLEVIS, BUSHING, LUG | OTHERS, BUSHED | OTHERS, BUSHING | OTHERS])
+@pytest.mark.parametrize(
+    "data", [LUG, BUSHED, CLEVIS, BUSHING, LUG | OTHERS, BUSHED | OTHERS, BUSHING | OTHERS]
+)
 def test_a_preset_is_the_general_scene_that_it_prints(data):
     scene = parse_any(data)
     assert isinstance(scene, ProblemScene)
     assert parse_any(tomllib.loads(resolved(scene))) == scene
     assert scene.analysis.symmetry == 2
     if "units" in data:
-        assert (scene.units.force_of(5.0), scene.thickness, scene.analysis.accuracy) == ("N", 5.0, 1e-3)
+        assert (scene.units.force_of(5.0), scene.thickness, scene.analysis.accuracy) == (
+            "N",
+            5.0,
+            1e-3,
+        )
 
 
 def test_ten_lines_of_a_lug_say_all_of_it():
@@ -93,7 +102,10 @@ def test_radii_of_a_bushing_make_its_fits():
     scene = parse_any(BUSHING)
     assert scene.mesh.shape is not None
     assert scene.mesh.shape.rings == [[10.05, 14.0], [13.98, 30.0]]
-    assert [i.surfaces for i in scene.interaction] == [["pin", "sleeve 1 inside"], ["sleeve 1 outside", "bore"]]
+    assert [i.surfaces for i in scene.interaction] == [
+        ["pin", "sleeve 1 inside"],
+        ["sleeve 1 outside", "bore"],
+    ]
     assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.02])
     assert scene.fits
     assert scene.targets == pytest.approx([1, 2, 7 / 3, 8 / 3, 3])
@@ -105,23 +117,53 @@ def test_radii_of_a_bushing_make_its_fits():
         (LUG, "lug.radius", -1.0, "lug.radius = -1.0 must be at least 1e-30."),
         (LUG, "lug.widht", 40.0, "did you mean width?"),
         (LUG, "lug.width", None, "lug.width is missing."),
-        (LUG, "lug.width", 20.1, "lug.width = 20.1 must leave a ligament of at least 0.02 R beside the hole."),
-        (LUG, "lug.edge_distance", 10.1, "must leave a ligament of at least 0.02 R before the hole."),
-        (LUG, "lug.length", 10.0, "must leave a ligament of at least 0.02 R behind the hole and the end's arc."),
+        (
+            LUG,
+            "lug.width",
+            20.1,
+            "lug.width = 20.1 must leave a ligament of at least 0.02 R beside the hole.",
+        ),
+        (
+            LUG,
+            "lug.edge_distance",
+            10.1,
+            "must leave a ligament of at least 0.02 R before the hole.",
+        ),
+        (
+            LUG,
+            "lug.length",
+            10.0,
+            "must leave a ligament of at least 0.02 R behind the hole and the end's arc.",
+        ),
         (LUG, "lug.length", 1e5, "lug.length = 100000.0 must not exceed 1000 R."),
-        (LUG, "lug.clearance", 5.0, "lug.clearance = 5.0 must be between -0.03 and 0.5 times the radius."),
+        (
+            LUG,
+            "lug.clearance",
+            5.0,
+            "lug.clearance = 5.0 must be between -0.03 and 0.5 times the radius.",
+        ),
         (
             LUG,
             "lug.clearance",
             -0.1,
             "lug.clearance = -0.1 needs pin.whole = true, as half a pin cannot be pressed in.",
         ),
-        (LUG, "lug.element_size", 8.0, "lug.element_size = 8.0 must be between 1e-3 and 0.5 times the radius."),
+        (
+            LUG,
+            "lug.element_size",
+            8.0,
+            "lug.element_size = 8.0 must be between 1e-3 and 0.5 times the radius.",
+        ),
         (LUG, "lug.end", "pointed", "lug.end = \"pointed\" must be 'round' or 'square'."),
         (LUG, "load.displacement", None, "load.displacement is missing (or force)."),
         (LUG, "load.force", 1.0, "load.displacement = 0.3 must not be given together with force."),
         (LUG, "load.at", "centre", 'load.at = "centre" must be "diameter" for a displacement.'),
-        (LUG, "load.steps", [1, 2], "path.steps = [1, 2] must have one number for each of the 1 stages."),
+        (
+            LUG,
+            "load.steps",
+            [1, 2],
+            "path.steps = [1, 2] must have one number for each of the 1 stages.",
+        ),
         (LUG, "plate", None, "plate is missing."),
         (BUSHED, "bushing.thickness", None, "bushing.thickness is missing."),
         (BUSHED, "bushing.thickness", 0.1, "bushing.thickness = 0.1 must be at least 0.02 R."),
@@ -133,9 +175,19 @@ def test_radii_of_a_bushing_make_its_fits():
         ),
         (BUSHED, "bushing.interference", 0.5, "must not exceed 0.03 of its outer radius."),
         (BUSHED, "bushing.interference", -0.1, "bushing.interference = -0.1 must be at least 0."),
-        (BUSHED, "bushing.bonded", True, "bushing.interference = 0.01 is not for a bonded bushing."),
+        (
+            BUSHED,
+            "bushing.bonded",
+            True,
+            "bushing.interference = 0.01 is not for a bonded bushing.",
+        ),
         (BUSHED, "bushing.radius", 9.9, "bushing.radius = 9.9 is not a known key"),
-        (BUSHED, "lug.clearance", -0.1, "needs pin.whole = true, as half a pin cannot be pressed in."),
+        (
+            BUSHED,
+            "lug.clearance",
+            -0.1,
+            "needs pin.whole = true, as half a pin cannot be pressed in.",
+        ),
         (LUG, "block", STEEL, "block is not a known key"),
         (LUG, "pin", {"rigid": True, "whole": True}, "pin.whole = true is not for a rigid pin."),
         (
@@ -146,16 +198,36 @@ def test_radii_of_a_bushing_make_its_fits():
         ),
         (LUG, "lug.kind", "lug", 'lug.kind = "lug" is not a known key; Keys are '),
         (CLEVIS, "outer.thickness", None, "outer.thickness is missing."),
-        (CLEVIS, "outer.width", 20.1, "outer.width = 20.1 must leave a ligament of at least 0.02 R beside the hole."),
-        (CLEVIS, "clevis.clearance", 6.0, "clevis.clearance = 6.0 must be between -0.03 and 0.5 times the radius."),
-        (CLEVIS, "clevis.clearance", -0.1, "needs pin.whole = true, as half a pin cannot be pressed in."),
+        (
+            CLEVIS,
+            "outer.width",
+            20.1,
+            "outer.width = 20.1 must leave a ligament of at least 0.02 R beside the hole.",
+        ),
+        (
+            CLEVIS,
+            "clevis.clearance",
+            6.0,
+            "clevis.clearance = 6.0 must be between -0.03 and 0.5 times the radius.",
+        ),
+        (
+            CLEVIS,
+            "clevis.clearance",
+            -0.1,
+            "needs pin.whole = true, as half a pin cannot be pressed in.",
+        ),
         (
             CLEVIS,
             "load",
             {"displacement": 0.1},
             "load.displacement = 0.1 is not for a clevis: its plates share a force",
         ),
-        (CLEVIS, "analysis", {"thickness": 5.0}, "analysis.thickness = 5.0 is not for a clevis, whose plates have a"),
+        (
+            CLEVIS,
+            "analysis",
+            {"thickness": 5.0},
+            "analysis.thickness = 5.0 is not for a clevis, whose plates have a",
+        ),
         (CLEVIS, "pin", {"rigid": True}, "pin.rigid = true must be false in a clevis."),
         (CLEVIS, "plate", STEEL, "plate is not a known key"),
         (BUSHING, "bushing.pin", "whole", "did you mean pin.whole?"),
@@ -167,8 +239,18 @@ def test_radii_of_a_bushing_make_its_fits():
         ),
         (BUSHING, "sleeve.0.bore", None, "sleeve 1.bore is missing."),
         (BUSHING, "sleeve.0.outer", 10.1, "must have a wall of at least 0.02 R."),
-        (BUSHING, "sleeve.0.bore", 9.9, "needs pin.whole = true, as half a pin cannot be pressed in."),
-        (BUSHING, "housing.bore", 13.0, "housing must not overlap what is inside by more than 0.03 of its radius"),
+        (
+            BUSHING,
+            "sleeve.0.bore",
+            9.9,
+            "needs pin.whole = true, as half a pin cannot be pressed in.",
+        ),
+        (
+            BUSHING,
+            "housing.bore",
+            13.0,
+            "housing must not overlap what is inside by more than 0.03 of its radius",
+        ),
         (BUSHING, "housing.bore", 22.0, "nor be wider by more than 0.5."),
         (BUSHING, "housing.outer", 1e5, "housing must not exceed 1000 R."),
         (BUSHING, "housing.E", None, "housing.E is missing."),
@@ -195,7 +277,8 @@ def test_sleeves_are_set_by_number(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "overrides", [["load.force=2e3", "load.displacement=none"], ["load.displacement=none", "load.force=2e3"]]
+    "overrides",
+    [["load.force=2e3", "load.displacement=none"], ["load.displacement=none", "load.force=2e3"]],
 )
 def test_a_load_is_replaced_in_any_order(tmp_path, overrides):
     path = tmp_path / "lug.toml"
@@ -214,11 +297,15 @@ def test_a_load_is_replaced_in_any_order(tmp_path, overrides):
 )
 def test_what_is_said_of_files_is_refused_of_shapes(key, value):
     data = tomllib.loads(resolved(parse_any(LUG)))
-    with pytest.raises(InputError, match=rf"^scene: mesh\.{key} = [^\n]* is for a mesh file: mesh\.shape[^\n]*$"):
+    with pytest.raises(
+        InputError, match=rf"^scene: mesh\.{key} = [^\n]* is for a mesh file: mesh\.shape[^\n]*$"
+    ):
         parse_any(changed(data, f"mesh.{key}", value))
 
 
-@pytest.mark.parametrize(("width", "edge"), [(24.2, 20.0), (120.0, 60.0), (40.0, 12.0), (40.0, 60.0)])
+@pytest.mark.parametrize(
+    ("width", "edge"), [(24.2, 20.0), (120.0, 60.0), (40.0, 12.0), (40.0, 60.0)]
+)
 def test_lugs_from_slender_to_stout_are_allowed(width, edge):
     """W/D from 1.2 to 6, e/D from 0.6 to 3."""
     parse_any(changed(changed(LUG, "lug.width", width), "lug.edge_distance", edge))
@@ -227,7 +314,9 @@ def test_lugs_from_slender_to_stout_are_allowed(width, edge):
 def test_walls_may_be_thin():
     """Two walls of 0.02 R to round-off, the second with its bore in the first one's outside."""
     sleeves = [STEEL | {"bore": 10.24, "outer": 10.44}, STEEL | {"bore": 10.43, "outer": 10.63}]
-    scene = parse_any(changed(BUSHING, "sleeve", sleeves) | {"housing": STEEL | {"bore": 10.63, "outer": 30.0}})
+    scene = parse_any(
+        changed(BUSHING, "sleeve", sleeves) | {"housing": STEEL | {"bore": 10.63, "outer": 30.0}}
+    )
     assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.01, 0.0])
 
 
@@ -235,7 +324,11 @@ def test_bodies_touch_at_first_under_a_force():
     """Or where the scene says so; else they are concentric."""
     shapes = [
         parse_any(data).mesh.shape
-        for data in (BUSHING, changed(BUSHING, "bushing.touching", True), BUSHING | {"load": {"force": 1.0}})
+        for data in (
+            BUSHING,
+            changed(BUSHING, "bushing.touching", True),
+            BUSHING | {"load": {"force": 1.0}},
+        )
     ]
     assert [shape.touching for shape in shapes] == [False, True, True]
 
@@ -250,7 +343,9 @@ def pulled(data: dict, **sections) -> System:
     return system
 
 
-@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
+@pytest.mark.parametrize(
+    "pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"]
+)
 def test_the_whole_lug_carries_what_twice_its_half_does(pin):
     """Whatever pin pulls at it."""
     half = pulled(LUG, pin=pin)
@@ -261,11 +356,19 @@ def test_the_whole_lug_carries_what_twice_its_half_does(pin):
 
 
 def test_a_loaded_pin_without_clearance():
-    """NAFEMS R0094, benchmark 4, in two dimensions: a force of 20 kN/mm at the centre of a steel pin in a softer sheet.
-    Displacement at the hole's edge on the load axis 0.760, pressure there 189 MPa (1 %); it takes 9983 of 10000 N."""
+    """NAFEMS R0094, benchmark 4, in two dimensions: a force of 20 kN/mm at the centre of a steel
+    pin in a softer sheet. Displacement at the hole's edge on the load axis 0.760, pressure there
+    189 MPa (1 %); it takes 9983 of 10000 N."""
     lug = {"radius": 50.0, "clearance": 0.0, "width": 200.0, "length": 200.0, "element_size": 4.0}
     load = {"force": 20000.0, "at": "centre", "steps": 1}
-    scene = parse_any({"lug": lug, "pin": STEEL | {"whole": True}, "plate": {"E": 70000.0, "nu": 0.3}, "load": load})
+    scene = parse_any(
+        {
+            "lug": lug,
+            "pin": STEEL | {"whole": True},
+            "plate": {"E": 70000.0, "nu": 0.3},
+            "load": load,
+        }
+    )
     system = System(general_problem(scene, MPI.COMM_SELF))
     system.solve(scene.targets)
     assert system.reaction("clamp")[0] == pytest.approx(-20000.0, rel=1e-6)
@@ -273,13 +376,21 @@ def test_a_loaded_pin_without_clearance():
     x = system.V.tabulate_dof_coordinates()[nodes, 0]
     assert system.equilibrium.displacement()[nodes[x.argmax()], 0] == pytest.approx(0.760, rel=5e-3)
     side = system.sides["hole"]
-    pressure, first = system.contact.pair_of(side).pressure, side.point[..., 0].mean(axis=1).argmax()
-    assert (side.weight * pressure)[first].sum() / side.weight[first].sum() == pytest.approx(189.0, rel=0.02)
+    pressure, first = (
+        system.contact.pair_of(side).pressure,
+        side.point[..., 0].mean(axis=1).argmax(),
+    )
+    assert (side.weight * pressure)[first].sum() / side.weight[first].sum() == pytest.approx(
+        189.0, rel=0.02
+    )
 
 
-@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
+@pytest.mark.parametrize(
+    "pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"]
+)
 def test_a_pin_pulls_at_its_bushing(pin):
-    """After the fit, with forces in balance at pin and housing but for the weak springs that hold loose bodies."""
+    """After the fit, with forces in balance at pin and housing but for the weak springs that hold
+    loose bodies."""
     system = pulled(BUSHING, pin=pin)
     assert system.drive_force("pull") > 1e4
     assert system.drive_force("pull") == pytest.approx(-system.reaction("outer edge")[0], rel=1e-6)
@@ -290,7 +401,10 @@ def test_a_bushing_of_a_lug_makes_a_fit_in_the_plate():
     scene = parse_any(BUSHED)
     assert scene.mesh.shape.hole == pytest.approx(10.0 + 2.0 - 0.01)
     assert [body.name for body in scene.body] == ["pin", "bushing", "lug"]
-    assert [i.surfaces for i in scene.interaction] == [["pin", "bushing inside"], ["bushing outside", "hole"]]
+    assert [i.surfaces for i in scene.interaction] == [
+        ["pin", "bushing inside"],
+        ["bushing outside", "hole"],
+    ]
     assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.01])
     rubbed = parse_any(BUSHED | {"analysis": {"friction": 0.1}}).interaction
     assert [i.friction for i in rubbed] == [0.1, 0.1]
@@ -301,7 +415,9 @@ def test_a_bushing_of_a_lug_makes_a_fit_in_the_plate():
     assert [shape.touching for shape in shapes] == [False, True]
 
 
-@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
+@pytest.mark.parametrize(
+    "pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"]
+)
 def test_a_pin_pulls_at_a_lug_through_its_bushing(pin):
     """With the force at the clamp, and the whole lug carries what twice its half does."""
     half = pulled(BUSHED, pin=pin)
@@ -321,12 +437,22 @@ def test_a_bonded_bushing_of_the_same_metal_is_a_plain_lug():
 
 
 def test_the_fit_of_a_bushing_in_a_wide_lug_is_that_of_lame():
-    """Before the pin touches, in a plate of 60 radii in plane stress: the pressure of a ring in an infinite plate."""
+    """Before the pin touches, in a plate of 60 radii in plane stress: the pressure of a ring in an
+    infinite plate."""
     E, nu, plate, a, wall, fit = 110000.0, 0.34, 70000.0, 10.0, 2.0, 0.01
-    lug = {"radius": 9.9, "clearance": 0.1, "width": 600.0, "length": 600.0, "element_size": 0.8, "growth": 0.3}
+    lug = {
+        "radius": 9.9,
+        "clearance": 0.1,
+        "width": 600.0,
+        "length": 600.0,
+        "element_size": 0.8,
+        "growth": 0.3,
+    }
     bushing = {"thickness": wall, "interference": fit, "E": E, "nu": nu}
     data = {"lug": lug, "bushing": bushing, "pin": STEEL, "plate": {"E": plate, "nu": 0.33}}
-    scene = parse_any(data | {"load": {"displacement": 0.01, "steps": 1}, "analysis": {"plane": "stress"}})
+    scene = parse_any(
+        data | {"load": {"displacement": 0.01, "steps": 1}, "analysis": {"plane": "stress"}}
+    )
     system = System(general_problem(scene, MPI.COMM_SELF))
     system.solve(scene.targets)
     b = a + wall
@@ -339,7 +465,8 @@ def test_the_fit_of_a_bushing_in_a_wide_lug_is_that_of_lame():
 
 @pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}], ids=["half", "whole"])
 def test_each_plate_of_a_clevis_is_a_lug_of_its_own(pin):
-    """The inner one under P, an outer one under P/2, each with its thickness; forces balance at their clamps."""
+    """The inner one under P, an outer one under P/2, each with its thickness; forces balance at
+    their clamps."""
     analysis = {"plane": "stress"}
     scene = parse_any(CLEVIS | {"pin": pin, "analysis": analysis})
     assert [load.force for load in scene.load] == [[1500.0, 3000.0], [1875.0, 3750.0]]

@@ -117,9 +117,14 @@ class Parts:
     contact: Contact
 
     def pressed(self, depth: float, noise: float = 0.0, seed: int = 0) -> np.ndarray:
-        """Pin moved down by ``depth``, both bodies bent smoothly, and ``noise`` at every node (serial only)."""
+        """Pin moved down by ``depth``, both bodies bent smoothly, and ``noise`` at every node
+        (serial only)."""
         x = coordinates(self.V)
-        u = 0.2 * depth * np.stack([np.sin(2 * x[:, 0] + x[:, 1]), np.cos(3 * x[:, 0] - 2 * x[:, 1])], axis=1)
+        u = (
+            0.2
+            * depth
+            * np.stack([np.sin(2 * x[:, 0] + x[:, 1]), np.cos(3 * x[:, 0] - 2 * x[:, 1])], axis=1)
+        )
         if self.cells.find(Cells.PIN).size:
             u[nodes_of(self.V, self.cells, Cells.PIN), 1] -= depth
         if noise:
@@ -137,7 +142,9 @@ def joint_parts(
     **contact_options,
 ) -> Parts:
     """A small quarter joint; without a ``pin`` material the pin is a rigid disc."""
-    joint = quarter_joint(comm, R, DR, 4.0, size, 0.4, rigid_pin=pin is None, partitioner=partitioner)
+    joint = quarter_joint(
+        comm, R, DR, 4.0, size, 0.4, rigid_pin=pin is None, partitioner=partitioner
+    )
     V = space(joint.mesh)
     materials = {Cells.BLOCK: block}
     sides = [Surface(V, joint.facets_in("hole"), block)]
@@ -147,26 +154,35 @@ def joint_parts(
         opposite = Surface(V, joint.facets_in("pin"), pin)
         sides.insert(0, opposite)
     bulk = Bulk(V, {tag: joint.cells.find(tag) for tag in materials}, materials)
-    return Parts(V, joint.cells, joint.facets, bulk, sides, interact([opposite, sides[-1]], **contact_options))
+    return Parts(
+        V,
+        joint.cells,
+        joint.facets,
+        bulk,
+        sides,
+        interact([opposite, sides[-1]], **contact_options),
+    )
 
 
 def interact(surfaces, *, kinematics="current", integrated=None, **options) -> Contact:
-    """The contact of two surfaces, of which one or both are integrated; "tied" is a law that has no kinematics, and
-    "rubbing" ones have friction."""
+    """The contact of two surfaces, of which one or both are integrated; "tied" is a law that has no
+    kinematics, and "rubbing" ones have friction."""
     kinematics, *rubbing = kinematics.split(", ")
     options |= {"law": "tied"} if kinematics == "tied" else {"kinematics": kinematics}
     options |= {"friction": FRICTION} if rubbing else {}
     chosen = "" if integrated is None else str(integrated)
     return Contact(
-        surfaces[1].V, [Interface(Interaction("contact", ("0", "1"), integrated=chosen, **options), surfaces)]
+        surfaces[1].V,
+        [Interface(Interaction("contact", ("0", "1"), integrated=chosen, **options), surfaces)],
     )
 
 
 def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0, **options) -> TaggedMesh:
-    """Rectangles of a ``width`` and height 1 on top of each other from y = -1, with so many ``edges`` on their sides.
+    """Rectangles of a ``width`` and height 1 on top of each other from y = -1, with so many
+    ``edges`` on their sides.
 
-    Sets are "lower", "middle" (of three) and "upper", their tops and bottoms, all "left" and all "right" sides; "base"
-    and "lid" are the outermost bottom and top.
+    Sets are "lower", "middle" (of three) and "upper", their tops and bottoms, all "left" and all
+    "right" sides; "base" and "lid" are the outermost bottom and top.
     """
     names = ("lower", "middle", "upper") if len(edges) == 3 else ("lower", "upper")
 
@@ -176,7 +192,9 @@ def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0, **options) -> Tagged
             face = gmsh.model.occ.addRectangle(0, k - 1, 0, width, 1)
             gmsh.model.occ.synchronize()
             gmsh.model.addPhysicalGroup(2, [face], name=name)
-            bottom, right, top, left = (line for _, line in gmsh.model.getBoundary([(2, face)], oriented=False))
+            bottom, right, top, left = (
+                line for _, line in gmsh.model.getBoundary([(2, face)], oriented=False)
+            )
             for line in (bottom, right, top, left):
                 gmsh.model.mesh.setTransfiniteCurve(line, n + 1)
             gmsh.model.addPhysicalGroup(1, [bottom], name=f"{name} bottom")
@@ -188,14 +206,17 @@ def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0, **options) -> Tagged
 
     mesh = gmsh_to_mesh(comm, build, **options)
     sets = mesh.facet_sets
-    return replace(mesh, facet_sets={**sets, "base": sets["lower bottom"], "lid": sets["upper top"]})
+    return replace(
+        mesh, facet_sets={**sets, "base": sets["lower bottom"], "lid": sets["upper top"]}
+    )
 
 
 INNER, OUTER, ON_X, ON_Y = range(1, 5)
 
 
 def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float, **options) -> TaggedMesh:
-    """A quarter of a "ring" between the radii ``a`` and ``b``, with edges "inner", "outer", "x" and "y"."""
+    """A quarter of a "ring" between the radii ``a`` and ``b``, with edges "inner", "outer", "x" and
+    "y"."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -210,17 +231,22 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float, **options) 
         face = geo.addPlaneSurface([geo.addCurveLoop(edges)])
         geo.synchronize()
         gmsh.model.addPhysicalGroup(2, [face], 1, "ring")
-        for edge, tag, name in zip(edges, (ON_X, OUTER, ON_Y, INNER), ("x", "outer", "y", "inner"), strict=True):
+        for edge, tag, name in zip(
+            edges, (ON_X, OUTER, ON_Y, INNER), ("x", "outer", "y", "inner"), strict=True
+        ):
             gmsh.model.addPhysicalGroup(1, [edge], tag, name)
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
-    return gmsh_to_mesh(comm, build, [Circle("inner", (0.0, 0.0), a), Circle("outer", (0.0, 0.0), b)], **options)
+    return gmsh_to_mesh(
+        comm, build, [Circle("inner", (0.0, 0.0), a), Circle("outer", (0.0, 0.0), b)], **options
+    )
 
 
 def notched_bar(comm: MPI.Comm, width: float, finest: float) -> TaggedMesh:
-    """A quarter of a square "bar" of ``width`` with two cracks in line: its "ligament" of 1 on y = 0, the sides "axis"
-    on x = 0 and "lid"; elements grow from the size ``finest`` at the crack's tip."""
+    """A quarter of a square "bar" of ``width`` with two cracks in line: its "ligament" of 1 on y =
+    0, the sides "axis" on x = 0 and "lid"; elements grow from the size ``finest`` at the crack's
+    tip."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo

@@ -1,4 +1,5 @@
-"""Scenes for the solver's tests: the paper's joint in units of R = E* = 1, and its solution step by step."""
+"""Scenes for the solver's tests: the paper's joint in units of R = E* = 1, and its solution step by
+step."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ try:
     MUMPS_FROM_C = True
 except CompilerError:  # PyPI's dolfinx has no headers
     MUMPS_FROM_C = False
-SEVERAL = MPI.COMM_WORLD.size > 1  # on one rank all cuts of a mesh are the same, and one of them is enough
+SEVERAL = (
+    MPI.COMM_WORLD.size > 1
+)  # on one rank all cuts of a mesh are the same, and one of them is enough
 
 scene = paper_joint
 

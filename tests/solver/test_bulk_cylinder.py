@@ -11,16 +11,26 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.problem import Body, Problem, Support
 from archord.solver.system import System
-from tests.solver.parts import INNER, OUTER, coordinates, edge_nodes, internal_force, quarter_annulus
+from tests.solver.parts import (
+    INNER,
+    OUTER,
+    coordinates,
+    edge_nodes,
+    internal_force,
+    quarter_annulus,
+)
 
 A, B = 1.0, 2.0
 E, SIGY = 1.0, 0.001
-NU = 0.499  # Hill's axial stress is the mean of the others, which von Mises yields with if elastically incompressible
+# Hill's axial stress is the mean of the others, which von Mises yields with if elastically
+# incompressible
+NU = 0.499
 K = SIGY / np.sqrt(3)
 
 
 def elastic_wall(pressure, r, inner=A):
-    """Radial displacement at ``r`` of an elastic ring from ``inner`` to B under internal ``pressure`` (Lame)."""
+    """Radial displacement at ``r`` of an elastic ring from ``inner`` to B under internal
+    ``pressure`` (Lame)."""
     return (1 + NU) / E * pressure * inner**2 / (B**2 - inner**2) * ((1 - 2 * NU) * r + B**2 / r)
 
 
@@ -40,7 +50,10 @@ class Cylinder:
         system = System(Problem(mesh, [body], supports=supports))
         self.cells, self.V, self.bulk = mesh.cells, system.V, system.bulk
         self.problem, self.solver = system.equilibrium, system.solver
-        inner, self.outer = edge_nodes(self.V, mesh.facets, INNER), edge_nodes(self.V, mesh.facets, OUTER)
+        inner, self.outer = (
+            edge_nodes(self.V, mesh.facets, INNER),
+            edge_nodes(self.V, mesh.facets, OUTER),
+        )
         self.radial = np.zeros_like(coordinates(self.V))
         self.radial[inner] = coordinates(self.V)[inner] / A
 
@@ -49,7 +62,9 @@ class Cylinder:
         assert result.converged, result.reason
         self.u = self.problem.displacement()
         force = internal_force(self.bulk, self.u)
-        self.pressure = (force * self.radial).sum() / (A * np.pi / 2)  # work on a unit radial motion of the wall
+        self.pressure = (force * self.radial).sum() / (
+            A * np.pi / 2
+        )  # work on a unit radial motion of the wall
         x = coordinates(self.V)[self.outer]
         self.outer_displacement = (self.u[self.outer] * x).sum(axis=1) / B
         self.problem.commit()
@@ -75,10 +90,12 @@ def test_pressure_below_yield_is_lames(quads):
 
 @every_cell
 def test_pressure_against_plastic_radius_is_hills(quads):
-    """p = 2 k (ln(c/a) + (1 - c^2/b^2) / 2) within 0.1 % at every step until the ring is plastic throughout.
+    """p = 2 k (ln(c/a) + (1 - c^2/b^2) / 2) within 0.1 % at every step until the ring is plastic
+    throughout.
 
-    Perfect plasticity, k = sigY / sqrt(3). c is that of the elastic ring outside which leaves the outer displacement
-    (1 - nu^2) 2 k c^2 / (E b), and agrees with the yielded area to a tenth of an element.
+    Perfect plasticity, k = sigY / sqrt(3). c is that of the elastic ring outside which leaves the
+    outer displacement (1 - nu^2) 2 k c^2 / (E b), and agrees with the yielded area to a tenth of an
+    element.
     """
     size = 0.12
     cylinder = Cylinder(size, quads)
@@ -87,7 +104,9 @@ def test_pressure_against_plastic_radius_is_hills(quads):
         outer = cylinder.outer_displacement.mean()
         c = np.sqrt(outer * E * B / (2 * K * (1 - NU**2)))
         assert A < c < B
-        assert cylinder.pressure == pytest.approx(2 * K * (np.log(c / A) + (1 - c**2 / B**2) / 2), rel=1e-3)
+        assert cylinder.pressure == pytest.approx(
+            2 * K * (np.log(c / A) + (1 - c**2 / B**2) / 2), rel=1e-3
+        )
         assert cylinder.yielded_radius() == pytest.approx(c, abs=size / 10)
 
 

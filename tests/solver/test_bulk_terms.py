@@ -29,9 +29,16 @@ from tests.solver.parts import (
     space,
 )
 
-MATERIALS = {"elastic": ELASTIC, "perfect": PERFECT, "hardening": HARDENING, "plane stress": PLANE_STRESS}
+MATERIALS = {
+    "elastic": ELASTIC,
+    "perfect": PERFECT,
+    "hardening": HARDENING,
+    "plane stress": PLANE_STRESS,
+}
 every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
-plastic_materials = pytest.mark.parametrize("material", list(MATERIALS.values())[1:], ids=list(MATERIALS)[1:])
+plastic_materials = pytest.mark.parametrize(
+    "material", list(MATERIALS.values())[1:], ids=list(MATERIALS)[1:]
+)
 YIELD_STRAIN = YIELD_STRESS / E
 
 
@@ -44,7 +51,9 @@ def warped():
 def warped_annulus(comm, size=0.4):
     tagged = quarter_annulus(comm, 1.0, 2.0, size)
     mesh, x = tagged.mesh, tagged.mesh.geometry.x
-    x[:, :2] += 0.02 * np.stack([np.sin(9 * x[:, 0] + 5 * x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1)
+    x[:, :2] += 0.02 * np.stack(
+        [np.sin(9 * x[:, 0] + 5 * x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1
+    )
     return mesh, tagged.cells, tagged.facets
 
 
@@ -79,7 +88,8 @@ def test_a_free_body_has_three_rigid_motions_and_no_other(material, bulk_of):
 @pytest.mark.parametrize("amount", [0.3, 3.0])
 @every_material
 def test_patch(material, amount, comm):
-    """A linear displacement gives constant stress, on warped cells and beyond yield, and no force inside."""
+    """A linear displacement gives constant stress, on warped cells and beyond yield, and no force
+    inside."""
     mesh, cells, facets = warped_annulus(comm)
     V = space(mesh)
     bulk = Bulk(V, {1: cells.find(1)}, {1: material})
@@ -117,7 +127,8 @@ def test_the_tangent_is_the_derivative_of_the_internal_force(material, bulk_of):
     def flowing(u):
         bulk.update(u)
         return np.concatenate(
-            [p.trial.peeq > p.state.peeq for _, p in bulk.histories().values()] or [np.ones(1, dtype=bool)]
+            [p.trial.peeq > p.state.peeq for _, p in bulk.histories().values()]
+            or [np.ones(1, dtype=bool)]
         )
 
     flows = flowing(u)
@@ -128,7 +139,9 @@ def test_the_tangent_is_the_derivative_of_the_internal_force(material, bulk_of):
         d = rng.normal(size=u.shape)
         np.testing.assert_array_equal(flowing(u + h * d), flows)
         np.testing.assert_array_equal(flowing(u - h * d), flows)
-        difference = (internal_force(bulk, u + h * d) - internal_force(bulk, u - h * d)).ravel() / (2 * h)
+        difference = (internal_force(bulk, u + h * d) - internal_force(bulk, u - h * d)).ravel() / (
+            2 * h
+        )
         assert np.linalg.norm(K @ d.ravel() - difference) < 1e-6 * np.linalg.norm(difference)
 
 
@@ -178,5 +191,8 @@ def test_bodies_keep_their_own_materials(first, warped):
     n = V.mesh.topology.index_map(2).size_local
     half = dict(enumerate(np.split(np.arange(n, dtype=np.int32), [n // 2]), 1))
     u = YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
-    together, *apart = (internal_force(Bulk(V, half, m), u) for m in ({1: first, 2: PERFECT}, {1: first}, {2: PERFECT}))
+    together, *apart = (
+        internal_force(Bulk(V, half, m), u)
+        for m in ({1: first, 2: PERFECT}, {1: first}, {2: PERFECT})
+    )
     np.testing.assert_allclose(together, sum(apart), rtol=0, atol=1e-15 * E)

@@ -48,7 +48,8 @@ def run(scene, folder, comm=MPI.COMM_SELF):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_solution_is_that_without_it(name, tmp_path, monkeypatch):
-    """Forces, peak pressures and dissipation agree to the tolerance of Newton's method, in fewer fine iterations."""
+    """Forces, peak pressures and dissipation agree to the tolerance of Newton's method, in fewer
+    fine iterations."""
     scene = SCENES[name]
     start_from(10**9, monkeypatch)
     plain, without = run(scene, tmp_path / "plain")
@@ -59,7 +60,9 @@ def test_the_solution_is_that_without_it(name, tmp_path, monkeypatch):
     for a, b in zip(plain, guessed, strict=True):
         for quantity in ("P", "p0", "plastic_dissipation", "elastic_energy"):
             largest = max(abs(getattr(m, quantity)) for m in plain)
-            assert getattr(b, quantity) == pytest.approx(getattr(a, quantity), abs=1e-8 * largest + 1e-300)
+            assert getattr(b, quantity) == pytest.approx(
+                getattr(a, quantity), abs=1e-8 * largest + 1e-300
+            )
     assert sum(m.iterations for m in guessed) < sum(m.iterations for m in plain)
 
 
@@ -79,9 +82,13 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
     scene = paper_joint(0.1, 4, yield_stress=0.002)
     plain, _ = run(scene, tmp_path / "plain")
     make, few = preset._coarser, {"max_iterations": 2}
-    coarser = lambda s: make(s).model_copy(update={"analysis": make(s).analysis.model_copy(update=few)})  # noqa: E731
+    coarser = lambda s: make(s).model_copy(
+        update={"analysis": make(s).analysis.model_copy(update=few)}
+    )  # noqa: E731
     monkeypatch.setattr(preset, "_coarser", coarser)
-    assert [m.P for m in run(scene, tmp_path / "left")[0]] == pytest.approx([m.P for m in plain], rel=1e-8)
+    assert [m.P for m in run(scene, tmp_path / "left")[0]] == pytest.approx(
+        [m.P for m in plain], rel=1e-8
+    )
 
 
 def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):

@@ -15,7 +15,8 @@ CUBIC = {"degree": 3}
 
 
 def test_both_degrees_find_the_same_joint():
-    """At 0.1 R, elements of second and third order agree in P within 2e-4, and the third are nearer to a fine mesh."""
+    """At 0.1 R, elements of second and third order agree in P within 2e-4, and the third are nearer
+    to a fine mesh."""
     second, third, fine = (
         solve(scene(h, 2, joint={"growth": growth}, analysis={"degree": degree})).steps[-1].P
         for h, growth, degree in ((0.1, 0.3, 2), (0.1, 0.3, 3), (0.05, 0.15, 3))
@@ -24,7 +25,9 @@ def test_both_degrees_find_the_same_joint():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("sections", [{}, {"yield_stress": 0.002}, {"pin": {"rigid": True, "E": None, "nu": None}}])
+@pytest.mark.parametrize(
+    "sections", [{}, {"yield_stress": 0.002}, {"pin": {"rigid": True, "E": None, "nu": None}}]
+)
 def test_forces_and_energies_balance(sections, comm):
     """Of third order too, whatever the number of ranks."""
     solution = solve(scene(0.2, 4, analysis=CUBIC, **sections), comm)
@@ -35,7 +38,8 @@ def test_forces_and_energies_balance(sections, comm):
 
 
 def test_fields_of_third_order_are_written_on_second_order_triangles(tmp_path):
-    """All of the displacement's values at vertices and middles, on a mesh whose arcs lie on their circles."""
+    """All of the displacement's values at vertices and middles, on a mesh whose arcs lie on their
+    circles."""
     problem = scene(0.2, 1, analysis=CUBIC)
     solve_scene(problem, tmp_path)
     u = solve(problem).joint.equilibrium.displacement()

@@ -1,4 +1,5 @@
-"""Drives: displacements and forces at once and in turn, reference points, couplings, pressures, and what they cost."""
+"""Drives: displacements and forces at once and in turn, reference points, couplings, pressures, and
+what they cost."""
 
 from __future__ import annotations
 
@@ -11,10 +12,29 @@ from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import Elastic
-from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
+from archord.solver.problem import (
+    Body,
+    Drive,
+    Guess,
+    Interaction,
+    Load,
+    Mean,
+    Problem,
+    Rigid,
+    Support,
+)
 from archord.solver.stepping import StepFailure, StepRules
 from archord.solver.system import System
-from tests.solver.parts import ELASTIC, HARDENING, NU, E, blocks, coordinates, quarter_annulus, solve
+from tests.solver.parts import (
+    ELASTIC,
+    HARDENING,
+    NU,
+    E,
+    blocks,
+    coordinates,
+    quarter_annulus,
+    solve,
+)
 
 BAR, LENGTH = Elastic(E, 0.0, "strain"), 4.0
 END = (LENGTH, -0.5)
@@ -55,7 +75,8 @@ def drives(control: str, **paths) -> list[Drive]:
 
 @pytest.mark.parametrize("control", ["displacement", "force"])
 def test_a_moment_on_a_rigid_end_bends_a_bar_as_beams_bend(control):
-    """M = E I kappa, exactly where nu = 0; the end goes aside by theta L / 2, and the wall holds against the moment."""
+    """M = E I kappa, exactly where nu = 0; the end goes aside by theta L / 2, and the wall holds
+    against the moment."""
     theta = 1e-3
     moment = E / 12 * theta / LENGTH
     paths = {"x": (0, 0), "y": (0, theta * LENGTH / 2), "turn": (0, theta)}
@@ -63,7 +84,9 @@ def test_a_moment_on_a_rigid_end_bends_a_bar_as_beams_bend(control):
         paths = {"x": (0, 0), "y": (0, 0), "turn": (0, moment)}
     supports = [*reference_point("end", "right"), *WALL]
     system = solve(bar(supports=supports, drives=drives(control, **paths)), [1.0])
-    np.testing.assert_allclose(system.driven()[0], [0, theta * LENGTH / 2, theta], rtol=1e-8, atol=1e-11)
+    np.testing.assert_allclose(
+        system.driven()[0], [0, theta * LENGTH / 2, theta], rtol=1e-8, atol=1e-11
+    )
     np.testing.assert_allclose(system.driven()[1], [0, 0, moment], rtol=1e-8, atol=1e-10 * E)
     for name, sign in (("end", 1), ("wall", -1)):
         np.testing.assert_allclose(system.reaction(name), 0, atol=1e-10 * E)
@@ -79,22 +102,30 @@ def test_forces_at_once_and_in_turn_add_up():
     def loaded(loads, control="force", **paths):
         return solve(bar(supports=supports, drives=drives(control, **paths)), loads)
 
-    single = [loaded([1.0], **{n: (0, f * (n == name)) for n, f in zip(NAMES, force, strict=True)}) for name in NAMES]
+    single = [
+        loaded([1.0], **{n: (0, f * (n == name)) for n, f in zip(NAMES, force, strict=True)})
+        for name in NAMES
+    ]
     together = loaded([1.0], **{name: (0, f) for name, f in zip(NAMES, force, strict=True)})
     x, y, turn = force
     in_turn = loaded([0.4, 1.0, 2.0, 3.0], x=(0, x), y=(0, 0, y), turn=(0, 0, 0, turn))
     u = sum(system.equilibrium.displacement() for system in single)
     for system in (together, in_turn):
-        np.testing.assert_allclose(system.equilibrium.displacement(), u, rtol=0, atol=1e-9 * np.abs(u).max())
+        np.testing.assert_allclose(
+            system.equilibrium.displacement(), u, rtol=0, atol=1e-9 * np.abs(u).max()
+        )
     q = together.driven()[0]
-    moved = loaded([1.0], "displacement", **{name: (0, level) for name, level in zip(NAMES, q, strict=True)})
+    moved = loaded(
+        [1.0], "displacement", **{name: (0, level) for name, level in zip(NAMES, q, strict=True)}
+    )
     np.testing.assert_allclose(moved.driven()[1], force, rtol=1e-8)
     np.testing.assert_allclose(moved.reaction("end"), force[:2], rtol=1e-8)
     assert moved.reaction_moment("end", END) == pytest.approx(force[2], rel=1e-7)
 
 
 def test_a_mean_displacement_takes_the_force_that_gives_it():
-    """At a point off the edge: a Lagrange multiplier, against forces on the same coupling; statically equivalent."""
+    """At a point off the edge: a Lagrange multiplier, against forces on the same coupling;
+    statically equivalent."""
     point, q = (5.0, 0.3), np.array([1e-3, -2e-3, 1e-3])
     given = {name: (0, level) for name, level in zip(NAMES, q, strict=True)}
     means = coupling("tip", "right", point)
@@ -109,7 +140,9 @@ def test_a_mean_displacement_takes_the_force_that_gives_it():
     pushed = solve(bar(means=means, drives=drives("force", **forced)), [1.0])
     np.testing.assert_allclose(pushed.driven()[0], q, rtol=1e-7)
     u = pushed.equilibrium.displacement()
-    np.testing.assert_allclose(u, prescribed.equilibrium.displacement(), rtol=0, atol=1e-8 * np.abs(u).max())
+    np.testing.assert_allclose(
+        u, prescribed.equilibrium.displacement(), rtol=0, atol=1e-8 * np.abs(u).max()
+    )
     assert pushed.energies()[0] == pytest.approx(force @ q / 2, rel=1e-7)
 
 
@@ -131,25 +164,41 @@ def test_means_alone_hold_a_body_on_any_ranks(comm):
 
 
 def pressed(comm=MPI.COMM_SELF, **options) -> Problem:
-    """Two blocks in contact: the lower one on a rigid reference point, which forces push and turn, the upper one under
-    a disc and on a coupling that shifts its middle."""
+    """Two blocks in contact: the lower one on a rigid reference point, which forces push and turn,
+    the upper one under a disc and on a coupling that shifts its middle."""
     bodies = [Body("lower", HARDENING), Body("upper", ELASTIC)]
-    disc = Rigid(RigidCircle(np.array([0.45, 3.0]), 2.0), {"disc x": (1.0, 0.0), "disc y": (0.5, -1.0)})
-    interactions = [Interaction("joint", ("upper bottom", "lower top")), Interaction("disc", (disc, "lid"))]
-    paths = [*drives("force", y=(0, 0.03), turn=(0, 1e-3)), *drives("displacement", x=(0, 0), mean=(0, 2e-3))]
-    paths += [Drive("disc x", (0, 1e-3)), Drive("disc y", (0, 0.02), options.pop("disc", "displacement"))]
+    disc = Rigid(
+        RigidCircle(np.array([0.45, 3.0]), 2.0), {"disc x": (1.0, 0.0), "disc y": (0.5, -1.0)}
+    )
+    interactions = [
+        Interaction("joint", ("upper bottom", "lower top")),
+        Interaction("disc", (disc, "lid")),
+    ]
+    paths = [
+        *drives("force", y=(0, 0.03), turn=(0, 1e-3)),
+        *drives("displacement", x=(0, 0), mean=(0, 2e-3)),
+    ]
+    paths += [
+        Drive("disc x", (0, 1e-3)),
+        Drive("disc y", (0, 0.02), options.pop("disc", "displacement")),
+    ]
     means = [Mean("shift", "upper bottom", 0, (0.5, 0.7), "mean")]
     supports = reference_point("base", "base", (0.4, -1.2))
-    return Problem(blocks(comm, 3, 4), bodies, interactions, supports, means=means, drives=paths, **options)
+    return Problem(
+        blocks(comm, 3, 4), bodies, interactions, supports, means=means, drives=paths, **options
+    )
 
 
 def test_the_bordered_tangent_is_the_derivative_of_the_residual():
-    """With plastic points, contact, a forced disc, a reference point and a multiplier, in random directions."""
+    """With plastic points, contact, a forced disc, a reference point and a multiplier, in random
+    directions."""
     system = System(pressed(disc="force"))
     equilibrium, rng = system.equilibrium, np.random.default_rng(0)
     equilibrium.load = 1.0
     state = 1e-3 * rng.normal(size=len(equilibrium.state()))
-    state[1 : 2 * equilibrium.n_local : 2] -= 0.03 * coordinates(system.V)[:, 1]  # pressed into the plastic range
+    state[1 : 2 * equilibrium.n_local : 2] -= (
+        0.03 * coordinates(system.V)[:, 1]
+    )  # pressed into the plastic range
     state[2 * equilibrium.n_local + system.drive_names.index("disc y")] = 0.06
     x = equilibrium.vector()
     equilibrium.pack(state, x)
@@ -158,7 +207,9 @@ def test_the_bordered_tangent_is_the_derivative_of_the_residual():
     equilibrium.update_tangent()
     assert all(pair.active.any() for pair in system.contact.pairs)
     assert system.peeq()[0] > 0
-    assert len(equilibrium.drives.unknown) == 3 + 1 + 3  # forces, a multiplier, and the anchors of its body
+    assert (
+        len(equilibrium.drives.unknown) == 3 + 1 + 3
+    )  # forces, a multiplier, and the anchors of its body
     n, sides = x.local_size, []
     free = np.append(~equilibrium.fixed.ravel(), np.ones(n - equilibrium.fixed.size, dtype=bool))
     for _ in range(3):
@@ -196,7 +247,13 @@ def test_pressure_in_a_thick_cylinder_is_lames():
     supports = [Support("x", "x", 1), Support("y", "y", 0)]
     loads = [Load(facets="inner", pressure=1.0, drive="pressure")]
     problem = Problem(
-        mesh, [Body("ring", ELASTIC)], (), supports, loads, drives=[Drive("pressure", (0, p))], symmetry=4.0
+        mesh,
+        [Body("ring", ELASTIC)],
+        (),
+        supports,
+        loads,
+        drives=[Drive("pressure", (0, p))],
+        symmetry=4.0,
     )
     system = solve(problem, [1.0])
     A, B = p * a**2 / (b**2 - a**2), p * a**2 * b**2 / (b**2 - a**2)
@@ -219,7 +276,8 @@ def test_a_force_on_facets_is_spread_evenly():
 
 
 def rings(a, b, c, d, size) -> TaggedMesh:
-    """Quarters of two rings, "bush" between the radii ``a`` and ``b`` and "housing" between ``c`` and ``d``."""
+    """Quarters of two rings, "bush" between the radii ``a`` and ``b`` and "housing" between ``c``
+    and ``d``."""
     radii = {1: a, 2: b, 3: c, 4: d}
 
     def build(gmsh) -> None:
@@ -250,15 +308,23 @@ def rings(a, b, c, d, size) -> TaggedMesh:
 
 def fitted(interference, overlap, **options) -> System:
     """A bush in a housing, of unlike materials, pressed in a stage of its own."""
-    bodies = [Body("bush", Elastic(110.0, 0.34, "strain")), Body("housing", Elastic(70.0, 0.33, "strain"))]
-    fit = Interaction("fit", ("bush outer", "housing inner"), interference=interference, overlap=overlap)
+    bodies = [
+        Body("bush", Elastic(110.0, 0.34, "strain")),
+        Body("housing", Elastic(70.0, 0.33, "strain")),
+    ]
+    fit = Interaction(
+        "fit", ("bush outer", "housing inner"), interference=interference, overlap=overlap
+    )
     supports = [Support("x", "x", 1), Support("y", "y", 0)]
     mesh = rings(10.05, 14.0, 14.0 - overlap, 30.0, 1.2)
-    return solve(Problem(mesh, bodies, [fit], supports, fit=True, symmetry=4.0, **options), [0.5, 1.0])
+    return solve(
+        Problem(mesh, bodies, [fit], supports, fit=True, symmetry=4.0, **options), [0.5, 1.0]
+    )
 
 
 def test_forces_balance_to_the_forces_that_a_fit_presses_with():
-    """They are the pressure on the whole circle, whatever their resultant: zero where nothing but the fit loads it."""
+    """They are the pressure on the whole circle, whatever their resultant: zero where nothing but
+    the fit loads it."""
     system = fitted(0.02, 0.0)
     pair = system.contact.pair_of(system.sides["housing inner"])
     pressed = float(pair.pressure.mean()) * 2 * np.pi * 14.0
@@ -266,12 +332,16 @@ def test_forces_balance_to_the_forces_that_a_fit_presses_with():
     rng = np.random.default_rng(0)
     system.equilibrium.u.x.array[:] += 1e-7 * rng.random(len(system.equilibrium.u.x.array))
     system.equilibrium.evaluate()
-    left = [4 * np.linalg.norm(system.equilibrium.residual_on(system.nodes_of(b))) for b in system.problem.bodies]
+    left = [
+        4 * np.linalg.norm(system.equilibrium.residual_on(system.nodes_of(b)))
+        for b in system.problem.bodies
+    ]
     assert system.force_balance() == pytest.approx(max(left) / pressed, rel=5e-3)
 
 
 def test_a_press_fit_is_lames():
-    """Fit pressure and displacements of two rings, given as an interference and drawn as an overlap."""
+    """Fit pressure and displacements of two rings, given as an interference and drawn as an
+    overlap."""
     pressures = []
     for interference, overlap in ((0.02, 0.0), (0.0, 0.02)):
         system = fitted(interference, overlap)
@@ -291,7 +361,9 @@ def test_a_press_fit_is_lames():
         assert np.abs(pair.pressure / pressure - 1).max() < 0.01
         np.testing.assert_allclose(pair.distance, 0, atol=1e-5)
         X = coordinates(system.V)
-        bore = np.isclose(np.linalg.norm(X, axis=1), c) & (system.equilibrium.displacement() @ [1, 1] > 0)
+        bore = np.isclose(np.linalg.norm(X, axis=1), c) & (
+            system.equilibrium.displacement() @ [1, 1] > 0
+        )
         moved = np.linalg.norm(system.equilibrium.displacement()[bore], axis=1)
         np.testing.assert_allclose(moved, pressure * flexibility(c, d, 70.0, 0.33), rtol=2e-3)
         pressures.append(mean)
@@ -306,18 +378,25 @@ def test_half_a_fit_is_there_in_the_middle_of_its_stage():
 
 
 def test_every_disc_follows_its_own_drive():
-    """One is pushed into a block by a force, one by the displacement that this takes: both indent alike."""
+    """One is pushed into a block by a force, one by the displacement that this takes: both indent
+    alike."""
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     names = ("", "other")
-    discs = [Rigid(RigidCircle(np.array([0.5, y + 2.0]), 2.0), (0.0, -1.0), names[y]) for y in (0, 1)]
+    discs = [
+        Rigid(RigidCircle(np.array([0.5, y + 2.0]), 2.0), (0.0, -1.0), names[y]) for y in (0, 1)
+    ]
     interactions = [
-        Interaction(f"{y}", (disc, f)) for y, disc, f in zip((0, 1), discs, ("lower top", "lid"), strict=True)
+        Interaction(f"{y}", (disc, f))
+        for y, disc, f in zip((0, 1), discs, ("lower top", "lid"), strict=True)
     ]
     supports = [Support("base", f, axis) for f in ("base", "upper bottom") for axis in (0, 1)]
     mesh = blocks(MPI.COMM_SELF, 6, 6)
     paths = [Drive("", (0, 0.05), "force"), Drive("other", (0, 0.0))]
     start = Guess(1e-3)
-    first = solve(Problem(mesh, bodies, interactions, supports, drives=paths, guess=lambda load: start), [0.5, 1.0])
+    first = solve(
+        Problem(mesh, bodies, interactions, supports, drives=paths, guess=lambda load: start),
+        [0.5, 1.0],
+    )
     depth = first.drive_displacement("")
     assert first.drive_force("other") == 0
     paths = [Drive("", (0, 0.0)), Drive("other", (0, depth))]
@@ -328,7 +407,11 @@ def test_every_disc_follows_its_own_drive():
 
 def test_a_force_that_nothing_resists_is_told_with_its_drive():
     """A block that two forces push, of which one finds no resistance."""
-    supports = [*reference_point("lid", "lid", (0.5, 1.0)), Support("base", "base", 1), Support("base", "base", 0)]
+    supports = [
+        *reference_point("lid", "lid", (0.5, 1.0)),
+        Support("base", "base", 1),
+        Support("base", "base", 0),
+    ]
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     paths = drives("force", x=(0, 0.01), y=(0, -0.02), turn=(0, 0))
     problem = Problem(

@@ -15,10 +15,14 @@ from archord.solver.system import System
 from tests.output.test_restart import go_on, run
 
 
-def eye(friction: float, force: list[float], steps: list[int], comm: MPI.Comm = MPI.COMM_SELF) -> System:
+def eye(
+    friction: float, force: list[float], steps: list[int], comm: MPI.Comm = MPI.COMM_SELF
+) -> System:
     """The eye of the stability benchmark, not yet solved, with this friction everywhere."""
     scene = cases()["eye, pulled and let go"].scene
-    rubbing = [interaction.model_copy(update={"friction": friction}) for interaction in scene.interaction]
+    rubbing = [
+        interaction.model_copy(update={"friction": friction}) for interaction in scene.interaction
+    ]
     pull = scene.load[0].model_copy(update={"force": force})
     path = scene.path.model_copy(update={"steps": steps})
     changed = scene.model_copy(update={"interaction": rubbing, "load": [pull], "path": path})
@@ -26,8 +30,8 @@ def eye(friction: float, force: list[float], steps: list[int], comm: MPI.Comm = 
 
 
 def follow(system: System, targets: list[float]) -> dict[str, list]:
-    """What was found at the ``targets``: iterations of the step, which must not be cut, the pin's displacement, and the
-    reaction of the pin that is held."""
+    """What was found at the ``targets``: iterations of the step, which must not be cut, the pin's
+    displacement, and the reaction of the pin that is held."""
     found: dict[str, list] = {"iterations": [], "moved": [], "reaction": []}
 
     def done(step, position) -> None:
@@ -42,7 +46,8 @@ def follow(system: System, targets: list[float]) -> dict[str, list]:
 
 @pytest.mark.mpi
 def test_an_eye_is_pulled_and_let_go_without_a_cutback(comm):
-    """The held pin carries the pull, but for the little that springs take, and nothing once it is let go."""
+    """The held pin carries the pull, but for the little that springs take, and nothing once it is
+    let go."""
     found = follow(eye(0.15, [3000.0, 0.0], [2, 1], comm), [1.0, 1.5, 2.0, 3.0])
     pull = np.array([0.0, 1500.0, 3000.0, 0.0])
     reactions = np.stack([-pull, np.zeros(4)], axis=1)
@@ -51,14 +56,15 @@ def test_an_eye_is_pulled_and_let_go_without_a_cutback(comm):
 
 
 def test_friction_hardly_moves_where_the_pin_first_touches():
-    """What brings a loose body to its first contact is no slip: nothing then keeps the pin from where it rests without
-    friction, but what friction holds while it is pressed."""
+    """What brings a loose body to its first contact is no slip: nothing then keeps the pin from
+    where it rests without friction, but what friction holds while it is pressed."""
     smooth, rough = (follow(eye(mu, [300.0], [1]), [1.0, 2.0])["moved"][-1] for mu in (0.0, 0.15))
     assert rough == pytest.approx(smooth, rel=0.02)
 
 
 def test_a_run_goes_on_from_where_it_was_halted(tmp_path):
-    """Slip counts from touch-down at points that did not touch before, which the accepted state tells once more."""
+    """Slip counts from touch-down at points that did not touch before, which the accepted state
+    tells once more."""
     scene = cases()["eye, pulled and let go"].scene
     run(scene, tmp_path / "whole", copies={3: tmp_path / "halted"})
     go_on(scene, tmp_path / "halted")
@@ -69,10 +75,17 @@ def test_a_run_goes_on_from_where_it_was_halted(tmp_path):
 
 
 def points(n: int = 200) -> tuple[np.ndarray, ...]:
-    """Gaps, slips, trial tractions, gammas ``(n, 2)`` and states of points that touch, or do not."""
+    """Gaps, slips, trial tractions, gammas ``(n, 2)`` and states of points that touch, or do
+    not."""
     draw = np.random.default_rng(1)
     state = FrictionState(draw.normal(0, 0.01, n), np.maximum(draw.normal(0, 1, n), 0), np.zeros(n))
-    return np.zeros(n), draw.normal(0, 0.01, n), draw.normal(0, 1, (n, 2)), np.full((n, 2), 100.0), state
+    return (
+        np.zeros(n),
+        draw.normal(0, 0.01, n),
+        draw.normal(0, 1, (n, 2)),
+        np.full((n, 2), 100.0),
+        state,
+    )
 
 
 def test_secants_change_the_derivative_alone():
@@ -91,7 +104,8 @@ def test_secants_change_the_derivative_alone():
 
 
 def test_the_elastic_law_holds_what_touched():
-    """Points that touched stick with whatever shear; others slide without friction and lose no work."""
+    """Points that touched stick with whatever shear; others slide without friction and lose no
+    work."""
     gap, slip, trial, gamma, before = points()
     traction, _, after = Coulomb(0.3).elastic().update(gap, slip, trial, gamma, before)
     touches, touched = trial[:, 0] > 0, before.pressure > 0

@@ -24,7 +24,8 @@ MU = 0.3
 
 
 def lid(*names: str, control: str = "force", **paths) -> tuple[list[Support], list[Drive]]:
-    """The edge "lid", moved straight by drives of these ``names`` ("x", "y"): ``paths`` of forces or displacements."""
+    """The edge "lid", moved straight by drives of these ``names`` ("x", "y"): ``paths`` of forces
+    or displacements."""
     supports = [Support(name, "lid", "xy".index(name), 1.0, name) for name in names]
     return supports, [Drive(name, paths[name], control) for name in names]
 
@@ -38,11 +39,18 @@ def wedge(comm: MPI.Comm, slope: float, n: int):
 
     def build(gmsh) -> None:
         for name, corners, edges in (
-            ("lower", [(-1, -1), (3, -1), (3, 3 * slope), (-1, -slope)], {"base": 0, "lower top": 2}),
+            (
+                "lower",
+                [(-1, -1), (3, -1), (3, 3 * slope), (-1, -slope)],
+                {"base": 0, "lower top": 2},
+            ),
             ("upper", [(0, 0), (1, slope), (1, 1.5), (0, 1.5)], {"upper bottom": 0, "lid": 2}),
         ):
             points = [gmsh.model.geo.addPoint(x, y, 0) for x, y in corners]
-            lines = [gmsh.model.geo.addLine(a, b) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+            lines = [
+                gmsh.model.geo.addLine(a, b)
+                for a, b in zip(points, [*points[1:], points[0]], strict=True)
+            ]
             face = gmsh.model.geo.addPlaneSurface([gmsh.model.geo.addCurveLoop(lines)])
             gmsh.model.geo.synchronize()
             gmsh.model.addPhysicalGroup(2, [face], name=name)
@@ -56,14 +64,19 @@ def wedge(comm: MPI.Comm, slope: float, n: int):
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 @pytest.mark.parametrize("mu", [0.1, 0.5])
 def test_a_block_is_pushed_up_a_wedge_by_the_force_of_the_cone(mu, kinematics):
-    """F/G = (tan a + mu)/(1 - mu tan a) (NAFEMS CGS-4), on the whole face that slides, and nothing of it before."""
+    """F/G = (tan a + mu)/(1 - mu tan a) (NAFEMS CGS-4), on the whole face that slides, and nothing
+    of it before."""
     slope = 0.2
     supports, drives = lid("x", control="displacement", x=[0, 0, 1e-6])
     up, weight = lid("y", y=[0, -0.01, -0.01])
     bodies = [Body(name, STEEL) for name in ("lower", "upper")]
-    contact = Interaction("contact", ("upper bottom", "lower top"), friction=mu, kinematics=kinematics)
+    contact = Interaction(
+        "contact", ("upper bottom", "lower top"), friction=mu, kinematics=kinematics
+    )
     mesh = wedge(MPI.COMM_WORLD, slope, 4)
-    system = System(Problem(mesh, bodies, [contact], [*held("base"), *supports, *up], drives=drives + weight))
+    system = System(
+        Problem(mesh, bodies, [contact], [*held("base"), *supports, *up], drives=drives + weight)
+    )
     ratio = (slope + mu) / (1 - mu * slope)
     found = []
     for load in (1.0, 1.01, 1.5, 2.0):
@@ -74,10 +87,14 @@ def test_a_block_is_pushed_up_a_wedge_by_the_force_of_the_cone(mu, kinematics):
 
 
 def rings(comm: MPI.Comm, radii: tuple[float, float, float], size: float):
-    """Two rings that touch at the middle one of ``radii``: "inside" the inner's bore, "pin" and "hole", "outside"."""
+    """Two rings that touch at the middle one of ``radii``: "inside" the inner's bore, "pin" and
+    "hole", "outside"."""
 
     def build(gmsh) -> None:
-        for name, a, b, edges in (("inner", *radii[:2], ("inside", "pin")), ("outer", *radii[1:], ("hole", "outside"))):
+        for name, a, b, edges in (
+            ("inner", *radii[:2], ("inside", "pin")),
+            ("outer", *radii[1:], ("hole", "outside")),
+        ):
             disc, bore = (gmsh.model.occ.addDisk(0, 0, 0, r, r) for r in (b, a))
             (face, *_), _ = gmsh.model.occ.cut([(2, disc)], [(2, bore)])
             gmsh.model.occ.synchronize()
@@ -96,7 +113,8 @@ def rings(comm: MPI.Comm, radii: tuple[float, float, float], size: float):
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
-    """T = 2 pi mu p r^2, from p before it turns; sticking before, and no more beyond, all round and round again."""
+    """T = 2 pi mu p r^2, from p before it turns; sticking before, and no more beyond, all round and
+    round again."""
     r, mu = 10.0, 0.2
     mesh = rings(MPI.COMM_WORLD, (6.0, r, 18.0), 1.5)
     turn = [
@@ -106,18 +124,27 @@ def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
     fit = Interaction("fit", ("pin", "hole"), friction=mu, interference=0.01, kinematics=kinematics)
     bodies = [Body("inner", STEEL), Body("outer", STEEL)]
     path = [0, 0, 1e-4, 1e-3, 2e-3]
-    problem = Problem(mesh, bodies, [fit], [*turn, *held("outside")], drives=[Drive("turn", path)], fit=True)
+    problem = Problem(
+        mesh, bodies, [fit], [*turn, *held("outside")], drives=[Drive("turn", path)], fit=True
+    )
     system, full, torque, on_contact = System(problem), [], [], []
     for load in (1.0, 2.0, 3.0, 4.0):
         system.solve([load])
-        pressed = sum(pair.share * (pair.surface.weight * pair.pressure).sum() for pair in system.contact.pairs)
+        pressed = sum(
+            pair.share * (pair.surface.weight * pair.pressure).sum()
+            for pair in system.contact.pairs
+        )
         full.append(mu * r * system.comm.allreduce(pressed))
         torque.append(system.drive_force("turn"))
         on_contact.append(system.contact_moment("fit", (0.0, 0.0)))
     assert torque[1] < 0.9 * full[0]
     assert on_contact[2] == pytest.approx(full[0], rel=1e-3)
-    assert on_contact[3] == pytest.approx(full[3], rel=1e-3)  # the bore's linear rotation has widened it
-    if kinematics == "reference":  # else those who hold feel the normals turn with the pin by an angle, over mu
+    assert on_contact[3] == pytest.approx(
+        full[3], rel=1e-3
+    )  # the bore's linear rotation has widened it
+    if (
+        kinematics == "reference"
+    ):  # else those who hold feel the normals turn with the pin by an angle, over mu
         assert torque == pytest.approx(on_contact, rel=1e-3, abs=1e-3 * full[0])
     slipped = (path[-1] - on_contact[-1] / torque[1] * path[2]) * r
     assert system.friction_dissipation() == pytest.approx(full[-1] / r * slipped, rel=0.01)
@@ -131,8 +158,12 @@ def test_boundless_friction_ties_what_is_pressed():
         contact = Interaction("contact", ("upper bottom", "lower top"), **law)
         bodies = [Body(name, STEEL) for name in ("lower", "upper")]
         mesh = blocks(MPI.COMM_WORLD, 3, 4)
-        system = solve(Problem(mesh, bodies, [contact], [*held("base"), *supports], drives=drives), [1.0, 2.0])
-        found.append([system.drive_displacement("x"), system.drive_displacement("y"), *system.energies()])
+        system = solve(
+            Problem(mesh, bodies, [contact], [*held("base"), *supports], drives=drives), [1.0, 2.0]
+        )
+        found.append(
+            [system.drive_displacement("x"), system.drive_displacement("y"), *system.energies()]
+        )
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
@@ -143,7 +174,9 @@ def test_sliding_forth_and_back_loses_what_the_loads_put_in():
     supports, drives = lid("x", control="displacement", x=[0, 0, 1e-3, -1e-3, 1e-3])
     up, weight = lid("y", y=[0, *4 * [-10]])
     mesh = blocks(MPI.COMM_WORLD, 4, 3)
-    system = System(Problem(mesh, bodies, [contact], [*held("base"), *supports, *up], drives=drives + weight))
+    system = System(
+        Problem(mesh, bodies, [contact], [*held("base"), *supports, *up], drives=drives + weight)
+    )
     work, last, lost = 0.0, (np.zeros(2), np.zeros(2)), [0.0]
     for load in np.linspace(0, 4, 161)[1:]:
         system.solve([load])
@@ -157,23 +190,37 @@ def test_sliding_forth_and_back_loses_what_the_loads_put_in():
 
 
 def cylinder_on_block(comm: MPI.Comm, R: float, size: float, near: float):
-    """Half a cylinder on a block; elements of ``size`` within ``near`` of first touch, and larger with the distance."""
+    """Half a cylinder on a block; elements of ``size`` within ``near`` of first touch, and larger
+    with the distance."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
         points = [geo.addPoint(x, y, 0) for x, y in ((0, R), (-R, R), (0, 0), (R, R))]
-        arcs = [geo.addCircleArc(a, points[0], b) for a, b in ((points[1], points[2]), (points[2], points[3]))]
+        arcs = [
+            geo.addCircleArc(a, points[0], b)
+            for a, b in ((points[1], points[2]), (points[2], points[3]))
+        ]
         top = geo.addLine(points[3], points[1])
         corners = [
-            geo.addPoint(x, y, 0) for x, y in ((-4 * R, -4 * R), (4 * R, -4 * R), (4 * R, 0), (0, 0), (-4 * R, 0))
+            geo.addPoint(x, y, 0)
+            for x, y in ((-4 * R, -4 * R), (4 * R, -4 * R), (4 * R, 0), (0, 0), (-4 * R, 0))
         ]
-        lines = [geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+        lines = [
+            geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
+        ]
         sets = {"upper": [*arcs, top], "lower": lines}
-        faces = {name: geo.addPlaneSurface([geo.addCurveLoop(edges)]) for name, edges in sets.items()}
+        faces = {
+            name: geo.addPlaneSurface([geo.addCurveLoop(edges)]) for name, edges in sets.items()
+        }
         geo.synchronize()
         for name, face in faces.items():
             gmsh.model.addPhysicalGroup(2, [face], name=name)
-        for name, edges in {"arc": arcs, "lid": [top], "lower top": lines[2:4], "base": [lines[0]]}.items():
+        for name, edges in {
+            "arc": arcs,
+            "lid": [top],
+            "lower top": lines[2:4],
+            "base": [lines[0]],
+        }.items():
             gmsh.model.addPhysicalGroup(1, edges, name=name)
         field = gmsh.model.mesh.field
         field.add("MathEval", 1)
@@ -187,7 +234,8 @@ def cylinder_on_block(comm: MPI.Comm, R: float, size: float, near: float):
 
 
 def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
-    """c/a = sqrt(1 - Q/(mu P)) and the shear at the centre, mu p0 (1 - c/a) (Johnson 1985, section 7.2)."""
+    """c/a = sqrt(1 - Q/(mu P)) and the shear at the centre, mu p0 (1 - c/a) (Johnson 1985, section
+    7.2)."""
     R, P = 10.0, 1000.0
     modulus = E / (2 * (1 - NU**2))
     a = np.sqrt(4 * P * R / (np.pi * modulus))
@@ -196,7 +244,9 @@ def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
     contact = Interaction("contact", ("arc", "lower top"), friction=MU, slide=a)
     bodies = [Body(name, STEEL) for name in ("upper", "lower")]
     mesh = cylinder_on_block(MPI.COMM_WORLD, R, a / 24, 1.2 * a)
-    problem = Problem(mesh, bodies, [contact], [*held("base"), *supports], drives=drives, stabilise=True)
+    problem = Problem(
+        mesh, bodies, [contact], [*held("base"), *supports], drives=drives, stabilise=True
+    )
     system = System(problem)
     system.solve([1.0])
     for n, share in enumerate(shares, 1):
@@ -207,14 +257,17 @@ def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
             assert width == pytest.approx(stick * a, rel=0.03)
             x = pair.surface.point.reshape(-1, 2)[:, 0]
             near = np.abs(x) < 0.2 * stick * a
-            q = system.comm.allreduce(np.abs(pair.traction[near, 1]).sum()) / system.comm.allreduce(near.sum())
+            q = system.comm.allreduce(np.abs(pair.traction[near, 1]).sum()) / system.comm.allreduce(
+                near.sum()
+            )
             x2 = system.comm.allreduce((x[near] ** 2).sum()) / system.comm.allreduce(near.sum())
             flat = MU * p0 * (1 - stick - x2 / (2 * a**2) * (1 - 1 / stick))
             assert q == pytest.approx(flat, rel=0.02)
 
 
 def test_what_cannot_rub_is_refused():
-    """No friction is the law without; a tied surface has none, and a coefficient is not negative."""
+    """No friction is the law without; a tied surface has none, and a coefficient is not
+    negative."""
     assert contact_law("frictionless", 0.0) is LAWS["frictionless"]
     for law, friction in (("tied", 0.1), ("frictionless", -0.1)):
         with pytest.raises(ValueError, match="friction must be positive"):
@@ -222,8 +275,8 @@ def test_what_cannot_rub_is_refused():
 
 
 def test_the_joint_of_the_paper_with_friction():
-    """P, p0 and the energy lost, from GetFEM and a code of our own that agree to the digits given (P) and about; the
-    dissipation closes the balance of energy."""
+    """P, p0 and the energy lost, from GetFEM and a code of our own that agree to the digits given
+    (P) and about; the dissipation closes the balance of energy."""
     scene = Scene(
         joint={"radius": 1.0, "relative_clearance": 0.005},
         pin={"E": 1.82, "nu": 0.3},

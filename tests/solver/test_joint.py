@@ -26,7 +26,8 @@ def reference_forces(table: str, start: str) -> list[float]:
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_elastic_force_agrees_with_independent_solvers(kinematics):
-    """P(delta) of GetFEM (current) and NGSolve (reference) within 0.05 % on at most 6 000 dofs, up to 2 dR."""
+    """P(delta) of GetFEM (current) and NGSolve (reference) within 0.05 % on at most 6 000 dofs, up
+    to 2 dR."""
     solution = solve(scene(analysis={"kinematics": kinematics}))
     assert solution.joint.n_dofs <= 6000
     P = [m.P for m in solution.steps]
@@ -34,7 +35,8 @@ def test_elastic_force_agrees_with_independent_solvers(kinematics):
 
 
 def test_elastic_contact_angle_and_peak_pressure():
-    """eps and p0 at 2 dR within 0.5 % of the concentric joint (NGSolve p4), which differs from ours by O(dR/R)."""
+    """eps and p0 at 2 dR within 0.5 % of the concentric joint (NGSolve p4), which differs from ours
+    by O(dR/R)."""
     profile = REFERENCE["elastic_profile_concentric_delta_2"]
     last = solve(scene(steps=1)).steps[-1]
     assert last.eps == pytest.approx(profile["eps_rad"], rel=5e-3)
@@ -43,8 +45,8 @@ def test_elastic_contact_angle_and_peak_pressure():
 
 @pytest.mark.parametrize("size", [0.02, 0.005])
 def test_plastic_force_agrees_with_independent_solvers(size):
-    """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, without cutback, on 2 %R in at most 7 iterations a step;
-    on the finest mesh, with its shear bands, as well."""
+    """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, without cutback, on 2 %R in at most
+    7 iterations a step; on the finest mesh, with its shear bands, as well."""
     solution = solve(scene(size, steps=20, yield_stress=0.002, joint={"growth": 0.5}))
     assert len(solution.steps) == 20
     assert pytest.approx(0.006692, rel=2e-3) == solution.steps[-1].P
@@ -67,21 +69,26 @@ VARIANTS = {
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_forces_balance(variant):
-    """Pin reaction, block reaction and the integral of the contact pressure agree to 1e-8 of P in each step."""
+    """Pin reaction, block reaction and the integral of the contact pressure agree to 1e-8 of P in
+    each step."""
     solution = solve(scene(0.12, 3, **VARIANTS[variant]))
     for m, profiles in zip(solution.steps, solution.profiles, strict=True):
         assert m.P > 0
         assert m.force_balance < 1e-8
         for p in profiles.values():
-            assert (p.pressure * p.weight).sum() == pytest.approx((p.raw_pressure * p.weight).sum(), rel=1e-12)
+            assert (p.pressure * p.weight).sum() == pytest.approx(
+                (p.raw_pressure * p.weight).sum(), rel=1e-12
+            )
 
 
 def test_a_projected_pressure_has_no_more_than_its_force():
-    """The vertical integral of both sides' pressure is P: within O(dR/R), as the arcs' normals are the undeformed
-    ones."""
+    """The vertical integral of both sides' pressure is P: within O(dR/R), as the arcs' normals are
+    the undeformed ones."""
     solution = solve(scene())
     for p in solution.profiles[-1].values():
-        assert 2 * (p.pressure * p.weight * np.cos(p.angle)).sum() == pytest.approx(solution.steps[-1].P, rel=1e-2)
+        assert 2 * (p.pressure * p.weight * np.cos(p.angle)).sum() == pytest.approx(
+            solution.steps[-1].P, rel=1e-2
+        )
 
 
 @pytest.mark.parametrize(
@@ -89,8 +96,8 @@ def test_a_projected_pressure_has_no_more_than_its_force():
     [("integration", ("both", "pin", "block"), 2e-4), ("gamma_factor", (0.5, 2.0, 10.0), 1e-4)],
 )
 def test_what_the_form_leaves_open_does_not_matter(key, values, within):
-    """Which sides are integrated, and gamma over a range of 20, move P by the discretisation error: the form is
-    consistent."""
+    """Which sides are integrated, and gamma over a range of 20, move P by the discretisation error:
+    the form is consistent."""
     forces = [solve(scene(steps=1, analysis={key: value})).steps[-1].P for value in values]
     assert forces == pytest.approx([forces[0]] * 3, rel=within)
 
@@ -106,7 +113,8 @@ EXTREMES = {
 
 @pytest.mark.parametrize("extreme", EXTREMES)
 def test_extreme_joints_are_solved_to_round_off(extreme):
-    """Where rounding of positions of size R limits the residual, it is what remains, and the forces balance."""
+    """Where rounding of positions of size R limits the residual, it is what remains, and the forces
+    balance."""
     solution = solve(scene(0.08, steps=2, **EXTREMES[extreme]))
     limit = max(1e-10, 2 * solution.joint.contact.round_off() / solution.steps[-1].P)
     assert all(m.force_balance < max(1e-8, limit) for m in solution.steps)
@@ -114,8 +122,11 @@ def test_extreme_joints_are_solved_to_round_off(extreme):
 
 
 def test_the_force_is_proportional_to_the_clearance():
-    """P(delta/dR) / dR tends to a limit as dR/R falls (concentric circles): 1e-6 R against 1e-4 R."""
-    tight, tighter = (solve(scene(joint={"clearance": c}, steps=1)).steps[-1].P / c for c in (1e-4, 1e-6))
+    """P(delta/dR) / dR tends to a limit as dR/R falls (concentric circles): 1e-6 R against 1e-4
+    R."""
+    tight, tighter = (
+        solve(scene(joint={"clearance": c}, steps=1)).steps[-1].P / c for c in (1e-4, 1e-6)
+    )
     assert tight == pytest.approx(tighter, rel=1e-3)
 
 
@@ -139,7 +150,8 @@ def test_a_very_stiff_pin_is_a_rigid_pin():
 
 
 def test_a_whole_pin_is_a_little_stiffer_than_its_half():
-    """What lies behind the pressed diameter, kept straight, only hinders it from widening; forces balance as before."""
+    """What lies behind the pressed diameter, kept straight, only hinders it from widening; forces
+    balance as before."""
     half, whole = (solve(scene(0.12, 2, pin=pin)).steps[-1] for pin in ({}, {"whole": True}))
     assert 1.0 < whole.P / half.P < 1.02
     assert whole.force_balance < 1e-8
@@ -155,7 +167,8 @@ def test_like_bodies_share_pin_and_hole_swapped():
 
 
 def test_hertz_is_the_limit_of_small_contacts():
-    """Half-width and peak pressure of Hertz's line contact within 1 % where the contact is small (a/R = 0.05).
+    """Half-width and peak pressure of Hertz's line contact within 1 % where the contact is small
+    (a/R = 0.05).
 
     Johnson (1985), eqs. 4.43 and 4.45, conforming: 1/R' = 1/R - 1/(R + dR).
     """
@@ -173,13 +186,22 @@ def test_results_do_not_depend_on_the_units(sigma_y):
     """The same joint in mm and MPa and in m and Pa: dimensionless results to 1e-9."""
     rows = []
     for length, stress in ((10.0, 115384.0), (0.01, 115384.0e6)):
-        solid = {"E": E * stress, "nu": 0.3} | ({"yield_stress": sigma_y * stress} if sigma_y else {})
+        solid = {"E": E * stress, "nu": 0.3} | (
+            {"yield_stress": sigma_y * stress} if sigma_y else {}
+        )
         sized = {"radius": length, "clearance": 0.005 * length, "element_size": 0.08 * length}
         solution = solve(scene(steps=4, joint=sized, pin=solid, block=solid))
         m, force = solution.steps[-1], stress * length
         energies = (m.elastic_energy, m.plastic_dissipation, m.work)
         rows.append(
-            [m.P / force, m.p0 / stress, m.eps, m.peeq_max, m.contact_area / length, m.peeq_integral / length**2]
+            [
+                m.P / force,
+                m.p0 / stress,
+                m.eps,
+                m.peeq_max,
+                m.contact_area / length,
+                m.peeq_integral / length**2,
+            ]
             + [e / force / length for e in energies]
             + [s.iterations for s in solution.steps]
         )
@@ -201,7 +223,8 @@ CUT = [
 @pytest.mark.mpi
 @pytest.mark.parametrize(("variant", "cut"), CUT if SEVERAL else CUT[:2])
 def test_results_do_not_depend_on_the_ranks(cut, variant):
-    """P, p0, PEEQ, energies to 1e-9 and iteration counts, whichever way the mesh is cut, against one rank.
+    """P, p0, PEEQ, energies to 1e-9 and iteration counts, whichever way the mesh is cut, against
+    one rank.
 
     Ranks may own no contact facet, no plastic cell or no cell at all.
     """
@@ -212,7 +235,11 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
         "all on the first": partition(lambda i, _: 0 * i),
         "all on the last": partition(lambda i, _: 0 * i - 1),
     }[cut]
-    load = {"load": {"displacement": None, "relative_force": 0.006}} if variant.endswith("force") else {}
+    load = (
+        {"load": {"displacement": None, "relative_force": 0.006}}
+        if variant.endswith("force")
+        else {}
+    )
     problem = scene(0.1, 4, **VARIANTS[variant.removesuffix(" by force")], **load)
     together = solve(problem, MPI.COMM_WORLD, partitioner)
     alone = solve(problem)
@@ -226,28 +253,48 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
 
 
 def test_peeq_is_told_by_body_and_near_the_contact(tmp_path):
-    """The largest at the integration points that the files hold, and where: of each body, and within R/2 of the arc up
-    to the largest contact angle so far, also when the pin is gone. The peak at the held corner is no contact."""
-    [folder] = solved_runs({"run": scene(0.1, 3, 0.002, load=AWAY, output={"points": True})}, tmp_path).values()
+    """The largest at the integration points that the files hold, and where: of each body, and
+    within R/2 of the arc up to the largest contact angle so far, also when the pin is gone. The
+    peak at the held corner is no contact."""
+    [folder] = solved_runs(
+        {"run": scene(0.1, 3, 0.002, load=AWAY, output={"points": True})}, tmp_path
+    ).values()
     run = Run(folder)
     for step in (1, 2, 3):
-        points, fields, row = run.points(step), run.fields(step), {k: v[step - 1] for k, v in run.columns.items()}
+        points, fields, row = (
+            run.points(step),
+            run.fields(step),
+            {k: v[step - 1] for k, v in run.columns.items()},
+        )
         x, peeq = points["coordinates"], points["peeq"]
-        angle, depth = np.arctan2(x[..., 0], -x[..., 1]), np.abs(np.hypot(*np.moveaxis(x, -1, 0)) - 1)
-        places = {name: np.broadcast_to((fields.body == tag)[:, None], peeq.shape) for name, tag in run.bodies.items()}
+        angle, depth = (
+            np.arctan2(x[..., 0], -x[..., 1]),
+            np.abs(np.hypot(*np.moveaxis(x, -1, 0)) - 1),
+        )
+        places = {
+            name: np.broadcast_to((fields.body == tag)[:, None], peeq.shape)
+            for name, tag in run.bodies.items()
+        }
         places["contact"] = (angle <= max(run.columns["eps"][:step])) & (depth <= 0.5)
         for name, inside in places.items():
             at = np.argmax(np.where(inside, peeq, -1))
             assert row[f"{name} peeq_max"] == pytest.approx(peeq.flat[at], rel=1e-9)
-            assert (row[f"{name} at x"], row[f"{name} at y"]) == pytest.approx(tuple(x.reshape(-1, 2)[at]), abs=1e-9)
-        assert row["peeq_max"] == max(row["pin peeq_max"], row["block peeq_max"]) > row["contact peeq_max"] > 0
+            assert (row[f"{name} at x"], row[f"{name} at y"]) == pytest.approx(
+                tuple(x.reshape(-1, 2)[at]), abs=1e-9
+            )
+        assert (
+            row["peeq_max"]
+            == max(row["pin peeq_max"], row["block peeq_max"])
+            > row["contact peeq_max"]
+            > 0
+        )
     assert run.columns["eps"][2] == 0
 
 
 @pytest.mark.parametrize("material", [{}, {"yield_stress": 0.002}])
 def test_petsc_keeps_no_solver_that_is_used_no_more(material):
-    """Without Python's collector: not every petsc4py shows it what PETSc refers to. MPICH has 2048 communicators, a run
-    needs 16, and sweeps solve thousands of runs in one process."""
+    """Without Python's collector: not every petsc4py shows it what PETSc refers to. MPICH has 2048
+    communicators, a run needs 16, and sweeps solve thousands of runs in one process."""
     joint = solve(scene(steps=1, block=material)).joint
     newton = NewtonSolver(joint.equilibrium)
     still = ref(newton)

@@ -1,4 +1,5 @@
-"""Large strain in the solver: a cylinder blown up, a joint whose clearance vanishes, tangents, rotation, energy."""
+"""Large strain in the solver: a cylinder blown up, a joint whose clearance vanishes, tangents,
+rotation, energy."""
 
 from __future__ import annotations
 
@@ -41,10 +42,13 @@ from tests.solver.test_bulk_terms import stiffness, warped_annulus
     ("modulus", "pressures"), [(0.0, [269.32, 255.55, 230.79]), (1000.0, [292.68, 299.29, 307.81])]
 )
 def test_a_rigid_plastic_cylinder_is_blown_up(modulus, pressures):
-    """10 to 20, sigY = 355: the pressure on the inner wall at radii of 10.5, 11 and 12 is the integral of the hoop
-    stress less the radial one over the wall of an incompressible body (Hill 1950, chapter V)."""
+    """10 to 20, sigY = 355: the pressure on the inner wall at radii of 10.5, 11 and 12 is the
+    integral of the hoop stress less the radial one over the wall of an incompressible body (Hill
+    1950, chapter V)."""
     mesh = quarter_annulus(MPI.COMM_WORLD, 10.0, 20.0, 1.25)
-    body = Body("ring", LargeStrain(J2Material(2.1e8, 0.3, "strain", LinearHardening(355.0, modulus))))
+    body = Body(
+        "ring", LargeStrain(J2Material(2.1e8, 0.3, "strain", LinearHardening(355.0, modulus)))
+    )
     supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k] / 10.0, "out") for k in range(2)]
     supports += [Support("x", "x", 1), Support("y", "y", 0)]
     system = System(Problem(mesh, [body], supports=supports, drives=[Drive("out", [0.0, 2.0])]))
@@ -58,14 +62,26 @@ def test_a_rigid_plastic_cylinder_is_blown_up(modulus, pressures):
 
 @pytest.mark.parametrize("finest", [0.06, 0.03, 0.015])
 def test_a_deep_notch_has_its_limit_load(finest):
-    """Two deep cracks in plane strain, nearly rigid plastic: the ligament carries the mean stress (2 + pi) k (Hill
-    1950, chapter IX) and no more, up to the size of the elements; load on bodies that lock rises without an end
-    (Nagtegaal, Parks and Rice 1974)."""
+    """Two deep cracks in plane strain, nearly rigid plastic: the ligament carries the mean stress
+    (2 + pi) k (Hill 1950, chapter IX) and no more, up to the size of the elements; load on bodies
+    that lock rises without an end (Nagtegaal, Parks and Rice 1974)."""
     metal = LargeStrain(J2Material(2.1e8, 0.3, "strain", LinearHardening(355.0)))
-    supports = [Support("ligament", "ligament", 1), Support("axis", "axis", 0), Support("lid", "lid", 1, 1.0)]
-    system = System(Problem(notched_bar(MPI.COMM_SELF, 9.0, finest), [Body("bar", metal)], supports=supports))
+    supports = [
+        Support("ligament", "ligament", 1),
+        Support("axis", "axis", 0),
+        Support("lid", "lid", 1, 1.0),
+    ]
+    system = System(
+        Problem(notched_bar(MPI.COMM_SELF, 9.0, finest), [Body("bar", metal)], supports=supports)
+    )
     forces = []
-    for strain in (2, 4, 8, 16, 20):  # of the whole, over that at which it would yield without the cracks
+    for strain in (
+        2,
+        4,
+        8,
+        16,
+        20,
+    ):  # of the whole, over that at which it would yield without the cracks
         system.solve([strain * 9.0 * 355.0 / 2.1e8])
         forces.append(-system.reaction("ligament")[1] / (355.0 / np.sqrt(3)))
     assert forces[-1] == pytest.approx(forces[-2], rel=5e-4)
@@ -74,7 +90,8 @@ def test_a_deep_notch_has_its_limit_load(finest):
 
 @pytest.mark.parametrize("small", [PERFECT, PLANE_STRESS], ids=["plane strain", "plane stress"])
 def test_the_tangent_of_the_bulk_is_the_derivative_of_its_force(small):
-    """At strains of some per cent, partly yielding; in plane stress but for the volume in the yield stress."""
+    """At strains of some per cent, partly yielding; in plane stress but for the volume in the yield
+    stress."""
     mesh, cells, _ = warped_annulus(MPI.COMM_SELF)
     bulk = Bulk(space(mesh), {1: cells.find(1)}, {1: LargeStrain(small)})
     x, rng = coordinates(bulk.V), np.random.default_rng(0)
@@ -84,7 +101,9 @@ def test_the_tangent_of_the_bulk_is_the_derivative_of_its_force(small):
     K, h = stiffness(bulk), 1e-9
     for _ in range(3):
         d = rng.normal(size=u.shape)
-        difference = (internal_force(bulk, u + h * d) - internal_force(bulk, u - h * d)).ravel() / (2 * h)
+        difference = (internal_force(bulk, u + h * d) - internal_force(bulk, u - h * d)).ravel() / (
+            2 * h
+        )
         limit = 1e-5 if small.plane == "strain" else 1e-2
         assert np.linalg.norm(K @ d.ravel() - difference) < limit * np.linalg.norm(difference)
 
@@ -122,7 +141,9 @@ def test_small_strain_is_the_limit_of_small_clearances(plane):
     """P over that of small strain, less one, is proportional to dR/R."""
     more = []
     for clearance in (1e-3, 1e-2):
-        small, large = (joint(strain, clearance, plane=plane).drive_force("") for strain in ("small", "large"))
+        small, large = (
+            joint(strain, clearance, plane=plane).drive_force("") for strain in ("small", "large")
+        )
         more.append(large / small - 1)
     assert more[1] == pytest.approx(10 * more[0], rel=0.1)
     assert 0 < more[0] < 1e-3
@@ -130,7 +151,8 @@ def test_small_strain_is_the_limit_of_small_clearances(plane):
 
 @dataclass(frozen=True)
 class Hyperelastic(Material):
-    """A material whose nominal stress is a ``law`` of F ``(2, 2, n)``, with the moduli of ``inner`` at F = 1."""
+    """A material whose nominal stress is a ``law`` of F ``(2, 2, n)``, with the moduli of ``inner``
+    at F = 1."""
 
     law: Callable[[Array, Elastic], Array]
     inner: Elastic = ELASTIC
@@ -176,12 +198,15 @@ def neo_hooke(F: Array, solid: Elastic) -> Array:
     ids=["Hencky", "St. Venant and Kirchhoff", "neo-Hooke"],
 )
 def test_the_elastic_joint_by_three_laws(law, more):
-    """At 2 dR of the paper's elastic joint P is above that of small strain by this. Other codes have the last two; in
-    confined compression, P = M (e + k e^2) with k = -1.5 and 0.9 of these, Hencky's has 1.5: on a line with them."""
+    """At 2 dR of the paper's elastic joint P is above that of small strain by this. Other codes
+    have the last two; in confined compression, P = M (e + k e^2) with k = -1.5 and 0.9 of these,
+    Hencky's has 1.5: on a line with them."""
     small, scene = joint("small"), joint_scene("large")
     problem = joint_problem(scene, MPI.COMM_WORLD)
     if law is not None:
-        problem = replace(problem, bodies=[replace(body, material=Hyperelastic(law)) for body in problem.bodies])
+        problem = replace(
+            problem, bodies=[replace(body, material=Hyperelastic(law)) for body in problem.bodies]
+        )
     large = System(problem)
     large.solve(scene.targets)
     assert large.drive_force("") / small.drive_force("") - 1 == pytest.approx(more, rel=0.02)
@@ -189,12 +214,19 @@ def test_the_elastic_joint_by_three_laws(law, more):
 
 
 def test_energy_balances_where_metal_flows_far():
-    """Two blocks squeezed to 0.7 of one's height: work is stored or dissipated, to the first order of the step."""
+    """Two blocks squeezed to 0.7 of one's height: work is stored or dissipated, to the first order
+    of the step."""
     metal = LargeStrain(J2Material(210000.0, 0.3, "strain", LinearHardening(300.0, 500.0)))
     contact = Interaction("contact", ("upper bottom", "lower top"))
-    supports = [Support("base", "base", 1), Support("press", "lid", 1, -1.0), Support("left", "left", 0)]
+    supports = [
+        Support("base", "base", 1),
+        Support("press", "lid", 1, -1.0),
+        Support("left", "left", 0),
+    ]
     mesh = blocks(MPI.COMM_WORLD, 3, 4)
-    system = System(Problem(mesh, [Body(n, metal) for n in ("lower", "upper")], [contact], supports))
+    system = System(
+        Problem(mesh, [Body(n, metal) for n in ("lower", "upper")], [contact], supports)
+    )
     work, last = 0.0, (0.0, 0.0)
     for load in np.linspace(0, 0.3, 61)[1:]:
         system.solve([load])

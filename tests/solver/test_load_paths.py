@@ -33,12 +33,15 @@ def by_force(targets, steps=3, **sections):
 )
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_force_and_displacement_control_find_the_same_state(sections, kinematics):
-    """One step to P finds the delta at which one step to delta finds P, with Newton's quadratic end."""
+    """One step to P finds the delta at which one step to delta finds P, with Newton's quadratic
+    end."""
     analysis = {"analysis": {"kinematics": kinematics}}
     pressed = solve(scene(H, 1, **sections, **analysis)).steps[0]
     forced = by_force(0.01, 1, **sections, **analysis)
     forced = forced.model_copy(
-        update={"load": forced.load.model_copy(update={"relative_force": pressed.P / (forced.E_star)})}
+        update={
+            "load": forced.load.model_copy(update={"relative_force": pressed.P / (forced.E_star)})
+        }
     )
     found = solve(forced).steps[0]
     assert pytest.approx(pressed.P, rel=1e-12) == found.P
@@ -54,15 +57,23 @@ def test_force_and_displacement_control_find_the_same_state(sections, kinematics
 def test_force_control_does_not_depend_on_the_ranks(comm, pin):
     """A force up and half-way back, plastic: the same displacements on one rank and on all."""
     problem = by_force(
-        [0.005, 0.003], 2, block={"E": 1.82, "nu": 0.3, "yield_stress": 0.002}, **({"pin": pin} if pin else {})
+        [0.005, 0.003],
+        2,
+        block={"E": 1.82, "nu": 0.3, "yield_stress": 0.002},
+        **({"pin": pin} if pin else {}),
     )
     many, one = solve(problem, comm), solve(problem, MPI.COMM_SELF)
-    np.testing.assert_allclose([m.delta for m in many.steps], [m.delta for m in one.steps], rtol=1e-8)
-    np.testing.assert_allclose([m.peeq_integral for m in many.steps], [m.peeq_integral for m in one.steps], rtol=1e-7)
+    np.testing.assert_allclose(
+        [m.delta for m in many.steps], [m.delta for m in one.steps], rtol=1e-8
+    )
+    np.testing.assert_allclose(
+        [m.peeq_integral for m in many.steps], [m.peeq_integral for m in one.steps], rtol=1e-7
+    )
 
 
 def test_an_elastic_joint_forgets_its_path():
-    """Pressed, pulled away, pressed again: no force while apart, the same force at the same delta, no work lost."""
+    """Pressed, pulled away, pressed again: no force while apart, the same force at the same delta,
+    no work lost."""
     steps = solve(scene(H, 4, load={"displacement": [2.0, -1.0, 2.0]})).steps
     P = {round(m.delta / 0.005, 6): [] for m in steps}
     for m in steps:
@@ -77,8 +88,9 @@ def test_an_elastic_joint_forgets_its_path():
 
 
 def test_unloading_from_a_plastic_state_is_elastic_and_leaves_a_dent():
-    """The first step back is stiffer than the last one forth and dissipates next to nothing; a force of zero leaves a
-    displacement and residual stress; pressed again to the old force, the joint is back where it was."""
+    """The first step back is stiffer than the last one forth and dissipates next to nothing; a
+    force of zero leaves a displacement and residual stress; pressed again to the old force, the
+    joint is back where it was."""
     steps = solve(by_force([0.006, 0.0, 0.006], [3, 6, 6], yield_stress=0.002)).steps
     top, first, free, again = steps[2], steps[3], steps[8], steps[14]
     assert top.plastic_dissipation > 0
@@ -93,8 +105,8 @@ def test_unloading_from_a_plastic_state_is_elastic_and_leaves_a_dent():
 
 
 def test_the_way_back_is_elastic():
-    """A tenth of dR back changes the force as if no point could yield any more; what flows, flows at the contact's
-    edge."""
+    """A tenth of dR back changes the force as if no point could yield any more; what flows, flows
+    at the contact's edge."""
     problem = scene(H, [4, 1], yield_stress=0.002, load={"displacement": [2.0, 1.9]})
     solution = solve(problem)
     top, back = solution.steps[-2:]
@@ -105,7 +117,9 @@ def test_the_way_back_is_elastic():
     points = joint.equilibrium.plastic_points()
     for p in points:
         p.acting = p.material.elastic()
-    assert joint.solver.newton.solve(equilibrium.state()).converged  # the state itself needs no flow
+    assert joint.solver.newton.solve(
+        equilibrium.state()
+    ).converged  # the state itself needs no flow
     equilibrium.load = 1.9 * 0.005
     assert joint.solver.newton.solve(equilibrium.state()).converged
     assert pytest.approx(joint.forces()["pin"] - top.P, rel=2e-3) == back.P - top.P
@@ -113,13 +127,15 @@ def test_the_way_back_is_elastic():
 
 def test_a_pulled_pin_comes_free_and_says_so():
     """A force that pulls has no equilibrium; the message names the last force that held."""
-    with pytest.raises(StepFailure, match=r"no equilibrium at P = -.*singular mode.*last load that held is P = "):
+    with pytest.raises(
+        StepFailure, match=r"no equilibrium at P = -.*singular mode.*last load that held is P = "
+    ):
         solve(by_force([0.006, -0.001], 2))
 
 
 def test_a_force_beyond_the_limit_load_ends_at_it():
-    """Perfectly plastic bodies carry no more than a limit load; more ends with the last force that held, close below
-    the one that did not."""
+    """Perfectly plastic bodies carry no more than a limit load; more ends with the last force that
+    held, close below the one that did not."""
     coarse = {"element_size": 0.2, "growth": 1.0}
     with pytest.raises(StepFailure) as failure:
         solve(by_force(0.04, 4, yield_stress=0.002, joint=coarse, stepping={"minimum": 0.01}))
@@ -128,10 +144,15 @@ def test_a_force_beyond_the_limit_load_ends_at_it():
 
 
 def test_zero_load_is_no_load():
-    """Steps at zero displacement or force converge to nothing, without nan, and the next step goes on from there."""
+    """Steps at zero displacement or force converge to nothing, without nan, and the next step goes
+    on from there."""
     for problem in (scene(H, 1, load={"displacement": [0.0, 1.0]}), by_force([0.0, 0.005], 1)):
         first, second = solve(problem).steps
-        assert all(value == 0 for name, value in vars(first).items() if name not in ("step", "seconds", "peeq"))
+        assert all(
+            value == 0
+            for name, value in vars(first).items()
+            if name not in ("step", "seconds", "peeq")
+        )
         assert second.P > 0
 
 
@@ -148,12 +169,17 @@ def write(folder, load):
 def test_paths_from_a_csv_file(tmp_path):
     """One step a row, or as many as steps says; the resolved scene holds the numbers."""
     (tmp_path / "cycle.csv").write_text("displacement\n1\n0.5\n2\n", encoding="utf-8")
-    assert load_scene(write(tmp_path, 'path = "cycle.csv"\n')).targets == pytest.approx([0.005, 0.0025, 0.01])
+    assert load_scene(write(tmp_path, 'path = "cycle.csv"\n')).targets == pytest.approx(
+        [0.005, 0.0025, 0.01]
+    )
     twice = load_scene(write(tmp_path, 'path = "cycle.csv"\nsteps = 2\n'))
     assert twice.targets == pytest.approx([0.0025, 0.005, 0.00375, 0.0025, 0.00625, 0.01])
 
 
-CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a decimal number like 0.5 .* in every row; row"
+CYCLE, IN_A_ROW = (
+    'path = "cycle.csv"',
+    "cycle.csv: must have a decimal number like 0.5 .* in every row; row",
+)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +188,11 @@ CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a decimal number l
         (CYCLE, None, "cannot be read"),
         (CYCLE, "", "one column, headed by displacement, .*, not ''"),
         (CYCLE, "delta\n1\n", "one column, headed by displacement, .*, not 'delta'"),
-        (CYCLE, "displacement,force\n1,2\n", "one column, headed by displacement, .*, not 'displacement,force'"),
+        (
+            CYCLE,
+            "displacement,force\n1,2\n",
+            "one column, headed by displacement, .*, not 'displacement,force'",
+        ),
         (CYCLE, "displacement\n1\ntwo\n", f"{IN_A_ROW} 3 has 'two'"),
         (CYCLE, "displacement\n1\n0.5,5\n", f"{IN_A_ROW} 3 has '0.5,5'"),
         (CYCLE, "displacement\n0,5\n", f"{IN_A_ROW} 2 has '0,5'"),
@@ -174,10 +204,18 @@ CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a decimal number l
         ("displacement = []", None, "must not be empty"),
         ('displacement = "far"', None, "must be a number"),
         ('displacement = [1.0, "far"]', None, "entry 2 must be a number"),
-        ("displacement = [1.0, 2.0]\nsteps = [1]", None, "must have one number for each of the 2 stages"),
+        (
+            "displacement = [1.0, 2.0]\nsteps = [1]",
+            None,
+            "must have one number for each of the 2 stages",
+        ),
         ("displacement = 1.0\nsteps = 0", None, "must be at least 1"),
         ("displacement = 1.0\nsteps = 1.5", None, "must be a whole number"),
-        (f"displacement = 1.0\n{CYCLE}", None, "load.displacement = 1.0 must not be given together with path"),
+        (
+            f"displacement = 1.0\n{CYCLE}",
+            None,
+            "load.displacement = 1.0 must not be given together with path",
+        ),
         ("steps = 3", None, "load.displacement is missing"),
     ],
 )

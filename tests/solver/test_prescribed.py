@@ -1,4 +1,5 @@
-"""Prescribed displacements where sets share nodes: fixing wins, others agree or are refused, in any order."""
+"""Prescribed displacements where sets share nodes: fixing wins, others agree or are refused, in any
+order."""
 
 from __future__ import annotations
 
@@ -21,12 +22,15 @@ def found(supports, comm=MPI.COMM_SELF, **options):
     """The drives' displacements and forces by name, and the reactions by name."""
     system = solve(bar(comm, supports, **options), [1.0])
     moved = dict(zip(system.drive_names, np.transpose(system.driven()).tolist(), strict=True))
-    return moved | {name: system.reaction(name).tolist() for name in sorted({s.name for s in supports})}
+    return moved | {
+        name: system.reaction(name).tolist() for name in sorted({s.name for s in supports})
+    }
 
 
 @pytest.mark.mpi
 def test_what_a_support_fixes_stays_whatever_moves_the_rest():
-    """Also in a body that is moved as a whole; what moves it has the force that the support answers."""
+    """Also in a body that is moved as a whole; what moves it has the force that the support
+    answers."""
     supports = [*WALL, Support("body", "bar", 0, 1.0, "pull")]
     for order in permutations(supports):
         problem = bar(MPI.COMM_WORLD, order, drives=drives("displacement", **PULL))
@@ -37,7 +41,9 @@ def test_what_a_support_fixes_stays_whatever_moves_the_rest():
         assert system.drive_force("pull") > 0
         assert system.force_balance() < 1e-9
         (said,) = system.warnings
-        assert said.startswith("'wall' (on 'left') fixes nodes that 'body' (on 'bar') would move in x, as at (0, -1)")
+        assert said.startswith(
+            "'wall' (on 'left') fixes nodes that 'body' (on 'bar') would move in x, as at (0, -1)"
+        )
 
 
 MOVED = [Support("top", "top", 1, 1.0, "press"), END]
@@ -57,7 +63,9 @@ def test_the_order_of_supports_changes_nothing(case):
     supports = LEGAL[case]
     used = {s.drive for s in supports if s.moves}
     given = [Drive(name, (0.0, 0.01)) for name in ("press", "pull", "pull too") if name in used]
-    first, *others = [found(order, MPI.COMM_WORLD, drives=given) for order in permutations(supports)]
+    first, *others = [
+        found(order, MPI.COMM_WORLD, drives=given) for order in permutations(supports)
+    ]
     for other in others:
         assert other.keys() == first.keys()
         for name, values in first.items():
@@ -68,7 +76,9 @@ def test_the_order_of_supports_changes_nothing(case):
 
 def test_sets_that_move_alike_move_as_one_set_and_have_its_force_together():
     """The work of each is its own: forces at shared nodes are theirs in equal parts."""
-    alone = found([*WALL, Support("body", "bar", 0, 1.0, "pull")], drives=drives("displacement", **PULL))
+    alone = found(
+        [*WALL, Support("body", "bar", 0, 1.0, "pull")], drives=drives("displacement", **PULL)
+    )
     paths = {"pull": (0.0, 0.01), "pull too": (0.0, 0.01, 0.01)}
     both = [Support("body", "bar", 0, 1.0, "pull"), Support("too", "bar", 0, 1.0, "pull too")]
     shared = found([*WALL, *both], drives=drives("displacement", **paths))
@@ -87,16 +97,21 @@ def test_supports_that_fix_one_node_have_equal_parts_of_its_reaction():
 
 
 def test_a_rigid_point_may_meet_a_support_that_leaves_it_rigid():
-    """It turns about the held corner (4, 0) of the roof; about another point it would lift the corner."""
+    """It turns about the held corner (4, 0) of the roof; about another point it would lift the
+    corner."""
     roof = Support("roof", "top", 1)
     for X, fits in ((4.0, True), (3.0, False)):
         guide = [Support("end", "right", axis) for axis in (0, 1)]
         turns = [s for s in reference_point("end", "right", (X, 0.0)) if s.drive == "turn"]
-        problem = bar(supports=[*WALL, roof, *guide, *turns], drives=drives("force", turn=(0.0, 1e-3)))
+        problem = bar(
+            supports=[*WALL, roof, *guide, *turns], drives=drives("force", turn=(0.0, 1e-3))
+        )
         if fits:
             assert solve(problem, [1.0]).drive_displacement("turn") > 0
             continue
-        with pytest.raises(ValueError, match=r"'roof' .on 'top'. fixes the node at .4, 0. in y, which 'end'"):
+        with pytest.raises(
+            ValueError, match=r"'roof' .on 'top'. fixes the node at .4, 0. in y, which 'end'"
+        ):
             System(problem)
 
 
@@ -106,9 +121,7 @@ def moves(name, facets, axis=0, rate=1.0):
 
 
 ALIKE = r"'end' .on 'right'. and 'foot' .on 'bottom'. move their common node at .4, -1. differently in x: leave it"
-RIGID = (
-    r"'wall' .on 'left'. fixes the node at .0, 0. in {}, which 'lid' .on 'top'. moves together with all its set: fix"
-)
+RIGID = r"'wall' .on 'left'. fixes the node at .0, 0. in {}, which 'lid' .on 'top'. moves together with all its set: fix"
 REFUSED = {
     "two displacements": (ALIKE, [moves("end", "right"), moves("foot", "bottom", 0, 3.0)], "displacement"),
     "two forces": (ALIKE, [moves("end", "right"), moves("foot", "bottom")], "force"),
@@ -146,7 +159,12 @@ def test_supports_that_contradict_each_other_are_refused_in_any_order(case):
 def test_displacements_on_different_paths_are_different():
     supports = [*WALL, moves("end", "right"), moves("foot", "bottom")]
     with pytest.raises(ValueError, match=ALIKE):
-        System(bar(supports=supports, drives=drives("displacement", end=(0.0, 0.1), foot=(0.0, 0.05, 0.1))))
+        System(
+            bar(
+                supports=supports,
+                drives=drives("displacement", end=(0.0, 0.1), foot=(0.0, 0.05, 0.1)),
+            )
+        )
 
 
 def test_means_that_others_decide_on_are_refused():

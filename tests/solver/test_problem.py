@@ -30,17 +30,29 @@ BETWEEN_WALLS = [
 def columns(width: float = 1.0, material=HARDENING, **options) -> Problem:
     """Two blocks of a ``width`` on top of each other, between walls."""
     bodies = [Body(name, material) for name in ("lower", "upper")]
-    return Problem(blocks(MPI.COMM_SELF, 3, 4, width=width), bodies, [ON_EACH_OTHER], BETWEEN_WALLS, **options)
+    return Problem(
+        blocks(MPI.COMM_SELF, 3, 4, width=width), bodies, [ON_EACH_OTHER], BETWEEN_WALLS, **options
+    )
 
 
 @pytest.mark.parametrize("control", ["displacement", "force"])
 def test_half_a_problem_with_symmetry_two_is_the_whole(control):
     """Forces, energies and PEEQ under both controls: the load of the half is that of the whole."""
-    halves = [columns(width, symmetry=2 / width, drives=[Drive("", control=control)]) for width in (1.0, 2.0)]
+    halves = [
+        columns(width, symmetry=2 / width, drives=[Drive("", control=control)])
+        for width in (1.0, 2.0)
+    ]
     systems = [solve(halves[0], [DEPTH if control == "displacement" else 0.06])]
     systems.append(solve(halves[1], [systems[0].equilibrium.load]))
     found = [
-        [s.drive_displacement(""), s.drive_force(""), *s.reaction("base"), *s.contact_force(), *s.energies(), *s.peeq()]
+        [
+            s.drive_displacement(""),
+            s.drive_force(""),
+            *s.reaction("base"),
+            *s.contact_force(),
+            *s.energies(),
+            *s.peeq(),
+        ]
         for s in systems
     ]
     assert found[0] == pytest.approx(found[1], rel=1e-8, abs=1e-14)
@@ -48,13 +60,18 @@ def test_half_a_problem_with_symmetry_two_is_the_whole(control):
 
 
 def test_a_second_call_goes_on_from_the_first(monkeypatch):
-    """By its own rules, through loads between the two: a little unloading in four steps is elastic."""
+    """By its own rules, through loads between the two: a little unloading in four steps is
+    elastic."""
     system, loads = solve(columns(), [DEPTH]), []
     peeq, accept = system.peeq(), LoadPath.accept
     assert peeq[0] > 0
-    monkeypatch.setattr(LoadPath, "accept", lambda path, load: (loads.append(load), accept(path, load)))
+    monkeypatch.setattr(
+        LoadPath, "accept", lambda path, load: (loads.append(load), accept(path, load))
+    )
     system.solve([0.99 * DEPTH], StepRules(initial=0.25, growth=1.0))
-    assert loads == pytest.approx([DEPTH * share for share in (0.9975, 0.995, 0.9925, 0.99)], rel=1e-12)
+    assert loads == pytest.approx(
+        [DEPTH * share for share in (0.9975, 0.995, 0.9925, 0.99)], rel=1e-12
+    )
     assert system.peeq() == peeq
     assert system.equilibrium.load == 0.99 * DEPTH
 
@@ -69,10 +86,14 @@ def test_force_control_finds_the_load_factor_of_its_force():
 
 @pytest.mark.parametrize("symmetry", [1.0, 2.0])
 def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
-    """Between walls, with stress that grows linearly downward; the weight works on its mean displacement."""
+    """Between walls, with stress that grows linearly downward; the weight works on its mean
+    displacement."""
     mesh = blocks(MPI.COMM_SELF, 3, 3)
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
-    supports = [Support(s, s, axis) for s, axis in (("base", 1), ("left", 0), ("right", 0), ("upper bottom", 1))]
+    supports = [
+        Support(s, s, axis)
+        for s, axis in (("base", 1), ("left", 0), ("right", 0), ("upper bottom", 1))
+    ]
     problem = Problem(mesh, bodies, (), supports, [Load("lower", (0.0, -1.0))], symmetry=symmetry)
     system, weight = solve(problem, [0.01]), 0.01
     modulus, y = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)), coordinates(system.V)[:, 1]
@@ -83,17 +104,23 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
     assert system.reaction("base")[1] == pytest.approx(weight, rel=1e-9)
     assert system.drive_force("") == weight
     assert system.drive_displacement("") == pytest.approx(weight / symmetry / modulus / 3, rel=1e-9)
-    assert system.energies()[0] == pytest.approx(system.drive_force("") * system.drive_displacement("") / 2, rel=1e-9)
+    assert system.energies()[0] == pytest.approx(
+        system.drive_force("") * system.drive_displacement("") / 2, rel=1e-9
+    )
 
 
 def test_a_load_is_spread_as_its_density_says():
     """Its first moment is that of the density, its sum the force."""
     mesh, load = blocks(MPI.COMM_SELF, 3, 3), Load("upper", (3.0, 4.0), lambda x: x[0] * x[1])
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
-    equilibrium = System(Problem(mesh, bodies, (), [Support("base", "base", 1)], [load])).equilibrium
+    equilibrium = System(
+        Problem(mesh, bodies, (), [Support("base", "base", 1)], [load])
+    ).equilibrium
     assert equilibrium.drives.applied[0].sum(axis=0) == pytest.approx([3.0, 4.0], rel=1e-12)
     x = coordinates(equilibrium.V)
-    assert equilibrium.drives.applied[0].T @ x == pytest.approx(np.outer([3, 4], [2 / 3, 2 / 3]), rel=1e-12)
+    assert equilibrium.drives.applied[0].T @ x == pytest.approx(
+        np.outer([3, 4], [2 / 3, 2 / 3]), rel=1e-12
+    )
 
 
 def test_a_guess_moves_bodies_rigidly():
@@ -102,7 +129,9 @@ def test_a_guess_moves_bodies_rigidly():
     system = System(replace(problem, supports=[Support("base", "base", 1)]))
     state, y = system.first_guess(0.5), coordinates(system.V)[:, 1]
     assert state[-1] == 1.0
-    np.testing.assert_array_equal(state[:-1].reshape(-1, 2)[y > 0.01], 0.5 * np.array([[1, -1]] * (y > 0.01).sum()))
+    np.testing.assert_array_equal(
+        state[:-1].reshape(-1, 2)[y > 0.01], 0.5 * np.array([[1, -1]] * (y > 0.01).sum())
+    )
     assert not state[:-1].reshape(-1, 2)[y < -0.01].any()
 
 
@@ -111,7 +140,9 @@ class Grained(Elastic):
 
     @property
     def elastic_tangent(self):
-        return super().elastic_tangent * np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 1.0], [1.0, 1.0, 1.0]])
+        return super().elastic_tangent * np.array(
+            [[1.0, 1.0, 1.0], [1.0, 2.0, 1.0], [1.0, 1.0, 1.0]]
+        )
 
 
 class Lopsided(Elastic):
@@ -143,17 +174,26 @@ REFUSED = {
     "different names": {"bodies": [Body("lower", ELASTIC), Body("lower", ELASTIC, "upper")]},
     "no facet, point or cell set 'top'": {"supports": [Support("base", "top", 1)]},
     "no cell set 'middle'": {"bodies": [Body("middle", ELASTIC)]},
-    "'left' belongs to 2 cell sets": {"interactions": [Interaction("joint", ("left", "lower top"))]},
+    "'left' belongs to 2 cell sets": {
+        "interactions": [Interaction("joint", ("left", "lower top"))]
+    },
     "does not have the surface 'lid'": {
         "interactions": [Interaction("joint", ("upper bottom", "lower top"), integrated="lid")]
     },
-    "must move supports": {"supports": [Support("base", "base", 1, 1.0)], "loads": [Load("lower", (0.0, -1.0))]},
+    "must move supports": {
+        "supports": [Support("base", "base", 1, 1.0)],
+        "loads": [Load("lower", (0.0, -1.0))],
+    },
     "no drive 'up'": {"loads": [Load("lower", (0.0, -1.0), drive="up")]},
     "'up' moves nothing": {"drives": [Drive("up")]},
     "a force on the cells of a set or on its facets": {"loads": [Load("lower", pressure=1.0)]},
-    "'joint' is tied": {"interactions": [Interaction("joint", ("upper bottom", "lower top"), "tied", overlap=0.1)]},
+    "'joint' is tied": {
+        "interactions": [Interaction("joint", ("upper bottom", "lower top"), "tied", overlap=0.1)]
+    },
     "must say yields": {"bodies": [Body("lower", Stiffening(E, NU, "strain"))]},
-    "must be at large strain, too": {"bodies": [Body("lower", LargeStrain(PERFECT)), Body("upper", PERFECT)]},
+    "must be at large strain, too": {
+        "bodies": [Body("lower", LargeStrain(PERFECT)), Body("upper", PERFECT)]
+    },
 }
 
 
@@ -178,5 +218,7 @@ def test_round_off_is_no_reason_to_refuse_a_material(nu):
     """Where a stress of the check cancels, nothing but round-off is left of it."""
     for plane in ("strain", "stress"):
         materials = Elastic(E, nu, plane), Rounded(E, nu, plane)
-        forces = [solve(columns(material=material), [DEPTH]).drive_force("") for material in materials]
+        forces = [
+            solve(columns(material=material), [DEPTH]).drive_force("") for material in materials
+        ]
         assert forces[0] == pytest.approx(forces[1], rel=1e-9)

@@ -1,4 +1,5 @@
-"""Quadrilaterals, and geometries of another order than the displacements: the laws that triangles obey."""
+"""Quadrilaterals, and geometries of another order than the displacements: the laws that triangles
+obey."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ def pressed(comm, order, degree, quads, upper=ELASTIC, loads=(DEPTH,), edges=(4,
 @every_order
 @every_degree
 def test_contact_patch(order, degree, quads, comm):
-    """Uniform pressure and linear displacement across lines whose nodes do not match, whatever the cells."""
+    """Uniform pressure and linear displacement across lines whose nodes do not match, whatever the
+    cells."""
     system = pressed(comm, order, degree, quads)
     pressure, x = E / (1 - NU**2) * DEPTH / 2, coordinates(system.V)
     assert -system.reaction("lid")[1] == pytest.approx(pressure, rel=1e-9)
@@ -66,10 +68,14 @@ def test_contact_patch(order, degree, quads, comm):
 
 @every_degree
 def test_the_bulk_rule_has_full_rank_and_a_smaller_one_has_not(degree):
-    """A free cell has three deformations without energy, its rigid motions; with p^2 points it has three more."""
+    """A free cell has three deformations without energy, its rigid motions; with p^2 points it has
+    three more."""
     element = lagrange_element(QUADRILATERAL, degree)
     found = []
-    for X in (bulk_quadrature(QUADRILATERAL, degree)[0], bulk_quadrature(QUADRILATERAL, degree - 1)[0]):
+    for X in (
+        bulk_quadrature(QUADRILATERAL, degree)[0],
+        bulk_quadrature(QUADRILATERAL, degree - 1)[0],
+    ):
         gradient = np.moveaxis(element.tabulate(1, X)[1:, ..., 0], 0, -1)
         B = strain_matrix(gradient).reshape(-1, 2 * element.dim)
         found.append(2 * element.dim - np.linalg.matrix_rank(B, tol=1e-9))
@@ -79,14 +85,16 @@ def test_the_bulk_rule_has_full_rank_and_a_smaller_one_has_not(degree):
 @every_degree
 @every_cell
 def test_lames_cylinder_converges(degree, quads):
-    """Radial displacement under a given one of the inner wall: cells of an eighth take two powers of eight off, and
-    more of third order."""
+    """Radial displacement under a given one of the inner wall: cells of an eighth take two powers
+    of eight off, and more of third order."""
     errors = []
     for size in (0.5, 0.0625):
         mesh = quarter_annulus(MPI.COMM_SELF, 1.0, 2.0, size, quads=quads, order=degree)
         supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k]) for k in range(2)]
         supports += [Support("x", "x", 1), Support("y", "y", 0)]
-        system = solve(Problem(mesh, [Body("ring", ELASTIC)], supports=supports, degree=degree), [DEPTH])
+        system = solve(
+            Problem(mesh, [Body("ring", ELASTIC)], supports=supports, degree=degree), [DEPTH]
+        )
         x, u = coordinates(system.V), system.equilibrium.displacement()
         r = np.linalg.norm(x, axis=1)
         lame = ((1 - 2 * NU) * r + 4 / r) / ((1 - 2 * NU) + 4) * DEPTH
@@ -95,14 +103,17 @@ def test_lames_cylinder_converges(degree, quads):
 
 
 def punch(gmsh):
-    """A block of 5 by 3, of which the "punch" is the unit of its top at the plane of symmetry, "left"."""
+    """A block of 5 by 3, of which the "punch" is the unit of its top at the plane of symmetry,
+    "left"."""
     geo, gap = gmsh.model.geo, 0.2
     points = [geo.addPoint(x, y, 0) for x, y in ((0, -3), (5, -3), (5, 0), (1, 0), (0, 0))]
     lines = [geo.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
     face = geo.addPlaneSurface([geo.addCurveLoop(lines)])
     geo.synchronize()
     gmsh.model.addPhysicalGroup(2, [face], name="ground")
-    for tag, (line, name) in enumerate(zip(lines, ("base", "right", "top", "punch", "left"), strict=True), 1):
+    for tag, (line, name) in enumerate(
+        zip(lines, ("base", "right", "top", "punch", "left"), strict=True), 1
+    ):
         gmsh.model.addPhysicalGroup(1, [line], tag, name)
     size = gmsh.model.mesh.field.add("MathEval")
     gmsh.model.mesh.field.setString(size, "F", f"{gap} * (1 + 0.5 * Sqrt((x - 1)^2 + y^2))")
@@ -111,11 +122,18 @@ def punch(gmsh):
 
 @every_cell
 def test_fully_plastic_cells_do_not_lock(quads):
-    """A rough rigid punch on perfectly plastic ground: its force stands still, a tenth above Prandtl's (2 + pi) k."""
+    """A rough rigid punch on perfectly plastic ground: its force stands still, a tenth above
+    Prandtl's (2 + pi) k."""
     ground = Body("ground", J2Material(1.0, 0.3, "strain", LinearHardening(0.001)))
     fixed = [("base", 0), ("base", 1), ("right", 0), ("left", 0), ("punch", 0)]
-    supports = [*(Support(name, name, axis) for name, axis in fixed), Support("punch", "punch", 1, -1.0)]
-    system = solve(Problem(gmsh_to_mesh(MPI.COMM_SELF, punch, quads=quads), [ground], supports=supports), [1e-9])
+    supports = [
+        *(Support(name, name, axis) for name, axis in fixed),
+        Support("punch", "punch", 1, -1.0),
+    ]
+    system = solve(
+        Problem(gmsh_to_mesh(MPI.COMM_SELF, punch, quads=quads), [ground], supports=supports),
+        [1e-9],
+    )
     force = []
     for loads in (np.linspace(0, 0.06, 13)[1:], [0.07]):
         system.solve(loads)
@@ -129,8 +147,11 @@ def test_fully_plastic_cells_do_not_lock(quads):
 @every_order
 @every_degree
 def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm, tmp_path):
-    """Nodes and cells come in one order; what is spread is what was collected; meshio and VTK read the files."""
-    systems = [pressed(c, order, degree, quads, PERFECT, [DEPTH, 2 * DEPTH]) for c in (comm, MPI.COMM_SELF)]
+    """Nodes and cells come in one order; what is spread is what was collected; meshio and VTK read
+    the files."""
+    systems = [
+        pressed(c, order, degree, quads, PERFECT, [DEPTH, 2 * DEPTH]) for c in (comm, MPI.COMM_SELF)
+    ]
     whole, alone = (MeshOrder(system) for system in systems)
     u = systems[0].equilibrium.displacement()
     np.testing.assert_array_equal(whole.spread(whole.collect(u)), u)
@@ -140,7 +161,11 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
         assert whole.mesh_digest() == alone.mesh_digest()
         for name, values in expected.items():
             np.testing.assert_allclose(
-                (mesh | fields)[name], values, rtol=0, atol=1e-7 * np.abs(values).max(), err_msg=name
+                (mesh | fields)[name],
+                values,
+                rtol=0,
+                atol=1e-7 * np.abs(values).max(),
+                err_msg=name,
             )
         FieldWriter(tmp_path, whole, mesh, 1).write(1.0, fields)
         with meshio.xdmf.TimeSeriesReader(tmp_path / "fields.xdmf") as file:
@@ -151,14 +176,18 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
         middles = (x[cells.data[:, :k]] + x[np.roll(cells.data[:, :k], -1, axis=1)]) / 2
         np.testing.assert_allclose(x[cells.data[:, k : 2 * k]], middles, atol=1e-14)
         if quads:
-            np.testing.assert_allclose(x[cells.data[:, 8]], x[cells.data[:, :4]].mean(axis=1), atol=0.02)
+            np.testing.assert_allclose(
+                x[cells.data[:, 8]], x[cells.data[:, :4]].mean(axis=1), atol=0.02
+            )
         cell = only(VtkFile(tmp_path / "fields.vtkhdf").at(1), 2).GetCell(1)
         place, at = np.array([0.2, 0.3, 0.0]), np.zeros(3)
         cell.EvaluateLocation(reference(0), place, at, np.zeros(cell.GetNumberOfPoints()))
         nodes = whole.nodes_of_cell[1]
         shape = tabulate(*cell_kind(len(nodes)), place[:2])[0]
         np.testing.assert_allclose(at, shape @ whole.coordinates[nodes], atol=1e-12)
-        assert np.ptp(displacement[:, 1]) == pytest.approx(np.ptp(fields["displacement"][:, 1]), rel=1e-9)
+        assert np.ptp(displacement[:, 1]) == pytest.approx(
+            np.ptp(fields["displacement"][:, 1]), rel=1e-9
+        )
         with h5py.File(tmp_path / "fields.h5") as file:
             assert file["mesh/cells"].shape == cells.data.shape
             lid = x[file["edges/lid"][()]]
@@ -170,7 +199,10 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
 @every_degree
 def test_guesses_from_quads(degree):
     """Isoparametric quads hold linear fields exactly, beyond their edges too."""
-    coarse, fine = (quarter_annulus(MPI.COMM_SELF, 1.0, 2.0, h, quads=True, order=degree).mesh for h in (0.5, 0.2))
+    coarse, fine = (
+        quarter_annulus(MPI.COMM_SELF, 1.0, 2.0, h, quads=True, order=degree).mesh
+        for h in (0.5, 0.2)
+    )
     x, to = coarse.geometry.x[:, :2], fine.geometry.x[:, :2]
     linear = lambda z: np.stack([1 + 2 * z[:, 0] - z[:, 1], z[:, 1]], axis=1)  # noqa: E731
     onto = Interpolation(x, coarse.geometry.dofmap, to)
@@ -180,7 +212,8 @@ def test_guesses_from_quads(degree):
 
 
 def test_middles_of_third_order_quads_are_exact():
-    """A product of cubics is found at the middles of edges and cells; vertices stay what they are."""
+    """A product of cubics is found at the middles of edges and cells; vertices stay what they
+    are."""
     x = lagrange_element(QUADRILATERAL, 3).points
 
     def f(p: Array) -> Array:

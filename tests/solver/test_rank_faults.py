@@ -52,7 +52,8 @@ PLACES = {
 
 @pytest.mark.parametrize("place", PLACES)
 def test_an_exception_on_one_rank_ends_the_run(tmp_path, place):
-    """Within five seconds of it, with that rank's message, its exit code, and the steps before it readable."""
+    """Within five seconds of it, with that rank's message, its exit code, and the steps before it
+    readable."""
     module, owner, name, call = PLACES[place]
     (tmp_path / "joint.toml").write_text(textwrap.dedent(SCENE), encoding="utf-8")
     source = textwrap.dedent(FAULT).format(module=module, owner=owner, name=name, call=call)

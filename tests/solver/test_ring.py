@@ -1,4 +1,5 @@
-"""Persson's joint: a pin in a ring under a force at its core, against Persson (1964), Ciavarella and Decuzzi (2001)."""
+"""Persson's joint: a pin in a ring under a force at its core, against Persson (1964), Ciavarella
+and Decuzzi (2001)."""
 
 import numpy as np
 import pytest
@@ -33,7 +34,8 @@ def test_peak_pressure_and_angle_are_persson_s(load):
 
 
 def test_the_pressure_profile_is_persson_s():
-    """Facet means over the whole contact at E* dR/P = 0.5, within 0.5 % of the peak but for the facet at the edge."""
+    """Facet means over the whole contact at E* dR/P = 0.5, within 0.5 % of the peak but for the
+    facet at the edge."""
     solution = solve(persson_joint(0.5, 0.02))
     m, (eps, _) = solution.steps[-1], theory(0.5)
     for arc in solution.profiles[-1].values():
@@ -45,13 +47,15 @@ def test_the_pressure_profile_is_persson_s():
 
 
 def test_the_mesh_error_of_the_peak_falls_with_its_order():
-    """At least the second order against the limit of the same ring; the small contact shows it best."""
+    """At least the second order against the limit of the same ring; the small contact shows it
+    best."""
     peaks = [solve(persson_joint(10.0, h)).steps[-1].p0 for h in (0.08, 0.04, 0.01)]
     assert abs(peaks[1] - peaks[2]) < abs(peaks[0] - peaks[2]) / 4
 
 
 def test_the_ring_is_large_enough():
-    """Held at 100 R instead of infinity, p0 is off by (R/100 R)^2 times a small number; a quarter of it at 200 R."""
+    """Held at 100 R instead of infinity, p0 is off by (R/100 R)^2 times a small number; a quarter
+    of it at 200 R."""
     _, peak = theory(0.5)
     error = [
         abs(m.p0 / m.P / peak - 1)
@@ -70,15 +74,18 @@ def test_an_interference_fit_opens_as_persson_s(load):
 
 @pytest.mark.parametrize("wall", [0.3, 0.02])
 def test_a_thin_bushing_is_pressed_as_lame_s(wall):
-    """A ring held at its outer edge, b = 1 + wall, and an oversized pin: their pressure is that of Lame's equations in
-    plane strain, with u = A (r - b^2/r) in the ring and u = -p r/(2 (lambda + mu)) in the pin."""
+    """A ring held at its outer edge, b = 1 + wall, and an oversized pin: their pressure is that of
+    Lame's equations in plane strain, with u = A (r - b^2/r) in the ring and u = -p r/(2 (lambda +
+    mu)) in the pin."""
     m = solve(persson_joint(-1e4, joint={"block_size": 1 + wall}))
     solid, b = m.joint.scene.block, 1 + wall
     mu = solid.E / (2 + 2 * solid.nu)
     both = 2 * mu / (1 - 2 * solid.nu)  # 2 (lambda + mu)
     ring, pin = (b**2 - 1) / (both + 2 * mu * b**2), 1 / both
     for arc in m.profiles[-1].values():
-        np.testing.assert_allclose(arc.facet_force / arc.weight.sum(axis=1), DR / (ring + pin), rtol=5e-3)
+        np.testing.assert_allclose(
+            arc.facet_force / arc.weight.sum(axis=1), DR / (ring + pin), rtol=5e-3
+        )
 
 
 @pytest.mark.parametrize("bodies", [UNLIKE, UNLIKE[::-1]])
@@ -94,11 +101,14 @@ def pressed_core(core_radius=0.1, yield_stress=None, of="pin"):
     """A ring whose loaded core yields before the contact does."""
     load = {"relative_force": 0.006, "steps": 4, "core_radius": core_radius}
     body = {of: {"yield_stress": yield_stress}} if yield_stress else {}
-    return persson_joint(0.5, 0.1, joint={"clearance": 1e-3}, **body).model_copy(update={"load": Load(**load)})
+    return persson_joint(0.5, 0.1, joint={"clearance": 1e-3}, **body).model_copy(
+        update={"load": Load(**load)}
+    )
 
 
 def test_a_core_that_yields_is_named_from_the_step_in_which_delta_contains_it(tmp_path):
-    """Up to there delta is that of a pin that does not yield, beyond it is larger; a larger core does not yield."""
+    """Up to there delta is that of a pin that does not yield, beyond it is larger; a larger core
+    does not yield."""
     elastic = np.array([m.delta for m in solve(pressed_core()).steps])
     outcome = solve_scene(pressed_core(yield_stress=0.01), tmp_path, MPI.COMM_SELF)
     (named,) = (w for w in outcome.warnings if "where the force is applied" in w)
@@ -126,7 +136,9 @@ def test_yielding_beside_the_core_is_not_the_core_s(tmp_path):
 @pytest.mark.mpi
 def test_a_core_that_yields_is_known_on_every_rank(comm):
     """The largest PEEQ within the core, whoever has its cells."""
-    one, several = (core_peeq(solve(pressed_core(yield_stress=0.01), c).joint) for c in (MPI.COMM_SELF, comm))
+    one, several = (
+        core_peeq(solve(pressed_core(yield_stress=0.01), c).joint) for c in (MPI.COMM_SELF, comm)
+    )
     assert several == pytest.approx(one, rel=1e-6)
     assert one > 0
 
@@ -141,7 +153,8 @@ def test_a_ring_does_not_depend_on_the_ranks(comm):
 
 
 def test_the_force_does_the_work_that_is_stored():
-    """Work of the force over the mean displacement of its core: the elastic energy, within the step error."""
+    """Work of the force over the mean displacement of its core: the elastic energy, within the step
+    error."""
     errors = []
     for steps in (8, 16):
         m = solve(persson_joint(0.5, 0.16, steps)).steps[-1]
@@ -150,7 +163,8 @@ def test_the_force_does_the_work_that_is_stored():
 
 
 def test_the_work_of_an_interference_fit_counts_from_its_first_step_on():
-    """The fit stores energy before there is a force: without it the balance is that of the steps, alone it is none."""
+    """The fit stores energy before there is a force: without it the balance is that of the steps,
+    alone it is none."""
     balances = []
     for steps in (8, 16):
         done = solve(persson_joint(-0.2, 0.08, steps)).steps

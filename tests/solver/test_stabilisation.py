@@ -22,7 +22,8 @@ YIELDING = J2Material(210000.0, 0.3, "strain", LinearHardening(400.0, 2000.0))
 
 
 def steps_of(problem: Problem, loads) -> tuple[System, float]:
-    """The system at the last of the ``loads``, none of which may be cut, and the work of its one drive."""
+    """The system at the last of the ``loads``, none of which may be cut, and the work of its one
+    drive."""
     system, work, before = System(problem), 0.0, np.zeros(2)
     for load in loads:
         system.solve([load], StepRules(minimum=1.0))
@@ -33,13 +34,17 @@ def steps_of(problem: Problem, loads) -> tuple[System, float]:
 
 
 def sleeves(comm=MPI.COMM_SELF, material=STEEL) -> Problem:
-    """A pin that is pushed through the clearances of two sleeves, which nothing else holds along the push."""
+    """A pin that is pushed through the clearances of two sleeves, which nothing else holds along
+    the push."""
     mesh = bushing(comm, 10.0, [(10.05, 12.0), (12.03, 14.0), (14.04, 30.0)], 1.5, 0.4)
     between = {"a": ("pin", "sleeve 1 inside"), "b": ("sleeve 1 outside", "sleeve 2 inside")}
     between["c"] = ("sleeve 2 outside", "bore")
     supports = [Support("axis", "axis", 1), Support("flat", "flat", 0, 1.0)]
     supports += [Support("edge", "outer edge", axis) for axis in (0, 1)]
-    bodies = [Body(name, STEEL if name == "pin" else material) for name in ("pin", "sleeve 1", "sleeve 2", "housing")]
+    bodies = [
+        Body(name, STEEL if name == "pin" else material)
+        for name in ("pin", "sleeve 1", "sleeve 2", "housing")
+    ]
     interactions = [Interaction(name, surfaces) for name, surfaces in between.items()]
     return Problem(mesh, bodies, interactions, supports, symmetry=2.0, stabilise=True)
 
@@ -47,12 +52,15 @@ def sleeves(comm=MPI.COMM_SELF, material=STEEL) -> Problem:
 @pytest.mark.mpi
 @pytest.mark.parametrize("material", [STEEL, YIELDING], ids=["elastic", "yielding"])
 def test_floating_sleeves_hand_the_whole_force_on(comm, material):
-    """From no contact at all, in steps of which some close a part of the clearance of 0.12: the springs' share of force
-    and work is below 1e-6, and the result does not depend on the steps that it took, if all is elastic."""
+    """From no contact at all, in steps of which some close a part of the clearance of 0.12: the
+    springs' share of force and work is below 1e-6, and the result does not depend on the steps that
+    it took, if all is elastic."""
     system, work = steps_of(sleeves(comm, material), [0.03, 0.09, 0.15, 0.2])
     P = system.drive_force("")
     for name in "abc":
-        np.testing.assert_allclose(system.contact_force(name), [P, system.contact_force(name)[1]], rtol=1e-6)
+        np.testing.assert_allclose(
+            system.contact_force(name), [P, system.contact_force(name)[1]], rtol=1e-6
+        )
     assert system.reaction("edge")[0] == pytest.approx(-P, rel=1e-6)
     assert 0 < system.stabilisation_energy < 1e-6 * work
     if material is STEEL:
@@ -62,21 +70,31 @@ def test_floating_sleeves_hand_the_whole_force_on(comm, material):
 
 @pytest.mark.parametrize(("times", "nu"), [(1e6, 0.3), (1.0, 0.4999)])
 def test_springs_stay_weak_beside_a_far_softer_body(times, nu):
-    """The springs of sleeves a million times as stiff as the rest, also of nearly incompressible ones, do less than a
-    millionth of the work."""
-    system, work = steps_of(sleeves(material=Elastic(times * 210000.0, nu, "strain")), [0.1, 0.15, 0.2])
+    """The springs of sleeves a million times as stiff as the rest, also of nearly incompressible
+    ones, do less than a millionth of the work."""
+    system, work = steps_of(
+        sleeves(material=Elastic(times * 210000.0, nu, "strain")), [0.1, 0.15, 0.2]
+    )
     assert 0 < system.stabilisation_energy < 1e-6 * work
     np.testing.assert_allclose(system.reaction("edge")[0], -system.drive_force(""), rtol=1e-5)
 
 
 @pytest.mark.parametrize("half", [True, False], ids=["half", "whole"])
 def test_a_pin_under_a_force_finds_its_hole(half):
-    """Concentric with clearance at first: nothing resists the force but springs. The whole pin may turn, too."""
+    """Concentric with clearance at first: nothing resists the force but springs. The whole pin may
+    turn, too."""
     mesh = lug(MPI.COMM_SELF, 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4, half=half, pin="whole")
-    supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [Support("axis", "axis", 1)] * half
-    bodies, contact = [Body("pin", STEEL), Body("lug", STEEL)], Interaction("contact", ("pin", "hole"))
+    supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [
+        Support("axis", "axis", 1)
+    ] * half
+    bodies, contact = (
+        [Body("pin", STEEL), Body("lug", STEEL)],
+        Interaction("contact", ("pin", "hole")),
+    )
     loads, drives = [Load("pin", (-1.0, 0.0), drive="pull")], [Drive("pull", (0, 4000.0))]
-    problem = Problem(mesh, bodies, [contact], supports, loads, drives=drives, symmetry=1.0 + half, stabilise=True)
+    problem = Problem(
+        mesh, bodies, [contact], supports, loads, drives=drives, symmetry=1.0 + half, stabilise=True
+    )
     system, work = steps_of(problem, [0.25, 0.5, 1.0])
     assert system.driven()[0][0] > 0.2  # through the whole clearance, and beyond
     np.testing.assert_allclose(system.reaction("clamp")[0], 4000, rtol=1e-6)
@@ -88,10 +106,14 @@ def test_a_disc_under_a_force_finds_its_body():
     """Half its radius away from it at first."""
     disc = Rigid(RigidCircle(np.array([0.5, 4.0]), 2.0), {"down": (0.0, -1.0), "aside": (1.0, 0.0)})
     paths = [Drive("down", (0, 0.1), "force"), Drive("aside", (0, 0.0))]
-    supports = [Support("base", facets, axis) for facets in ("base", "upper bottom") for axis in (0, 1)]
+    supports = [
+        Support("base", facets, axis) for facets in ("base", "upper bottom") for axis in (0, 1)
+    ]
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     contact = [Interaction("contact", (disc, "lid"))]
-    problem = Problem(blocks(MPI.COMM_SELF, 3, 6), bodies, contact, supports, drives=paths, stabilise=True)
+    problem = Problem(
+        blocks(MPI.COMM_SELF, 3, 6), bodies, contact, supports, drives=paths, stabilise=True
+    )
     system = solve(problem, [1.0])
     assert system.drive_displacement("down") > 1.0
     assert system.contact_force("contact")[1] == pytest.approx(-0.1, rel=1e-6)
@@ -99,7 +121,8 @@ def test_a_disc_under_a_force_finds_its_body():
 
 
 def test_bodies_that_supports_hold_get_no_springs():
-    """Also not those that a coupling holds; a rigid reference point that a force moves does not hold."""
+    """Also not those that a coupling holds; a rigid reference point that a force moves does not
+    hold."""
 
     def springs(mesh=None, **parts):
         problem = Problem(blocks(MPI.COMM_SELF, 2, 3), bodies, (), stabilise=True, **parts)
@@ -119,9 +142,21 @@ def test_a_mean_motion_of_half_an_edge_is_that_of_the_whole():
     found = []
     for half in (True, False):
         mesh = lug(MPI.COMM_SELF, 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4, half=half)
-        supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [Support("axis", "axis", 1)] * half
-        bodies, contact = [Body("pin", STEEL), Body("lug", STEEL)], Interaction("contact", ("pin", "hole"))
-        means, drives = [Mean("flat", "flat", 0, None if half else (0.1, 0.0), "pull")], [Drive("pull", (0, 0.1))]
+        supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [
+            Support("axis", "axis", 1)
+        ] * half
+        bodies, contact = (
+            [Body("pin", STEEL), Body("lug", STEEL)],
+            Interaction("contact", ("pin", "hole")),
+        )
+        means, drives = (
+            [Mean("flat", "flat", 0, None if half else (0.1, 0.0), "pull")],
+            [Drive("pull", (0, 0.1))],
+        )
         parts = {"means": means, "drives": drives, "symmetry": 1.0 + half, "stabilise": True}
-        found.append(steps_of(Problem(mesh, bodies, [contact], supports, **parts), [0.5, 1.0])[0].drive_force("pull"))
+        found.append(
+            steps_of(Problem(mesh, bodies, [contact], supports, **parts), [0.5, 1.0])[
+                0
+            ].drive_force("pull")
+        )
     assert found[0] == pytest.approx(found[1], rel=1e-4)

@@ -10,7 +10,8 @@ from tests.solver.solving import scene, solve
 
 
 def test_cutbacks_change_the_path_but_not_the_targets():
-    """With too few iterations allowed, steps are cut, all targets are hit, and P agrees within the step error."""
+    """With too few iterations allowed, steps are cut, all targets are hit, and P agrees within the
+    step error."""
     free = solve(scene(0.12, 4, yield_stress=0.002))
     bound = solve(scene(0.12, 4, yield_stress=0.002, analysis={"max_iterations": 5}))
     assert sum(m.cutbacks for m in free.steps) == 0
@@ -39,12 +40,14 @@ def test_a_failed_step_leaves_no_trace():
 
 
 def test_a_solve_that_cannot_go_on_says_where_and_why():
-    """The message holds delta, the reason, the residual and its place; accepted steps were reported before."""
+    """The message holds delta, the reason, the residual and its place; accepted steps were reported
+    before."""
     problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6})
     joint, accepted = Joint(problem, MPI.COMM_SELF), []
     targets = problem.targets
     with pytest.raises(
-        StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
+        StepFailure,
+        match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller",
     ):
         march(
             joint.load_path(),
@@ -56,11 +59,13 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
 
 
 def test_one_large_step_finds_the_plastic_state():
-    """Elastic first touch, then the plastic state at 2 dR at once: the force of 20 steps within 0.5 %."""
+    """Elastic first touch, then the plastic state at 2 dR at once: the force of 20 steps within 0.5
+    %."""
     assert pytest.approx(0.00669, rel=5e-3) == solve(scene(0.08, 1, yield_stress=0.002)).steps[-1].P
 
 
 def test_a_short_step_is_no_equilibrium():
-    """PETSc's criterion of short steps, by which a line search that fails far from equilibrium converges, is off."""
+    """PETSc's criterion of short steps, by which a line search that fails far from equilibrium
+    converges, is off."""
     solvers = solve(scene(0.1, 1)).joint.solver.newton._solvers
     assert [snes.getTolerances()[2] for snes in solvers.values()] == [0.0] * len(solvers)

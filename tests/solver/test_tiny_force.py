@@ -1,4 +1,5 @@
-"""Forces of which the contact is smaller than a facet: force control answers as displacement control does."""
+"""Forces of which the contact is smaller than a facet: force control answers as displacement
+control does."""
 
 import pytest
 
@@ -10,7 +11,8 @@ from tests.solver.solving import solve
 
 @pytest.mark.parametrize("force", [1e-6, 1e-8, 1e-10])
 def test_a_tiny_force_moves_the_pin_as_far_as_takes_it(force):
-    """Down to P/(E* R) = 1e-10, whose delta is a 3e-9 of R: one attempt, and the displacement gives the force back."""
+    """Down to P/(E* R) = 1e-10, whose delta is a 3e-9 of R: one attempt, and the displacement gives
+    the force back."""
     load = {"displacement": None, "relative_force": force}
     (pressed,) = solve(paper_joint(0.1, 1, load=load)).steps
     assert pressed.cutbacks == 0

@@ -16,7 +16,8 @@ load = { displacement = 1.0, steps = 2 }
 output = { fields = false }
 """
 SOFT = "[grid]\npin.E = [0.5, 1.0, 1.82]\nload.steps = [2, 3]\n"  # six cases on one mesh
-STUCK = "analysis.max_iterations = 2\nstepping.minimum = 1.0\n"  # Newton needs more, and no step may be cut
+# Newton needs more, and no step may be cut
+STUCK = "analysis.max_iterations = 2\nstepping.minimum = 1.0\n"
 
 
 def written(folder: Path, text: str, name: str = "some") -> str:

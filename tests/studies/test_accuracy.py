@@ -41,14 +41,21 @@ def accurate(scene, folder, comm=MPI.COMM_SELF, **hooks):
 
 
 def known_force(case):
-    """P at 2 dR in units of E* R, from meshes of up to 400 thousand dofs (docs/work_precision.md)."""
+    """P at 2 dR in units of E* R, from meshes of up to 400 thousand dofs
+    (docs/work_precision.md)."""
     return CASES[case]["current"]["P"][0]
 
 
-@pytest.mark.parametrize(("shape", "heading", "size"), [(True, "elements/R", 0.04), (False, "size/file", 1.0)])
+@pytest.mark.parametrize(
+    ("shape", "heading", "size"), [(True, "elements/R", 0.04), (False, "size/file", 1.0)]
+)
 def test_sizes_of_general_meshes_have_their_heading(capsys, shape, heading, size):
     """Those of shapes are over R as those of joints, those of files over the file's."""
-    mesh = {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}} if shape else {"file": "x.msh"}
+    mesh = (
+        {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}}
+        if shape
+        else {"file": "x.msh"}
+    )
     press = {"name": "press", "on": "flat", "direction": "x", "displacement": 0.1}
     data = {"mesh": mesh, "body": [{"name": "lug", "E": 1.0, "nu": 0.3}], "load": [press]}
     scene = parse_any(data | {"analysis": {"accuracy": 0.01}})
@@ -72,11 +79,14 @@ def test_an_elastic_joint_is_as_accurate_as_asked(elastic):
     assert found.step_error == 0
     sizes = [level.element_size for level in found.levels]
     assert np.divide(sizes[:-1], sizes[1:]) == pytest.approx(mesh_family.RATIO, rel=1e-3)
-    assert [level.mesh_error is None for level in found.levels] == [True] + [False] * (len(sizes) - 1)
+    assert [level.mesh_error is None for level in found.levels] == [True] + [False] * (
+        len(sizes) - 1
+    )
 
 
 def test_the_run_says_how_accurate_it_is_and_can_be_solved_again(elastic, tmp_path):
-    """run.json has what was asked, what came out, and every mesh, scene.toml the last one and no accuracy."""
+    """run.json has what was asked, what came out, and every mesh, scene.toml the last one and no
+    accuracy."""
     report = json.loads((elastic.folder / "run.json").read_text())
     block, last = report["accuracy"], report["accuracy"]["levels"][-1]
     assert (report["status"], block["asked"]) == ("done", 1e-3)
@@ -93,7 +103,8 @@ def test_the_run_says_how_accurate_it_is_and_can_be_solved_again(elastic, tmp_pa
 
 
 def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
-    """In 20 output steps, as the reference has them; its own error of the steps at 2 dR is below 5e-4."""
+    """In 20 output steps, as the reference has them; its own error of the steps at 2 dR is below
+    5e-4."""
     outcome = accurate(open_scene(6e-3, 20, 0.002, output={"fields": False}), tmp_path)
     found = outcome.accuracy
     assert outcome.status == "done"
@@ -101,7 +112,10 @@ def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
     assert 0 < found.step_error <= 3e-3
     assert abs(outcome.steps[-1].P / known_force("plastic") - 1) < 6e-3
     tried = {level.substeps for level in found.levels if level.mesh == 1}
-    assert {found.substeps, 2 * found.substeps} <= tried or {found.substeps, found.substeps // 2} <= tried
+    assert {found.substeps, 2 * found.substeps} <= tried or {
+        found.substeps,
+        found.substeps // 2,
+    } <= tried
 
 
 def test_under_a_force_the_displacement_is_accurate(tmp_path):
@@ -113,7 +127,8 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
 
 
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
-    """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer to that of many."""
+    """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer
+    to that of many."""
     plane, short = {"plane": "stress"}, {"initial": 1 / 16, "maximum": 1 / 16}
     many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
     known = Case("many", many).solve(tmp_path).steps[-1].P
@@ -130,7 +145,8 @@ def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
 
 
 def test_a_mesh_that_does_not_see_the_contact_is_no_evidence(tmp_path, monkeypatch):
-    """Where the contact is smaller than expected, coarse meshes are passed over until a few facets touch."""
+    """Where the contact is smaller than expected, coarse meshes are passed over until a few facets
+    touch."""
     monkeypatch.setattr(mesh_family, "expected_angle", lambda scene: 1.17)
     scene = open_scene(0.02, 1, load={"displacement": 0.05}, output={"fields": False})
     outcome = accurate(scene, tmp_path)
@@ -169,7 +185,8 @@ def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
     [("on_step", 6, None, 2, 1), ("on_level", 1, None, 4, 1), ("on_step", 4, 0.002, 4, 0)],
 )
 def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, steps, meshes):
-    """In the second mesh after a step, between meshes, and while steps are chosen: what was accepted is there."""
+    """In the second mesh after a step, between meshes, and while steps are chosen: what was
+    accepted is there."""
     seen = []
 
     def interrupt(thing):
@@ -180,7 +197,11 @@ def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, s
     before = signal.getsignal(signal.SIGINT)
     scene = open_scene(1e-3, 4, yield_stress)
     outcome = accurate(scene, tmp_path, **{when: interrupt})
-    assert (outcome.status, outcome.signal, len(outcome.steps)) == ("interrupted", signal.SIGINT, steps)
+    assert (outcome.status, outcome.signal, len(outcome.steps)) == (
+        "interrupted",
+        signal.SIGINT,
+        steps,
+    )
     assert "interrupted by SIGINT" in outcome.message
     assert accepted_steps(tmp_path) == steps
     report = json.loads((tmp_path / "run.json").read_text())
@@ -194,12 +215,18 @@ def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, s
 
 
 def test_accurate_and_small_contacts_get_small_elements():
-    """More accuracy is finer everywhere; a contact of a tenth of the angle has as many elements, which grow as fast."""
-    third = [MeshFamily(open_scene(asked), asked).scene_of(2, 1).joint for asked in (0.01, 1e-3, 1e-4, 1e-5)]
+    """More accuracy is finer everywhere; a contact of a tenth of the angle has as many elements,
+    which grow as fast."""
+    third = [
+        MeshFamily(open_scene(asked), asked).scene_of(2, 1).joint
+        for asked in (0.01, 1e-3, 1e-4, 1e-5)
+    ]
     assert all(a.h > b.h and a.growth > b.growth for a, b in pairwise(third))
     cubic = MeshFamily(open_scene(1e-4, analysis={"degree": 3}), 1e-4).scene_of(2, 1).joint
     assert cubic.h > third[2].h
-    wide, small = (MeshFamily(open_scene(1e-3, load={"displacement": d}), 1e-3) for d in (2.0, 0.01))
+    wide, small = (
+        MeshFamily(open_scene(1e-3, load={"displacement": d}), 1e-3) for d in (2.0, 0.01)
+    )
     a, b = wide.scene_of(1, 1).joint, small.scene_of(1, 1).joint
     assert b.growth == a.growth
     angle = mesh_family.expected_angle(small.scene)
@@ -209,7 +236,9 @@ def test_accurate_and_small_contacts_get_small_elements():
 
 def test_units_do_not_matter():
     """Metres and pascals instead of millimetres and megapascals: the same meshes in units of R."""
-    data, other = (tomllib.loads(resolved(open_scene(1e-3, load={"displacement": 0.3}))) for _ in range(2))
+    data, other = (
+        tomllib.loads(resolved(open_scene(1e-3, load={"displacement": 0.3}))) for _ in range(2)
+    )
     other["joint"] |= {"radius": 0.037, "clearance": 0.005 * 0.037, "block_size": 3.7}
     for body in ("pin", "block"):
         other[body]["E"] *= 1.3e9
@@ -229,8 +258,13 @@ def test_thickness_does_not_matter():
 
 
 def test_meshes_are_bounded_by_the_keys():
-    """Unlike elements on both arcs and a shrinking edge stay within what a scene allows; beyond it there is no mesh."""
-    for keys in ({"size_ratio": 0.01}, {"size_ratio": 10.0}, {"edge_angle": 1.0, "edge_ratio": 0.01}):
+    """Unlike elements on both arcs and a shrinking edge stay within what a scene allows; beyond it
+    there is no mesh."""
+    for keys in (
+        {"size_ratio": 0.01},
+        {"size_ratio": 10.0},
+        {"edge_angle": 1.0, "edge_ratio": 0.01},
+    ):
         family = MeshFamily(open_scene(1e-3, joint=keys), 1e-3)
         assert family.scene_of(0, 1) is not None
         assert family.scene_of(1, 1) is not None
@@ -256,10 +290,15 @@ def test_an_override_takes_the_place_of_the_accuracy_or_of_the_mesh(tmp_path):
         section, name, value = override.replace("=", ".", 1).split(".", 2)
         data = tomllib.loads(text)
         data[section][name] = float(value)
-        with pytest.raises(InputError, match=rf"{section}\.{name} = {value} must not be given together with analysis"):
+        with pytest.raises(
+            InputError,
+            match=rf"{section}\.{name} = {value} must not be given together with analysis",
+        ):
             parse_scene(data)
     (tmp_path / "closed.toml").write_text(resolved(paper_joint()))
-    assert load_scene(tmp_path / "closed.toml", ["analysis.accuracy=0.01"]).analysis.accuracy == 0.01
+    assert (
+        load_scene(tmp_path / "closed.toml", ["analysis.accuracy=0.01"]).analysis.accuracy == 0.01
+    )
 
 
 @pytest.mark.mpi
@@ -275,4 +314,9 @@ def test_ranks_choose_the_same_meshes(tmp_path, comm):
     assert [m.P for m in together.steps] == pytest.approx(forces, rel=1e-8)
     assert together.accuracy.estimated == pytest.approx(found.estimated, rel=1e-4)
     for a, b in zip(together.accuracy.levels, found.levels, strict=True):
-        assert (a.mesh, a.element_size, a.substeps, a.dofs) == (b.mesh, b.element_size, b.substeps, b.dofs)
+        assert (a.mesh, a.element_size, a.substeps, a.dofs) == (
+            b.mesh,
+            b.element_size,
+            b.substeps,
+            b.dofs,
+        )

@@ -1,4 +1,5 @@
-"""What a sweep file expands to: laws of counting, sampling and naming, before anything is solved."""
+"""What a sweep file expands to: laws of counting, sampling and naming, before anything is
+solved."""
 
 import math
 import re
@@ -13,7 +14,15 @@ from hypothesis import strategies as st
 
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
-from archord.studies.cases import LatinHypercube, SweepFile, combinations, factors, read_sweep, run_name, samples
+from archord.studies.cases import (
+    LatinHypercube,
+    SweepFile,
+    combinations,
+    factors,
+    read_sweep,
+    run_name,
+    samples,
+)
 from archord.studies.sweep import expected_seconds, heading, part_of
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -35,7 +44,8 @@ def faults(folder: Path, text: str, base: str = ELASTIC, overrides=()) -> list[s
 
 
 def test_everything_is_multiplied(tmp_path):
-    """As many cases as the product of all lengths, all different, the last factor varying fastest."""
+    """As many cases as the product of all lengths, all different, the last factor varying
+    fastest."""
     varied = {
         "grid": {"joint.radius": [1, 2], "load.steps": [1, 2, 3]},
         "zip": {"pin.E": [1, 2, 3], "pin.nu": [1, 2, 3]},
@@ -44,22 +54,35 @@ def test_everything_is_multiplied(tmp_path):
     }
     rows = combinations(factors(SweepFile.model_validate({"base": {}} | varied)))
     assert len(rows) == 2 * 3 * (2 * 3) * 4
-    order = [tuple(row[key] for key in ("block.E", "pin.E", "joint.radius", "load.steps")) for row in rows]
+    order = [
+        tuple(row[key] for key in ("block.E", "pin.E", "joint.radius", "load.steps"))
+        for row in rows
+    ]
     assert order == sorted(order)
-    assert len({(*first, row["block.nu"]) for first, row in zip(order, rows, strict=True)}) == len(rows)
+    assert len({(*first, row["block.nu"]) for first, row in zip(order, rows, strict=True)}) == len(
+        rows
+    )
     assert all(row["pin.E"] == row["pin.nu"] for row in rows)
     assert len(read_sweep(written(tmp_path, "")).cases) == 1
 
 
 @settings(max_examples=20, deadline=None)
-@given(number=st.integers(1, 40), seed=st.integers(0, 2**31), low=st.floats(1e-3, 1.0), factor=st.floats(1.5, 1e3))
+@given(
+    number=st.integers(1, 40),
+    seed=st.integers(0, 2**31),
+    low=st.floats(1e-3, 1.0),
+    factor=st.floats(1.5, 1e3),
+)
 def test_every_stratum_of_a_range_holds_one_sample(number, seed, low, factor):
-    """On a linear and on a logarithmic scale; the same seed gives the same samples, another one others."""
+    """On a linear and on a logarithmic scale; the same seed gives the same samples, another one
+    others."""
     ends = {"from": low, "to": low * factor}
     ranges = {"joint.radius": ends, "joint.clearance": {**ends, "scale": "log"}}
 
     def drawn(seed: int) -> list:
-        return samples(LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges}))
+        return samples(
+            LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges})
+        )
 
     rows = drawn(seed)
     linear, log = (np.array([row[key] for row in rows]) for key in ranges)
@@ -73,7 +96,9 @@ def test_a_heading_has_the_unit_of_its_key():
     """Forces are per unit thickness unless the scene has one."""
     scene = load_scene(ELASTIC)
     assert heading("load.force", scene) == "load.force [E* R]"
-    thick = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"thickness": 10.0})})
+    thick = scene.model_copy(
+        update={"analysis": scene.analysis.model_copy(update={"thickness": 10.0})}
+    )
     assert heading("load.force", thick) == "load.force [E* R2]"
 
 
@@ -95,7 +120,9 @@ def test_overrides_mean_what_set_means(tmp_path):
         ["load.displacement=none", "load.relative_force=[0.001, 0.002]"],
     ]
     found = read_sweep(written(tmp_path, text)).cases
-    assert [resolved(case.scene) for case in found] == [resolved(load_scene(ELASTIC, some)) for some in options]
+    assert [resolved(case.scene) for case in found] == [
+        resolved(load_scene(ELASTIC, some)) for some in options
+    ]
     text = '[grid]\nblock.yield_stress = ["none", 300.0]'
     plastic = read_sweep(written(tmp_path, text, str(SCENES / "steel_pin.toml")))
     assert [case.scene.block.yield_stress for case in plastic.cases] == [None, 300.0]
@@ -153,9 +180,18 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
     [
         ("gird = 3", "gird = 3: is not a known key."),
         ("[grid]\njoint.clearance = 1", "grid.joint.clearance = 1: input should be a valid list."),
-        ("[grid]\nclearance = [1]", "[grid] clearance: must read section.key, like joint.clearance."),
-        ("grid.units.length = ['m']", "[grid] units.length: cannot vary; all cases of a table have the same units."),
-        ("[zip]\npin.E = [1, 2]\npin.nu = [0]", "zip: must hold lists of one length, but pin.E has 2, pin.nu has 1."),
+        (
+            "[grid]\nclearance = [1]",
+            "[grid] clearance: must read section.key, like joint.clearance.",
+        ),
+        (
+            "grid.units.length = ['m']",
+            "[grid] units.length: cannot vary; all cases of a table have the same units.",
+        ),
+        (
+            "[zip]\npin.E = [1, 2]\npin.nu = [0]",
+            "zip: must hold lists of one length, but pin.E has 2, pin.nu has 1.",
+        ),
         (
             "[grid]\njoint.clearance = [0.1]\n[[list]]\njoint.relative_clearance = 0.1",
             "[grid] joint.clearance: is varied by [[list]] joint.relative_clearance already.",
@@ -181,7 +217,10 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
             "case 3 and 1 more: load.steps = 1.5 must be a whole number.",
         ),
         ("[[list]]\nblock.nu = 0.7", "every case: block.nu = 0.7 must be at most 0.499999."),
-        (f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}", "has 160000 cases; 100000 are allowed."),
+        (
+            f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}",
+            "has 160000 cases; 100000 are allowed.",
+        ),
     ],
 )
 def test_faults_are_told_in_a_sentence(tmp_path, text, said):
@@ -198,7 +237,9 @@ def test_of_many_faults_the_first_are_told(tmp_path):
 
 def test_a_base_is_needed(tmp_path):
     assert faults(tmp_path, "", "") == ["FILE: base: is missing."]
-    assert faults(tmp_path, "base = 3", "") == ["FILE: base = 3: input should be a valid dictionary."]
+    assert faults(tmp_path, "base = 3", "") == [
+        "FILE: base = 3: input should be a valid dictionary."
+    ]
     said = f"{tmp_path}/nowhere.toml: cannot be read: No such file or directory."
     assert faults(tmp_path, "", "nowhere.toml") == [said]
 
@@ -208,7 +249,11 @@ def test_examples_are_sound(tmp_path):
     text = re.search(r"```toml\n(base = .*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)[1]
     documented = tmp_path / "all.sweep.toml"
     documented.write_text(text.replace("steel_pin.toml", str(SCENES / "steel_pin.toml")))
-    files = {documented: 240, SCENES / "clearance.sweep.toml": 9, SCENES / "stiffness.sweep.toml": 24}
+    files = {
+        documented: 240,
+        SCENES / "clearance.sweep.toml": 9,
+        SCENES / "stiffness.sweep.toml": 24,
+    }
     for file, number in files.items():
         sweep = read_sweep(file)
         assert len(sweep.cases) == len(sweep.distinct) == number
@@ -224,7 +269,9 @@ def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
 
 
 def test_scenes_and_sweeps_are_told_apart(tmp_path):
-    with pytest.raises(InputError, match=r"\A.* is a scene, not a sweep; solve it by archord solve.*\Z"):
+    with pytest.raises(
+        InputError, match=r"\A.* is a scene, not a sweep; solve it by archord solve.*\Z"
+    ):
         read_sweep(ELASTIC)
     for name in ("lug", "bushing"):
         with pytest.raises(InputError, match=r"\A[^\n]*: is a scene, not a sweep; [^\n]*\.\Z"):

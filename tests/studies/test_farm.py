@@ -1,4 +1,5 @@
-"""Cases on any number of ranks: each is solved once, all ranks take part, and the numbers are those of one rank."""
+"""Cases on any number of ranks: each is solved once, all ranks take part, and the numbers are those
+of one rank."""
 
 import os
 import signal
@@ -55,7 +56,9 @@ def test_a_signal_ends_the_batch_on_all_ranks(comm, tmp_path):
     before = signal.getsignal(signal.SIGTERM)
     assert solve_cases(comm, cases, folder, ended) == signal.SIGTERM
     assert signal.getsignal(signal.SIGTERM) == before
-    rest = agreed(comm, lambda: [case for case in cases if result_of(case, folder).status != "done"])
+    rest = agreed(
+        comm, lambda: [case for case in cases if result_of(case, folder).status != "done"]
+    )
     assert rest
     assert solve_cases(comm, rest, folder, lambda result: None) == 0
     if comm.rank == 0:
@@ -72,7 +75,9 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
     if comm.rank == 0:
         by_run = {result.run: result for result in results}
         assert [by_run[case.run].status for case in cases] == 3 * ["failed"] + 3 * ["done"]
-        assert [result_of(case, folder).message for case in cases] == 3 * ["ValueError: broken"] + 3 * [""]
+        assert [result_of(case, folder).message for case in cases] == 3 * [
+            "ValueError: broken"
+        ] + 3 * [""]
 
 
 def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(comm, tmp_path):

@@ -30,11 +30,15 @@ def swept(tmp_path_factory):
 def test_each_case_of_a_preset_is_what_solve_makes_of_it(swept, tmp_path):
     (tmp_path / "base.toml").write_text(LUG.partition("[base]")[2])
     keys = ["--set", "lug.width=36.0", "--set", "load.displacement=0.1"]
-    assert run(["solve", str(tmp_path / "base.toml"), *keys, "-o", str(tmp_path / "alone"), "-q"]) == 0
+    assert (
+        run(["solve", str(tmp_path / "base.toml"), *keys, "-o", str(tmp_path / "alone"), "-q"]) == 0
+    )
     rows = table(swept / "out" / "cases.csv")
     assert [(row["lug.width"], row["load.displacement"]) for row in rows][1] == ("36", "0.1")
     alone = archord.load(tmp_path / "alone")
-    assert float(rows[1]["pull force [N/mm]"]) == pytest.approx(alone.columns["pull force"][-1], rel=1e-12)
+    assert float(rows[1]["pull force [N/mm]"]) == pytest.approx(
+        alone.columns["pull force"][-1], rel=1e-12
+    )
     assert {row["status"] for row in rows} == {"done"}
 
 

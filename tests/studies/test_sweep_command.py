@@ -1,4 +1,5 @@
-"""archord sweep as a user runs it, in this process: what is solved, what is not solved again, what the tables say."""
+"""archord sweep as a user runs it, in this process: what is solved, what is not solved again, what
+the tables say."""
 
 import os
 import shutil
@@ -23,10 +24,24 @@ def solved(tmp_path_factory) -> Path:
 
 def test_each_case_is_what_solve_makes_of_it(solved, tmp_path):
     """To the last digit, though the process and its mesh had other cases before."""
-    (tmp_path / "base.toml").write_text((solved / "some.sweep.toml").read_text().partition("[base]")[2])
+    (tmp_path / "base.toml").write_text(
+        (solved / "some.sweep.toml").read_text().partition("[base]")[2]
+    )
     for number, E, steps in ((1, 0.5, 2), (6, 1.82, 3)):
         keys = ["--set", f"pin.E={E}", "--set", f"load.steps={steps}"]
-        assert run(["solve", str(tmp_path / "base.toml"), *keys, "-o", str(tmp_path / f"{number}"), "-q"]) == 0
+        assert (
+            run(
+                [
+                    "solve",
+                    str(tmp_path / "base.toml"),
+                    *keys,
+                    "-o",
+                    str(tmp_path / f"{number}"),
+                    "-q",
+                ]
+            )
+            == 0
+        )
         alone = read_history(tmp_path / f"{number}" / "history.csv")
         rows = [row for row in table(solved / "out" / "sweep.csv") if row["case"] == str(number)]
         for name in set(alone) - {"seconds"}:
@@ -35,7 +50,8 @@ def test_each_case_is_what_solve_makes_of_it(solved, tmp_path):
 
 
 def test_tables_are_tidy(solved):
-    """A row per case and step, the varied keys in columns with their units; a row per case with the last step."""
+    """A row per case and step, the varied keys in columns with their units; a row per case with the
+    last step."""
     rows = table(solved / "out" / "sweep.csv")
     assert list(rows[0])[:6] == ["case", "run", "status", "pin.E [E*]", "load.steps", "step"]
     assert "".join(row["case"] for row in rows) == "112223344455666"
@@ -51,15 +67,26 @@ def test_tables_are_tidy(solved):
 
 
 def test_cases_with_other_columns_share_a_table(tmp_path):
-    """An elastic joint has none of PEEQ by body: its cells are empty, and every number stands under its heading."""
+    """An elastic joint has none of PEEQ by body: its cells are empty, and every number stands under
+    its heading."""
     text = '[grid]\nblock.yield_stress = ["none", 0.002]\npin.yield_stress = ["none", 0.002]\n'
     assert sweep(written(tmp_path, text), "-o", tmp_path / "out", "-q") == 0
     rows, ends = table(tmp_path / "out" / "sweep.csv"), table(tmp_path / "out" / "cases.csv")
     for k, (row, end) in enumerate(zip(rows[1::2], ends, strict=True)):
         own = read_history(tmp_path / "out" / "cases" / row["run"] / "history.csv")
-        values = {heading.split(" [")[0]: value for heading, value in row.items() if heading not in list(row)[:5]}
-        assert {name: float(value) for name, value in values.items() if value} == {n: v[-1] for n, v in own.items()}
-        assert [bool(row[f"{place} peeq_max"]) for place in ("pin", "block", "contact")] == [k % 2 == 1, k > 1, k > 0]
+        values = {
+            heading.split(" [")[0]: value
+            for heading, value in row.items()
+            if heading not in list(row)[:5]
+        }
+        assert {name: float(value) for name, value in values.items() if value} == {
+            n: v[-1] for n, v in own.items()
+        }
+        assert [bool(row[f"{place} peeq_max"]) for place in ("pin", "block", "contact")] == [
+            k % 2 == 1,
+            k > 1,
+            k > 0,
+        ]
         assert end["contact peeq_max"] == row["contact peeq_max"]
 
 
@@ -75,7 +102,11 @@ def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
     after = times(solved / "out")
     assert {name: after[name] for name in before} == before
     assert len({name.split("/")[1] for name in after}) == 8
-    assert {row["pin.E [E*]"] for row in table(solved / "out" / "cases.csv")} == {"0.25", "1", "1.82"}
+    assert {row["pin.E [E*]"] for row in table(solved / "out" / "cases.csv")} == {
+        "0.25",
+        "1",
+        "1.82",
+    }
     assert sweep(written(solved, SOFT), "-o", solved / "out", "-q") == 0
     rows = numbers(solved / "out")
     assert sweep(solved / "out", "-q") == 0
@@ -93,8 +124,9 @@ def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused):
 
 
 def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
-    """A case that finds no equilibrium, and one with an error that nobody foresaw: noted, exit code 3, and left alone
-    until --retry. The error's traceback is in failure.txt, its sentence in the table, and a retry removes it."""
+    """A case that finds no equilibrium, and one with an error that nobody foresaw: noted, exit code
+    3, and left alone until --retry. The error's traceback is in failure.txt, its sentence in the
+    table, and a retry removes it."""
     break_mesh(monkeypatch, "two\nlines", below=0.75)
     text = f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 0.5\n[[list]]\npin.nu = 0.2\n"
     file, out = written(tmp_path, text), tmp_path / "out"
@@ -115,13 +147,19 @@ def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     assert times(out) == before
     monkeypatch.undo()
     assert sweep(file, "-o", out, "-q", "--retry") == 3
-    assert [end["status"] for end in table(out / "cases.csv")] == ["done", "stopped", "done", "done"]
+    assert [end["status"] for end in table(out / "cases.csv")] == [
+        "done",
+        "stopped",
+        "done",
+        "done",
+    ]
     assert result_of(cases[2], out).status == "done"
     assert not failure.exists()
 
 
 def test_an_array_solves_the_whole(tmp_path, solved):
-    """Part by part into one folder, whatever is in a case's way; the last part leaves the whole, as does --gather."""
+    """Part by part into one folder, whatever is in a case's way; the last part leaves the whole, as
+    does --gather."""
     file, out = written(tmp_path, SOFT), tmp_path / "out"
     out.joinpath("cases").mkdir(parents=True)
     out.joinpath("sweep.toml").touch()
@@ -155,19 +193,27 @@ def _again(solved: Path) -> Path:
         (["FILE", "--dry-run"], ""),
         (["FILE", "--array", "3/2"], "--array 3/2: must be I/N, with I from 1 to N.\n"),
         (["FILE", "--gather"], "runs/some: holds no sweep to gather.\n"),
-        (["FILE", "-o", "full"], "full: is not empty and holds no sweep; choose another folder with -o.\n"),
+        (
+            ["FILE", "-o", "full"],
+            "full: is not empty and holds no sweep; choose another folder with -o.\n",
+        ),
         (["FILE", "-o", "full/file"], "full/file: cannot be used for a sweep: Not a directory.\n"),
         (["WRONG"], "WRONG: case 2: pin.E = -1.0 must be greater than 0.\n"),
         (["full"], "full/sweep.toml: cannot be read: No such file or directory.\n"),
         (["nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory.\n"),
     ],
 )
-def test_nothing_is_written_by_a_dry_run_or_bad_input(tmp_path, monkeypatch, capsys, arguments, said):
+def test_nothing_is_written_by_a_dry_run_or_bad_input(
+    tmp_path, monkeypatch, capsys, arguments, said
+):
     """Exit code 2 with a sentence; a dry run prints a line for each case."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
-    file, wrong = written(tmp_path, SOFT), written(tmp_path, "[grid]\npin.E = [1.0, -1.0]\n", "wrong")
+    file, wrong = (
+        written(tmp_path, SOFT),
+        written(tmp_path, "[grid]\npin.E = [1.0, -1.0]\n", "wrong"),
+    )
     before = sorted(tmp_path.rglob("*"))
     code = sweep(*(a.replace("FILE", file).replace("WRONG", wrong) for a in arguments))
     out, err = capsys.readouterr()
@@ -180,7 +226,8 @@ def test_nothing_is_written_by_a_dry_run_or_bad_input(tmp_path, monkeypatch, cap
 
 
 def test_absent_keys_lists_and_identical_cases(tmp_path, capsys):
-    """An absent key is empty, lists are as in TOML; cases of one scene are solved once and have their rows each."""
+    """An absent key is empty, lists are as in TOML; cases of one scene are solved once and have
+    their rows each."""
     text = """
         [[list]]
         block.yield_stress = "none"
@@ -220,7 +267,8 @@ def _swap(run: Path) -> None:
     ],
 )
 def test_a_case_whose_files_disagree_is_solved_again(solved, tmp_path, capsys, damage, said):
-    """Not called done with empty columns: the tables are what they were; a gathering has no numbers for it."""
+    """Not called done with empty columns: the tables are what they were; a gathering has no numbers
+    for it."""
     out = shutil.copytree(solved / "out", tmp_path / "out")
     design = read_sweep(solved / "some.sweep.toml")
     case = design.distinct[2]

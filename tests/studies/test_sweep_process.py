@@ -13,7 +13,8 @@ from archord.output.folder import report_of
 from tests.studies.parts import numbers, sweep, table, times, written
 from tests.test_cli import ENVIRONMENT, archord
 
-TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [5, 6, 7]\n"  # twelve cases, some two seconds
+# twelve cases, some two seconds
+TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [5, 6, 7]\n"
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,9 @@ def whole(tmp_path_factory) -> Path:
 def started(file: str, folder: Path, ranks: int = 0) -> subprocess.Popen:
     launcher = ["mpirun", "-n", str(ranks)] if ranks else []
     command = [*launcher, sys.executable, "-m", "archord", "sweep", file, "-o", str(folder)]
-    return subprocess.Popen(command, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.Popen(
+        command, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def done(folder: Path) -> set[str]:
@@ -44,7 +47,8 @@ def until_cases_are_done(process: subprocess.Popen, number: int) -> None:
 
 
 def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
-    """kill -9 at random moments: what is done stays as it is, and the end is that of the sweep in one go."""
+    """kill -9 at random moments: what is done stays as it is, and the end is that of the sweep in
+    one go."""
     chance, out, file = random.Random(3), tmp_path / "out", written(tmp_path, TEXT)
     continued = 0
     for cases in (1, 3):
@@ -59,7 +63,9 @@ def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
             if name.split("/")[1] in finished:
                 assert after[name] == written_at, name
         assert len(done(out)) >= len(finished) + cases
-        continued += any((p / "checkpoint.h5").exists() and p.name not in done(out) for p in out.glob("cases/*"))
+        continued += any(
+            (p / "checkpoint.h5").exists() and p.name not in done(out) for p in out.glob("cases/*")
+        )
     assert len(done(out)) < 12
     assert sweep(file, "-o", out, "-q") == 0
     same_numbers(out, whole)
@@ -73,12 +79,15 @@ def same_numbers(a: Path, b: Path) -> None:
             if name in ("run", "status"):
                 assert one[name] == other[name]
             elif name != "force_balance":
-                assert float(one[name]) == pytest.approx(float(other[name]), rel=1e-10, abs=1e-30), name
+                assert float(one[name]) == pytest.approx(
+                    float(other[name]), rel=1e-10, abs=1e-30
+                ), name
 
 
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
-    """SIGTERM: running cases keep their accepted steps, the tables tell, and the sweep goes on to the same numbers."""
+    """SIGTERM: running cases keep their accepted steps, the tables tell, and the sweep goes on to
+    the same numbers."""
     out, file = tmp_path / "out", written(tmp_path, TEXT)
     process = started(file, out, ranks)
     until_cases_are_done(process, 2)
@@ -89,7 +98,11 @@ def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
         assert sweep(file, "-o", out, "--gather", "-q") == 0
     else:
         assert " open in " in said
-    status, finished, before = [row["status"] for row in table(out / "cases.csv")], done(out), times(out)
+    status, finished, before = (
+        [row["status"] for row in table(out / "cases.csv")],
+        done(out),
+        times(out),
+    )
     assert set(status) <= {"done", "interrupted", "open"}
     assert 2 <= status.count("done") == len(finished) < 12
     assert sweep(file, "-o", out, "-q") == 0
@@ -127,7 +140,9 @@ def test_the_job_script_calls_what_exists(tmp_path):
     task = {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
     for option, environment, said in (("--dry-run", {}, "12 cases, "), ("-q", task, "")):
         environment = ENVIRONMENT | environment
-        result = subprocess.run([*command, option], cwd=tmp_path, env=environment, capture_output=True, text=True)
+        result = subprocess.run(
+            [*command, option], cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
         assert result.returncode == 0, result.stderr
         assert result.stdout.startswith(said)
     assert len(done(tmp_path / "out")) == 1

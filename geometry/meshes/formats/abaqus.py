@@ -1,7 +1,9 @@
-"""Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file; all else of it is skipped.
+"""Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file; all else
+of it is skipped.
 
-meshio's reader of such files knows neither surfaces nor plane elements of second order, and forgets all but the last
-block of nodes. Lines (trusses) only name edges, as gmsh writes them; springs, masses and the like name nothing.
+meshio's reader of such files knows neither surfaces nor plane elements of second order, and forgets
+all but the last block of nodes. Lines (trusses) only name edges, as gmsh writes them; springs,
+masses and the like name nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +17,13 @@ from pathlib import Path
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
-from archord.geometry.meshes.formats.abaqus_blocks import Options, Rows, Scope, number_of, scoped_blocks
+from archord.geometry.meshes.formats.abaqus_blocks import (
+    Options,
+    Rows,
+    Scope,
+    number_of,
+    scoped_blocks,
+)
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
 _KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
@@ -36,9 +44,9 @@ _UNREAD = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # the
 class _Model:
     """What a file has, by keys (`Scope.key`).
 
-    The places of ``nodes``; the nodes of plane elements (``cells``) and of ``lines``; the elements ``without_area``;
-    the keys of ``sets`` by kind and name, as it is first written; ``surfaces`` as elements and a face. Sets for the
-    file's ``internal`` use have no name for others.
+    The places of ``nodes``; the nodes of plane elements (``cells``) and of ``lines``; the elements
+    ``without_area``; the keys of ``sets`` by kind and name, as it is first written; ``surfaces`` as
+    elements and a face. Sets for the file's ``internal`` use have no name for others.
     """
 
     def __init__(self, path: Path) -> None:
@@ -81,12 +89,18 @@ class _Model:
             self.without_area.update(scope.key(row[0]) for row in rows)
             return
         if not _KINDS.fullmatch(kind):
-            what = next((said for start, said in _OTHERS.items() if kind.startswith(start)), "elements")
-            raise ValueError(f"{what} of type {kind} are not read, only plane ones: CPS and CPE of 3, 4, 6 or 8 nodes")
+            what = next(
+                (said for start, said in _OTHERS.items() if kind.startswith(start)), "elements"
+            )
+            raise ValueError(
+                f"{what} of type {kind} are not read, only plane ones: CPS and CPE of 3, 4, 6 or 8 nodes"
+            )
         values = [scope.key(value) for row in rows for value in row if value]
         size = 1 + int(kind[3])
         if len(values) % size:
-            raise ValueError(f"elements of type {kind} have {len(values)} numbers, no multiple of {size}")
+            raise ValueError(
+                f"elements of type {kind} have {len(values)} numbers, no multiple of {size}"
+            )
         found = self.lines if kind.startswith("T") else self.cells
         for start in range(0, len(values), size):
             key, *nodes = values[start : start + size]
@@ -115,18 +129,25 @@ class _Model:
         if options.get("TYPE", "").upper() == "NODE":
             self._add(scope, "NSET", name, self._chosen(scope, "NSET", (row[0] for row in rows)))
             return
-        found = [(self._chosen(scope, "ELSET", [item]), "".join(face).upper()) for item, *face in rows]
+        found = [
+            (self._chosen(scope, "ELSET", [item]), "".join(face).upper()) for item, *face in rows
+        ]
         self.surfaces[scope.qualified(name)] += found
 
     def _add(self, scope: Scope, kind: str, name: str | None, keys: list[int]) -> None:
         if name:
             whole = scope.qualified(name)
             if self._owners.setdefault((kind, whole.upper()), scope.index) != scope.index:
-                raise ValueError(f"the *{kind} {whole!r} is there twice, once as a set of an instance")
-            self.sets[kind].setdefault(self._names.setdefault(whole.upper(), whole), []).extend(keys)
+                raise ValueError(
+                    f"the *{kind} {whole!r} is there twice, once as a set of an instance"
+                )
+            self.sets[kind].setdefault(self._names.setdefault(whole.upper(), whole), []).extend(
+                keys
+            )
 
     def _chosen(self, scope: Scope, kind: str, items: Iterable[str]) -> list[int]:
-        """The keys of the numbers among ``items``, and those in the sets named there, of the ``scope`` first."""
+        """The keys of the numbers among ``items``, and those in the sets named there, of the
+        ``scope`` first."""
         chosen = []
         for item in filter(None, items):
             if item.isdecimal():
@@ -141,17 +162,26 @@ class _Model:
 
 
 def read_abaqus(path: Path) -> PlaneMesh:
-    """The mesh of an .inp file: its element sets, and as facet sets its surfaces, its sets of lines and what its node
-    sets have of the boundary; other nodes of these are point sets. Raises ValueError."""
+    """The mesh of an .inp file: its element sets, and as facet sets its surfaces, its sets of lines
+    and what its node sets have of the boundary; other nodes of these are point sets. Raises
+    ValueError."""
     model = _Model(path)
     kind = one_kind(set(map(len, model.cells.values())))
-    node, cell = ({number: k for k, number in enumerate(there)} for there in (model.nodes, model.cells))
+    node, cell = (
+        {number: k for k, number in enumerate(there)} for there in (model.nodes, model.cells)
+    )
     corners = _places(node, chain(*model.cells.values()), "node").reshape(-1, kind)
     cell_sets, facet_sets, point_sets = {}, defaultdict[str, list[np.ndarray]](list), {}
     for name, numbers in model.sets["ELSET"].items():
-        ends = [model.lines[number][:: len(model.lines[number]) - 1] for number in numbers if number in model.lines]
+        ends = [
+            model.lines[number][:: len(model.lines[number]) - 1]
+            for number in numbers
+            if number in model.lines
+        ]
         members = sorted(set(numbers) - model.lines.keys() - model.without_area)
-        named = name not in model.internal and not (numbers and model.without_area.issuperset(numbers))
+        named = name not in model.internal and not (
+            numbers and model.without_area.issuperset(numbers)
+        )
         if named and (members or not ends):
             cell_sets[name] = _places(cell, members, f"element of the set {name!r}")
         if ends:
@@ -161,7 +191,9 @@ def read_abaqus(path: Path) -> PlaneMesh:
     for name, parts in model.surfaces.items():
         for elements, face in parts:
             if face not in faces:
-                raise ValueError(f"the surface {name!r} has the face {face!r}, which is none of S1 to S{sides}")
+                raise ValueError(
+                    f"the surface {name!r} has the face {face!r}, which is none of S1 to S{sides}"
+                )
             places = _places(cell, elements, f"element of the surface {name!r}")
             facet_sets[name].append(corners[places][:, faces[face]])
     x, cells = in_basix_order(np.array(list(model.nodes.values())), corners, perm_gmsh)
@@ -175,7 +207,11 @@ def read_abaqus(path: Path) -> PlaneMesh:
             if len(rest := np.setdiff1d(nodes, edges)):
                 point_sets[name] = rest
     return PlaneMesh.of_sets(
-        x, cells, cell_sets, {name: np.concatenate(ends) for name, ends in facet_sets.items()}, point_sets
+        x,
+        cells,
+        cell_sets,
+        {name: np.concatenate(ends) for name, ends in facet_sets.items()},
+        point_sets,
     )
 
 

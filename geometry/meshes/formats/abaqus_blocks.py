@@ -1,5 +1,5 @@
-"""The blocks of an Abaqus or CalculiX input file: keywords with options and rows, the files that it includes, and the
-parts of an assembly, each as often as it has an instance."""
+"""The blocks of an Abaqus or CalculiX input file: keywords with options and rows, the files that it
+includes, and the parts of an assembly, each as often as it has an instance."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class Scope:
-    """An instance of a part, the ``index``-th, or with the number 0 and no name what lies beside all instances.
+    """An instance of a part, the ``index``-th, or with the number 0 and no name what lies beside
+    all instances.
 
-    Its nodes are moved by ``shift`` ``(3,)``, then turned by the matrix ``turn`` ``(3, 3)`` about the point ``centre``
-    ``(3,)``.
+    Its nodes are moved by ``shift`` ``(3,)``, then turned by the matrix ``turn`` ``(3, 3)`` about
+    the point ``centre`` ``(3,)``.
     """
 
     name: str = ""
@@ -44,7 +45,8 @@ class Scope:
     centre: Array = field(default_factory=lambda: np.zeros(3))
 
     def key(self, number: str) -> int:
-        """A node or element by its ``number`` here as one among all instances. Raises ValueError."""
+        """A node or element by its ``number`` here as one among all instances. Raises
+        ValueError."""
         if not number.isdecimal() or int(number) >= _NUMBERS:
             raise ValueError(f"{number!r} is no number of a node or an element")
         return self.index * _NUMBERS + int(number)
@@ -67,8 +69,8 @@ def number_of(key: int) -> int:
 
 
 def scoped_blocks(path: Path) -> Iterator[tuple[Scope, Block]]:
-    """The blocks of the file ``path``, those of a part in every instance of it; of parts without any instance, in their
-    own place. Raises ValueError."""
+    """The blocks of the file ``path``, those of a part in every instance of it; of parts without
+    any instance, in their own place. Raises ValueError."""
     parts: dict[str, tuple[str, list[Block]]] = {}
     scopes: dict[str, Scope] = {}
     beside_all = Scope()
@@ -108,28 +110,43 @@ def scoped_blocks(path: Path) -> Iterator[tuple[Scope, Block]]:
 
 
 def _new(options: Options, keyword: str, known: dict) -> str:
-    """The name of a part or an instance. Raises ValueError for none, and for one that is ``known``."""
+    """The name of a part or an instance. Raises ValueError for none, and for one that is
+    ``known``."""
     name = options.get("NAME", "")
     if not name or name.upper() in known:
-        raise ValueError(f"the *{keyword} {name!r} is there twice" if name else f"a *{keyword} has no name")
+        raise ValueError(
+            f"the *{keyword} {name!r} is there twice" if name else f"a *{keyword} has no name"
+        )
     return name
 
 
 def _instance(name: str, index: int, rows: Rows) -> Scope:
-    """An instance that is moved by its first row, and turned about the axis between two points by an angle in degrees
-    in its second. Raises ValueError."""
+    """An instance that is moved by its first row, and turned about the axis between two points by
+    an angle in degrees in its second. Raises ValueError."""
     numbers = [[float(value or 0) for value in row] for row in rows]
-    if len(numbers) > 2 or any(len(row) > 3 for row in numbers[:1]) or any(len(row) != 7 for row in numbers[1:]):
-        raise ValueError(f"the *INSTANCE {name!r} must have a row of 3 numbers to move it, and one of 7 to turn it")
+    if (
+        len(numbers) > 2
+        or any(len(row) > 3 for row in numbers[:1])
+        or any(len(row) != 7 for row in numbers[1:])
+    ):
+        raise ValueError(
+            f"the *INSTANCE {name!r} must have a row of 3 numbers to move it, and one of 7 to turn it"
+        )
     shift = np.zeros(3)
     if numbers:
         shift[: len(numbers[0])] = numbers[0]
     if len(numbers) < 2:
         return Scope(name, index, shift)
-    start, end, angle = np.array(numbers[1][:3]), np.array(numbers[1][3:6]), np.radians(numbers[1][6])
+    start, end, angle = (
+        np.array(numbers[1][:3]),
+        np.array(numbers[1][3:6]),
+        np.radians(numbers[1][6]),
+    )
     length = np.linalg.norm(end - start)
     if not length > 0:
-        raise ValueError(f"the *INSTANCE {name!r} is turned about an axis between two points that are one")
+        raise ValueError(
+            f"the *INSTANCE {name!r} is turned about an axis between two points that are one"
+        )
     x, y, z = (end - start) / length
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross  # Rodrigues
@@ -137,8 +154,8 @@ def _instance(name: str, index: int, rows: Rows) -> Scope:
 
 
 def _lines(path: Path, mesh: Path, depth: int = 0) -> Iterator[str]:
-    """The lines of a file, those of keywords whole, and those of the files that it includes, which lie in the folder of
-    the ``mesh``."""
+    """The lines of a file, those of keywords whole, and those of the files that it includes, which
+    lie in the folder of the ``mesh``."""
     if depth > _DEEPEST:
         raise ValueError(f"{path.name} includes itself")
     text = path.read_text(encoding="utf-8", errors="replace")

@@ -9,8 +9,8 @@ from archord.report.readable import require_file
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` that ``path`` names. Raises ValueError for one outside the folder of ``path``, OSError for what
-    is no file."""
+    """The file ``name`` that ``path`` names. Raises ValueError for one outside the folder of
+    ``path``, OSError for what is no file."""
     folder = os.path.abspath(path.parent)
     found = os.path.abspath(os.path.join(folder, name))
     if os.path.commonpath([folder, found]) != folder:
@@ -18,4 +18,6 @@ def beside(path: Path, name: str) -> Path:
     try:
         return require_file(found)
     except OSError as error:
-        raise ValueError(f"names the file {name!r}, which cannot be read: {error.strerror}") from None
+        raise ValueError(
+            f"names the file {name!r}, which cannot be read: {error.strerror}"
+        ) from None

@@ -39,12 +39,13 @@ def read_mesh(
     refine: int = 0,
     partitioner=None,
 ) -> TaggedMesh:
-    """The mesh of ``source`` times ``scale``, `refined` with ``circles`` in scaled lengths, on the ranks of ``comm``.
+    """The mesh of ``source`` times ``scale``, `refined` with ``circles`` in scaled lengths, on the
+    ranks of ``comm``.
 
-    A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx, an .npz file of
-    archord, the module gmsh with a model on rank 0, or a mesh as `tagged` returns it. Sets have the names of physical
-    groups, of sets and surfaces, or the values of tags. Collective; raises ValueError on all ranks for what is no mesh
-    of plane cells of one kind.
+    A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx,
+    an .npz file of archord, the module gmsh with a model on rank 0, or a mesh as `tagged` returns
+    it. Sets have the names of physical groups, of sets and surfaces, or the values of tags.
+    Collective; raises ValueError on all ranks for what is no mesh of plane cells of one kind.
     """
     made: Any = gathered(source) if isinstance(source, TaggedMesh) else None
     failure = ""
@@ -66,8 +67,8 @@ def read_mesh(
 
 
 def plane_mesh_of(source: Source, comm: MPI.Comm, order: int | None) -> PlaneMesh | None:
-    """The mesh of ``source``, of this ``order`` where a model is yet to be meshed: on rank 0, None elsewhere.
-    Collective for a mesh of dolfinx; raises what a damaged file makes of it."""
+    """The mesh of ``source``, of this ``order`` where a model is yet to be meshed: on rank 0, None
+    elsewhere. Collective for a mesh of dolfinx; raises what a damaged file makes of it."""
     if isinstance(source, TaggedMesh):
         return gathered(source)
     return _read(source, order or 2) if comm.rank == 0 else None
@@ -80,10 +81,13 @@ def tagged(
     cell_sets: Mapping[str, int] | None = None,
     facet_sets: Mapping[str, int] | None = None,
 ) -> TaggedMesh:
-    """A dolfinx ``mesh`` with its tags, named by ``cell_sets`` and ``facet_sets`` or else by their numbers; without
-    tags, all cells are "all". Collective; raises ValueError on all ranks for what is not plane."""
+    """A dolfinx ``mesh`` with its tags, named by ``cell_sets`` and ``facet_sets`` or else by their
+    numbers; without tags, all cells are "all". Collective; raises ValueError on all ranks for what
+    is not plane."""
     if mesh.topology.dim != 2 or (cells and cells.dim != 2) or (facets and facets.dim != 1):
-        raise ValueError("the mesh and the tags of its cells must be of dimension 2, the tags of facets of dimension 1")
+        raise ValueError(
+            "the mesh and the tags of its cells must be of dimension 2, the tags of facets of dimension 1"
+        )
     flat(np.concatenate(mesh.comm.allgather(mesh.geometry.x)))
     mesh.topology.create_connectivity(1, 2)
     index_map, none = mesh.topology.index_map(2), np.zeros(0, dtype=np.int32)
@@ -109,7 +113,9 @@ def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
     readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf, ".npz": stored_mesh}
     if path.suffix.lower() not in readers:
         raise ValueError(f"is none of the files of meshes that are read: {', '.join(readers)}")
-    require_file(path).open("rb").close()  # or gmsh would say something else of a file that is not there
+    require_file(path).open(
+        "rb"
+    ).close()  # or gmsh would say something else of a file that is not there
     if not path.stat().st_size:
         raise ValueError("is empty")
     return readers[path.suffix.lower()](path)
@@ -122,7 +128,9 @@ def _read_gmsh(path: Path) -> PlaneMesh:
             raise ValueError("is no mesh of gmsh: it must begin with $MeshFormat")
     with TemporaryDirectory() as folder:
         found, said = Path(folder) / "mesh.npz", Path(folder) / "error"
-        child = os.fork()  # not of multiprocessing, whose daemons, as the workers of a pool, may have no children
+        child = (
+            os.fork()
+        )  # not of multiprocessing, whose daemons, as the workers of a pool, may have no children
         if child == 0:
             _merge(path, found, said)
         _, status = os.waitpid(child, 0)
@@ -134,7 +142,8 @@ def _read_gmsh(path: Path) -> PlaneMesh:
 
 
 def _merge(path: Path, found: Path, said: Path) -> NoReturn:
-    """Write the mesh that gmsh has of ``path`` to ``found``, or to ``said`` why there is none, and end the process."""
+    """Write the mesh that gmsh has of ``path`` to ``found``, or to ``said`` why there is none, and
+    end the process."""
     status = 1
     try:
         nowhere = os.open(os.devnull, os.O_WRONLY)

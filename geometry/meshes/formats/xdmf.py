@@ -17,9 +17,13 @@ _SOLIDS = ("tet", "hex", "wedge", "pyramid")
 
 
 def read_xdmf(path: Path) -> PlaneMesh:
-    """The first grid with a geometry; sets are what other grids, or it, have as values of cells, lines and points, and
-    their names are those values as text. Raises ValueError."""
-    grids = [grid for grid in ElementTree.parse(path).iter("Grid") if grid.find("Topology/DataItem") is not None]
+    """The first grid with a geometry; sets are what other grids, or it, have as values of cells,
+    lines and points, and their names are those values as text. Raises ValueError."""
+    grids = [
+        grid
+        for grid in ElementTree.parse(path).iter("Grid")
+        if grid.find("Topology/DataItem") is not None
+    ]
     meshes = [grid for grid in grids if grid.find("Geometry/DataItem") is not None]
     if not meshes:
         raise ValueError("there is no grid with topology and geometry")
@@ -28,23 +32,38 @@ def read_xdmf(path: Path) -> PlaneMesh:
     if kind.startswith(_SOLIDS):
         raise ValueError(SOLID)
     x, cells = (_data(path, meshes[0], part) for part in ("Geometry", "Topology"))
-    sets: dict[int, dict[str, np.ndarray]] = {1: {}, 2: {}, cells.shape[1]: {}}  # by the number of nodes
+    sets: dict[int, dict[str, np.ndarray]] = {
+        1: {},
+        2: {},
+        cells.shape[1]: {},
+    }  # by the number of nodes
     for grid in grids:
         if grid.find("Attribute[@Center='Cell']/DataItem") is None:
             continue
-        entities, values = _data(path, grid, "Topology"), _data(path, grid, "Attribute[@Center='Cell']").ravel()
+        entities, values = (
+            _data(path, grid, "Topology"),
+            _data(path, grid, "Attribute[@Center='Cell']").ravel(),
+        )
         n = entities.shape[1] if entities.shape[1] in sets else 2
         for value in np.unique(values):
             if (name := str(int(value))) in sets[n]:
-                raise ValueError(f"two tags have the value {name}, which is to name a set: give them other values")
+                raise ValueError(
+                    f"two tags have the value {name}, which is to name a set: give them other values"
+                )
             sets[n][name] = entities[values == value][:, : max(n, 2)]
     corners = 3 if cells.shape[1] in (3, 6, 10) else 4
     tagged = np.concatenate([cells, *sets[cells.shape[1]].values()])[:, :corners]
-    _, first, which = np.unique(np.sort(tagged, axis=1), axis=0, return_index=True, return_inverse=True)
+    _, first, which = np.unique(
+        np.sort(tagged, axis=1), axis=0, return_index=True, return_inverse=True
+    )
     ends = np.cumsum([len(cells), *map(len, sets[cells.shape[1]].values())])
-    cell_sets = dict(zip(sets[cells.shape[1]], np.split(first[which.ravel()], ends[:-1])[1:], strict=True))
+    cell_sets = dict(
+        zip(sets[cells.shape[1]], np.split(first[which.ravel()], ends[:-1])[1:], strict=True)
+    )
     points = {name: nodes[:, 0] for name, nodes in sets[1].items()}
-    return PlaneMesh.of_sets(*in_basix_order(x, cells.astype(np.int64), perm_vtk), cell_sets, sets[2], points)
+    return PlaneMesh.of_sets(
+        *in_basix_order(x, cells.astype(np.int64), perm_vtk), cell_sets, sets[2], points
+    )
 
 
 def _data(path: Path, grid: ElementTree.Element, part: str) -> np.ndarray:

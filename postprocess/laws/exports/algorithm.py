@@ -1,11 +1,14 @@
-"""The law of one joint as a program of numbers: what ``JointCurve.at`` says, in the few words that all languages have.
+"""The law of one joint as a program of numbers: what ``JointCurve.at`` says, in the few words that
+all languages have.
 
-``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``, ``while``, ``for`` and
-``break``, have one ``return``, of names, at their end, and change no parameter. What ``WITH_...`` switches off and what
-is never called is left out of an export. Tables are in the joint's units; an export has its own instead of those below.
+``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``,
+``while``, ``for`` and ``break``, have one ``return``, of names, at their end, and change no
+parameter. What ``WITH_...`` switches off and what is never called is left out of an export. Tables
+are in the joint's units; an export has its own instead of those below.
 """
 
-# ruff: noqa: SIM102, SIM300, RUF059 (no "and", and a name for every result: words that all languages have)
+# ruff: noqa: SIM102, SIM300, RUF059 (no "and", and a name for every result: words that all
+# languages have)
 
 from __future__ import annotations
 
@@ -29,7 +32,10 @@ BACK: Table = (0.0, 1.0)  # force of the curve that unloading follows
 BACK_SLOPE: Table = (1.0, 1.0)
 RATIO: Table = (1.0, 1.0)  # its scale, by the deepest displacement
 RATIO_SLOPE: Table = (0.0, 0.0)
-TOE: Table = (0.0, 0.0)  # how far before the end of the way back it bends, by the deepest displacement
+TOE: Table = (
+    0.0,
+    0.0,
+)  # how far before the end of the way back it bends, by the deepest displacement
 TOUCH: Table = (2.0, 0.0, 0.0)  # a, b, c of the logarithmic law
 PEAK: Table = (1.0, 1.0)  # largest pressure over the root of the force
 PEAK_SLOPE: Table = (0.0, 0.0)
@@ -45,7 +51,8 @@ def warn_outside(delta: float) -> None:
 
 
 def beyond(value: float, last: float) -> float:
-    """0 up to last; nan, by infinity less infinity, beyond and of nan: added to what is unknown there."""
+    """0 up to last; nan, by infinity less infinity, beyond and of nan: added to what is unknown
+    there."""
     doubt = 0.0
     if value <= last:
         doubt = 0.0
@@ -88,7 +95,8 @@ def interval(table: Table, value: float) -> int:
 
 
 def cubic(f: Table, df: Table, x: float) -> tuple[float, float]:
-    """Hermite's cubic through f with slopes df at x, and its slope; straight on beyond the last node."""
+    """Hermite's cubic through f with slopes df at x, and its slope; straight on beyond the last
+    node."""
     i: int = interval(NODES, x)
     inside = min(x, NODES[LAST])
     width = NODES[i + 1] - NODES[i]
@@ -97,7 +105,11 @@ def cubic(f: Table, df: Table, x: float) -> tuple[float, float]:
     d0 = width * df[i]
     d1 = width * df[i + 1]
     slope = (d0 + t * (2 * (3 * rise - 2 * d0 - d1) + t * 3 * (d0 + d1 - 2 * rise))) / width
-    value = f[i] + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise))) + slope * (x - inside)
+    value = (
+        f[i]
+        + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise)))
+        + slope * (x - inside)
+    )
     return value, slope
 
 
@@ -110,14 +122,20 @@ def straight(f: Table, x: float) -> float:
 
 
 def first_touch(delta: float) -> tuple[float, float]:
-    """Force and stiffness of line contact: pi x t - ln(1 + t) = a + b x + c x^2, t = FORCE/P, by Newton's method."""
+    """Force and stiffness of line contact: pi x t - ln(1 + t) = a + b x + c x^2, t = FORCE/P, by
+    Newton's method."""
     x = max(delta / LENGTH, 1e-290)
     level = TOUCH[0] + x * (TOUCH[1] + x * TOUCH[2])
     t = (level + math.log(1 + level / (math.pi * x))) / (math.pi * x)
     for _ in range(6):
         t = t - (math.pi * x * t - math.log(1 + t) - level) / (math.pi * x - 1 / (1 + t))
     P = FORCE / t
-    stiffness = (math.pi - (TOUCH[1] + 2 * TOUCH[2] * x) / t) / (math.pi * x * t - t / (1 + t)) * FORCE / LENGTH
+    stiffness = (
+        (math.pi - (TOUCH[1] + 2 * TOUCH[2] * x) / t)
+        / (math.pi * x * t - t / (1 + t))
+        * FORCE
+        / LENGTH
+    )
     return P, stiffness
 
 
@@ -146,7 +164,8 @@ def touch_displacement(P: float) -> float:
 
 
 def table_displacement(P: float) -> float:
-    """The displacement between nodes at which the table BACK has the force P: Newton's method, bracketed."""
+    """The displacement between nodes at which the table BACK has the force P: Newton's method,
+    bracketed."""
     i: int = interval(BACK, P)
     width = NODES[i + 1] - NODES[i]
     rise = BACK[i + 1] - BACK[i]
@@ -193,7 +212,8 @@ def scale(deepest: float) -> float:
 
 
 def way_back(delta: float, deepest: float) -> tuple[float, float]:
-    """Force and stiffness below the deepest displacement: r BACK(h(a)/r), which meets first loading there."""
+    """Force and stiffness below the deepest displacement: r BACK(h(a)/r), which meets first loading
+    there."""
     ratio = scale(deepest)
     largest, stiffness = curve(LOAD, LOAD_SLOPE, deepest)
     travel = ratio * back_displacement(largest / ratio)
@@ -213,7 +233,8 @@ def way_back(delta: float, deepest: float) -> tuple[float, float]:
 
 
 def force(delta: float, deepest: float = 0.0) -> tuple[float, float]:
-    """Force P and stiffness dP/d(delta), nan beyond the tables, after the joint has been as deep as deepest."""
+    """Force P and stiffness dP/d(delta), nan beyond the tables, after the joint has been as deep as
+    deepest."""
     warn_outside(max(delta, deepest))
     P, stiffness = curve(LOAD, LOAD_SLOPE, delta)
     if WITH_WAY_BACK:
@@ -248,7 +269,8 @@ def residual(deepest: float) -> float:
 
 
 def expected_error(delta: float, deepest: float = 0.0) -> float:
-    """The error of the force, in its unit, below which 9 of 10 joints stay; nan beyond the tables."""
+    """The error of the force, in its unit, below which 9 of 10 joints stay; nan beyond the
+    tables."""
     place = delta
     share = straight(ERROR, delta)
     if WITH_WAY_BACK:

@@ -1,7 +1,9 @@
-"""A joint's law as one file for another program: tables in the joint's units, and the functions that read them.
+"""A joint's law as one file for another program: tables in the joint's units, and the functions
+that read them.
 
-The functions are those of ``algorithm.py`` in every language, less what the law has no need of: the way back of a joint
-that does not yield, the logarithmic law of first touch, pressure and angle where they are unknown.
+The functions are those of ``algorithm.py`` in every language, less what the law has no need of: the
+way back of a joint that does not yield, the logarithmic law of first touch, pressure and angle
+where they are unknown.
 """
 
 from __future__ import annotations
@@ -22,22 +24,34 @@ from typing import Any
 
 import numpy as np
 
-from archord.postprocess.laws.exports.translate import FUNCTIONS, in_c, in_modelica, in_octave, in_python, select
+from archord.postprocess.laws.exports.translate import (
+    FUNCTIONS,
+    in_c,
+    in_modelica,
+    in_octave,
+    in_python,
+    select,
+)
 from archord.postprocess.laws.general.joint_curve import JointCurve
 
-Tables = dict[str, Any]  # int, float, str or list[float] by the names of algorithm.py, and of `_UNITS`
+Tables = dict[
+    str, Any
+]  # int, float, str or list[float] by the names of algorithm.py, and of `_UNITS`
 
 _UNITS = ("length_unit", "force_unit", "pin_length")
 _STATE = """The force P and dP/d(delta) follow from the displacement delta and from one number that the joint remembers:
 deepest, the largest delta of all accepted steps, 0 at first. Trial steps leave it as it is. Beyond RANGE, the end of
 the tables, the force goes on straight, which is a guess; stiffness, expected error, pressure, angle and residual
 clearance are nan there, and all are nan of nan."""
-_ELASTIC = "The joint does not yield: it comes back along its first loading, and deepest changes nothing."
+_ELASTIC = (
+    "The joint does not yield: it comes back along its first loading, and deepest changes nothing."
+)
 
 
 @dataclass(frozen=True)
 class _Form:
-    """How a language writes an integer, a number, a table with the ends of its lines, words, text, and functions."""
+    """How a language writes an integer, a number, a table with the ends of its lines, words, text,
+    and functions."""
 
     template: str
     whole: str
@@ -107,23 +121,37 @@ _FORMS = {
 _TEMPLATES = tomllib.loads(Path(__file__).with_name("templates.toml").read_text(encoding="utf-8"))
 _WORDS = {
     name: {*words.split()}
-    for name, words in tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8")).items()
+    for name, words in tomllib.loads(
+        Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
+    ).items()
 } | {"python": {*keyword.kwlist, *sys.stdlib_module_names, *dir(builtins)}}
-_SPOKEN = {"python": "Python", "c": "C or C++", "modelica": "Modelica", "octave": "Matlab and Octave"}
+_SPOKEN = {
+    "python": "Python",
+    "c": "C or C++",
+    "modelica": "Modelica",
+    "octave": "Matlab and Octave",
+}
 _LONGEST = 63  # characters of a name in Matlab, and those that C99 tells apart
 
 
 def export_curve(curve: JointCurve, target: Path) -> str:
-    """The text of the file ``target`` with the law of one joint, in the language that its suffix names: .py, .h (C99),
-    .mo (Modelica), .m (Matlab, Octave), .json. Its stem becomes the name of the law, but in JSON.
+    """The text of the file ``target`` with the law of one joint, in the language that its suffix
+    names: .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), .json. Its stem becomes the name of
+    the law, but in JSON.
 
-    Raises ValueError on another suffix, a stem that is no name, tables of several joints, and tables that have gaps or
-    a way back that does not rise.
+    Raises ValueError on another suffix, a stem that is no name, tables of several joints, and
+    tables that have gaps or a way back that does not rise.
     """
     if target.suffix not in (*_FORMS, ".json"):
-        raise ValueError(f"{target.name}: a law is exported to files that end in {', '.join(_FORMS)} or .json")
-    if curve.y.ndim != 1 or any(np.size(unit) != 1 for unit in (curve.length, curve.force, curve.pressure)):
-        raise ValueError("a file holds the law of one joint, and this table has several: take them one by one")
+        raise ValueError(
+            f"{target.name}: a law is exported to files that end in {', '.join(_FORMS)} or .json"
+        )
+    if curve.y.ndim != 1 or any(
+        np.size(unit) != 1 for unit in (curve.length, curve.force, curve.pressure)
+    ):
+        raise ValueError(
+            "a file holds the law of one joint, and this table has several: take them one by one"
+        )
     if target.suffix == ".json":
         return replace(curve, about=curve.about | {"forces": _units(curve)}).to_json()
     name, form = target.stem, _FORMS[target.suffix]
@@ -131,9 +159,15 @@ def export_curve(curve: JointCurve, target: Path) -> str:
     tables = _tables(curve)
     wanted = ["force", "deeper", "residual", "expected_error"]
     wanted += [
-        f for f, key in (("peak_pressure", "PEAK"), ("contact_angle", "ANGLE")) if np.isfinite(tables[key]).all()
+        f
+        for f, key in (("peak_pressure", "PEAK"), ("contact_angle", "ANGLE"))
+        if np.isfinite(tables[key]).all()
     ]
-    flags = {"WITH_TOUCH": curve.touch.size > 0, "WITH_WAY_BACK": curve.yields, "WITH_TOE": bool(curve.toe.any())}
+    flags = {
+        "WITH_TOUCH": curve.touch.size > 0,
+        "WITH_WAY_BACK": curve.yields,
+        "WITH_TOE": bool(curve.toe.any()),
+    }
     functions, used = select(wanted, flags)
     tables = {key: values for key, values in tables.items() if key in {*used, "RANGE", "REACH"}}
     _check(tables)
@@ -146,7 +180,9 @@ def export_curve(curve: JointCurve, target: Path) -> str:
         about=form.text(curve.about),
         tables="\n".join(_table(form, name, key, values) for key, values in tables.items()),
         functions="\n\n".join(form.function(node, name) for node in functions),
-        handles="\n".join(f"    the_law.{function} = @{function};" for function in wanted if function != "deeper"),
+        handles="\n".join(
+            f"    the_law.{function} = @{function};" for function in wanted if function != "deeper"
+        ),
     )
 
 
@@ -163,12 +199,16 @@ def _check_name(target: Path, language: str) -> None:
     elif name in _WORDS[language]:
         fault = f"it is a name that {_SPOKEN[language]} has already"
     if fault:
-        raise ValueError(f"{target.name}: {name} cannot name a law: {fault}; choose another name for the file")
+        raise ValueError(
+            f"{target.name}: {name} cannot name a law: {fault}; choose another name for the file"
+        )
 
 
 def _tables(curve: JointCurve) -> Tables:
     """All numbers of the law, in the units of the joint."""
-    length, force, pressure = (float(np.squeeze(unit)) for unit in (curve.length, curve.force, curve.pressure))
+    length, force, pressure = (
+        float(np.squeeze(unit)) for unit in (curve.length, curve.force, curve.pressure)
+    )
     root = np.sqrt(force)
     arrays = {
         "NODES": length * curve.x,
@@ -202,7 +242,9 @@ def _check(tables: Tables) -> None:
     bad = [key for key, values in tables.items() if not np.isfinite(values).all()]
     if bad:
         raise ValueError(f"a law with gaps in its tables cannot be exported: {', '.join(bad)}")
-    if "BACK" in tables and not ((np.diff(tables["BACK"]) > 0).all() and tables["BACK_SLOPE"][-1] > 0):
+    if "BACK" in tables and not (
+        (np.diff(tables["BACK"]) > 0).all() and tables["BACK_SLOPE"][-1] > 0
+    ):
         raise ValueError("a law whose way back does not rise throughout cannot be exported")
 
 
@@ -223,19 +265,23 @@ def _units(curve: JointCurve) -> str:
     else:
         of = f"total, of a pin of length {curve.pin_length:g} ({curve.length_unit})"
         rule = "do not multiply them by the length"
-    said = (
-        f"UNITS: displacements in {curve.length_unit}; force P in {curve.force_unit}, {of}: P, stiffness and expected"
-    )
+    said = f"UNITS: displacements in {curve.length_unit}; force P in {curve.force_unit}, {of}: P, stiffness and expected"
     return f"{said} error are for a pin of length PIN_LENGTH = {curve.pin_length:g}; {rule}."
 
 
 def _header(title: str, curve: JointCurve) -> str:
-    """What the file is, where it comes from and how it is used, fit for a comment of any language."""
+    """What the file is, where it comes from and how it is used, fit for a comment of any
+    language."""
     about = {key: value for key, value in curve.about.items() if key != "title"}
-    lines = [f"{key}: {value if isinstance(value, str) else json.dumps(value)}" for key, value in about.items()]
+    lines = [
+        f"{key}: {value if isinstance(value, str) else json.dumps(value)}"
+        for key, value in about.items()
+    ]
     lines = [textwrap.fill(line, 110, subsequent_indent="    ") for line in lines]
     rule = " ".join((_STATE if curve.yields else f"{_STATE} {_ELASTIC}").split())
-    text = "\n".join([title, "", *lines, "", textwrap.fill(_units(curve), 110), "", textwrap.fill(rule, 110)])
+    text = "\n".join(
+        [title, "", *lines, "", textwrap.fill(_units(curve), 110), "", textwrap.fill(rule, 110)]
+    )
     for mark, instead in (("\\", "/"), ('"""', "'''"), ("*/", "* /"), ("/*", "/ *")):
         text = text.replace(mark, instead)
     return text

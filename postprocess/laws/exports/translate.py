@@ -1,4 +1,5 @@
-"""The functions of ``algorithm.py`` in other languages: their syntax trees, pruned and printed line by line."""
+"""The functions of ``algorithm.py`` in other languages: their syntax trees, pruned and printed line
+by line."""
 
 from __future__ import annotations
 
@@ -17,12 +18,15 @@ TABLES = {name for name in vars(algorithm) if name.isupper()}
 
 
 def select(wanted: list[str], flags: dict[str, bool]) -> tuple[list[ast.FunctionDef], set[str]]:
-    """The functions that ``wanted`` ones call, less what ``flags`` switch off; and the names of the tables they use."""
+    """The functions that ``wanted`` ones call, less what ``flags`` switch off; and the names of the
+    tables they use."""
     todo, used, tables = list(wanted), dict[str, ast.FunctionDef](), set[str]()
     while todo:
         name = todo.pop()
         used[name] = node = _Prune(flags).visit(ast.parse(ast.unparse(FUNCTIONS[name])).body[0])
-        names = {n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
+        names = {
+            n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)
+        }
         tables |= names & TABLES
         todo += (names & FUNCTIONS.keys()) - used.keys() - {"warn_outside"}
     return [used[name] for name in FUNCTIONS if name in used], tables
@@ -41,8 +45,8 @@ class _Prune(ast.NodeTransformer):
 
 @dataclass(frozen=True)
 class Language:
-    """How a language writes names, entries of tables (from ``base`` on), statements, the ends of blocks, and
-    what takes the place of ``warn_outside``."""
+    """How a language writes names, entries of tables (from ``base`` on), statements, the ends of
+    blocks, and what takes the place of ``warn_outside``."""
 
     words: dict[str, str]
     base: int
@@ -73,7 +77,10 @@ class Language:
             case ast.Assign(targets=[ast.Tuple(elts=[first, second])], value=value):
                 open_call = self.expression(value)[:-1]
                 return [self.several.format(ast.unparse(first), ast.unparse(second), open_call)]
-            case ast.Assign(targets=[target], value=value) | ast.AnnAssign(target=target, value=ast.expr() as value):
+            case (
+                ast.Assign(targets=[target], value=value)
+                | ast.AnnAssign(target=target, value=ast.expr() as value)
+            ):
                 return [self.assign.format(ast.unparse(target), self.expression(value))]
             case ast.If():
                 other = [self.else_, *self.statements(node.orelse, "    ")] if node.orelse else []
@@ -86,7 +93,11 @@ class Language:
                     self.ends[1],
                 ]
             case ast.For(iter=ast.Call(args=[count])):
-                return [self.for_.format(ast.unparse(count)), *self.statements(node.body, "    "), self.ends[2]]
+                return [
+                    self.for_.format(ast.unparse(count)),
+                    *self.statements(node.body, "    "),
+                    self.ends[2],
+                ]
             case ast.Break():
                 return ["break;"]
             case ast.Expr(value=ast.Call(args=[delta])):
@@ -111,20 +122,29 @@ class _Words(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
         return (
-            ast.Name(self.language.half.format(ast.unparse(node.left))) if isinstance(node.op, ast.FloorDiv) else node
+            ast.Name(self.language.half.format(ast.unparse(node.left)))
+            if isinstance(node.op, ast.FloorDiv)
+            else node
         )
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.Name:
         table, place = (ast.unparse(self.visit(part)) for part in (node.value, node.slice))
         start, _, more = place.partition(" + ")
         number = int(more or 0) + self.language.base
-        place = f"{int(place) + self.language.base}" if place.isdigit() else f"{start} + {number}" if number else start
+        place = (
+            f"{int(place) + self.language.base}"
+            if place.isdigit()
+            else f"{start} + {number}"
+            if number
+            else start
+        )
         return ast.Name(self.language.entry.format(table, place))
 
 
 @dataclass(frozen=True)
 class Signature:
-    """A function's name, doc, inputs and locals with their types, the names that it returns, and its body."""
+    """A function's name, doc, inputs and locals with their types, the names that it returns, and
+    its body."""
 
     name: str
     doc: str
@@ -160,11 +180,19 @@ def in_c(node: ast.FunctionDef, name: str) -> str:
     prefix, f = f"{name}_", Signature.of(node)
     c = _c(prefix)
     result, *more = f.outputs
-    inputs = [f"{c.types[kind]}{name}" for name, kind in f.inputs.items()] + [f"double *{name}_out" for name in more]
+    inputs = [f"{c.types[kind]}{name}" for name, kind in f.inputs.items()] + [
+        f"double *{name}_out" for name in more
+    ]
     body = c.statements(f.body, "")
-    kinds = {kind: [name for name, own in f.locals.items() if own == kind] for kind in f.locals.values()}
+    kinds = {
+        kind: [name for name, own in f.locals.items() if own == kind] for kind in f.locals.values()
+    }
     lines = [f"{c.types[kind]}{', '.join(names)};" for kind, names in kinds.items()]
-    lines += [f"(void){name};" for name in f.inputs if not any(re.search(rf"\b{name}\b", line) for line in body)]
+    lines += [
+        f"(void){name};"
+        for name in f.inputs
+        if not any(re.search(rf"\b{name}\b", line) for line in body)
+    ]
     lines += [*body, *(f"*{name}_out = {name};" for name in more), f"return {result};"]
     head = f"/* {f.doc} */\nstatic inline {c.types[f.locals[result]]}{prefix}{f.name}({', '.join(inputs)}) {{\n"
     return head + "".join(f"    {line}\n" for line in lines) + "}"
@@ -185,7 +213,9 @@ def in_modelica(node: ast.FunctionDef, name: str) -> str:
 def in_octave(node: ast.FunctionDef, name: str) -> str:
     """The function in Matlab and Octave; tables are a persistent structure ``T``."""
     f = Signature.of(node)
-    tables = {n.id for statement in f.body for n in ast.walk(statement) if isinstance(n, ast.Name)} & TABLES
+    tables = {
+        n.id for statement in f.body for n in ast.walk(statement) if isinstance(n, ast.Name)
+    } & TABLES
     lines = [f"% {f.doc}"]
     lines += ["persistent T", "if isempty(T)", "    T = tables();", "end"] if tables else []
     lines += OCTAVE.statements(f.body, "")

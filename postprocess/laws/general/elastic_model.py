@@ -1,13 +1,15 @@
-"""The elastic joint: P(delta), p0 and eps as polynomials of what decides it, the same in plane strain and stress.
+"""The elastic joint: P(delta), p0 and eps as polynomials of what decides it, the same in plane
+strain and stress.
 
-With the pin's share ``p`` of the compliance 1/E*, ``q = 1 - p``, and ``m``, ``n`` of pin and block, ``nu/(1 - nu)`` in
-plane strain and ``nu`` in plane stress, three functions of ``x = delta/dR`` say all of ``y = P/(E* dR)``:
+With the pin's share ``p`` of the compliance 1/E*, ``q = 1 - p``, and ``m``, ``n`` of pin and block,
+``nu/(1 - nu)`` in plane strain and ``nu`` in plane stress, three functions of ``x = delta/dR`` say
+all of ``y = P/(E* dR)``:
 
     F = pi x/y + ln(y/(1 + y)),    p0 R/(E* dR sqrt(y)),    eps/sqrt(y)
 
-F is constant at first touch, where the contact is a line contact's (Johnson 1985, eq. 5.57), and a compliance at depth.
-Each is a sum of Chebyshev polynomials of x/(1 + x) times products of p, p m, q n and dR/R: elastic_model.json, which
-law_fit.py fits.
+F is constant at first touch, where the contact is a line contact's (Johnson 1985, eq. 5.57), and a
+compliance at depth. Each is a sum of Chebyshev polynomials of x/(1 + x) times products of p, p m, q
+n and dR/R: elastic_model.json, which law_fit.py fits.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ _CLEARANCE = 0.02  # dR/R of which dR/R is counted
 
 
 class Elastic(NamedTuple):
-    """What decides elastic joints, each ``(m,)``: share of the pin p, ``m`` and ``n`` of pin and block, ``clearance``
-    dR/R."""
+    """What decides elastic joints, each ``(m,)``: share of the pin p, ``m`` and ``n`` of pin and
+    block, ``clearance`` dR/R."""
 
     p: Array
     m: Array
@@ -64,16 +66,21 @@ def depth(x: Array) -> Array:
 
 @dataclass(frozen=True)
 class Polynomials:
-    """One of the three functions: ``coefficients`` ``(terms, degree + 1)`` of the products with ``exponents``."""
+    """One of the three functions: ``coefficients`` ``(terms, degree + 1)`` of the products with
+    ``exponents``."""
 
     exponents: Array
     coefficients: Array
 
     def at(self, joints: Elastic, x: Array) -> tuple[Array, Array]:
-        """The function and its derivative by x ``(m, k)``, at ``x`` ``(k,)`` of all or ``(m, k)`` of each joint."""
+        """The function and its derivative by x ``(m, k)``, at ``x`` ``(k,)`` of all or ``(m, k)``
+        of each joint."""
         series = (products(joints, self.exponents) @ self.coefficients).T[..., None]
         slope = 2 * (1 + FARTHEST) / FARTHEST / (1 + x) ** 2
-        value, rise = (chebyshev.chebval(depth(x), c, tensor=False) for c in (series, chebyshev.chebder(series)))
+        value, rise = (
+            chebyshev.chebval(depth(x), c, tensor=False)
+            for c in (series, chebyshev.chebder(series))
+        )
         return value, rise * slope
 
 
@@ -87,12 +94,15 @@ class ElasticModel:
 
     def at(self, joints: Elastic, x: Array) -> ElasticState:
         """All quantities of ``joints`` at ``x > 0``, ``(k,)`` or ``(m, k)``."""
-        (F, F_slope), (peak, _), (angle, _) = (of.at(joints, x) for of in (self.F, self.peak, self.angle))
+        (F, F_slope), (peak, _), (angle, _) = (
+            of.at(joints, x) for of in (self.F, self.peak, self.angle)
+        )
         y, slope = line_contact(np.asarray(x), F, F_slope)
         return ElasticState(y, slope, F, F_slope, peak * np.sqrt(y), angle * np.sqrt(y))
 
     def to_json(self) -> str:
-        """The model as a table: a row for each product, its exponents and coefficients in six digits."""
+        """The model as a table: a row for each product, its exponents and coefficients in six
+        digits."""
         lines = []
         for name, of in vars(self).items():
             rows = [[*map(int, e), *(float(f"{c:.6g}") for c in row)]

@@ -1,8 +1,10 @@
-"""Regression of curves by a Gaussian process: several outputs at once, of which later ones are known of fewer points.
+"""Regression of curves by a Gaussian process: several outputs at once, of which later ones are
+known of fewer points.
 
-Rasmussen and Williams (2006), sections 2.2, 2.7 and 5.4. The kernel is Matern's of order 7/2 with a length for each
-input, beside a linear mean with wide prior; outputs share it but for their size. Points are ordered so that output j is
-known of the first n_j: then one Cholesky factor serves all outputs, as its leading block is that of the leading points.
+Rasmussen and Williams (2006), sections 2.2, 2.7 and 5.4. The kernel is Matern's of order 7/2 with a
+length for each input, beside a linear mean with wide prior; outputs share it but for their size.
+Points are ordered so that output j is known of the first n_j: then one Cholesky factor serves all
+outputs, as its leading block is that of the leading points.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ _WIDE = 1.0  # prior variance of the linear mean's coefficients over that of the
 
 @dataclass(frozen=True)
 class Kernel:
-    """``lengths`` ``(d,)`` of the inputs, and ``noise``, the variance of data over that of the process."""
+    """``lengths`` ``(d,)`` of the inputs, and ``noise``, the variance of data over that of the
+    process."""
 
     lengths: Array
     noise: float
@@ -38,24 +41,31 @@ class Kernel:
 
 
 class Process:
-    """A Gaussian process through ``values`` ``(n, outputs)`` at ``points`` ``(n, d)``, nan from some row on in every
-    column: ``size`` ``(outputs,)`` is the variance of each, ``likelihood`` the logarithm of all data's."""
+    """A Gaussian process through ``values`` ``(n, outputs)`` at ``points`` ``(n, d)``, nan from
+    some row on in every column: ``size`` ``(outputs,)`` is the variance of each, ``likelihood`` the
+    logarithm of all data's."""
 
     def __init__(self, kernel: Kernel, points: Array, values: Array) -> None:
         self.kernel, self.points = kernel, points
         covariance = np.zeros((len(points), len(points)))
         for start in range(0, len(points), _ROWS):  # of the half that Cholesky's factor needs
             rows = slice(start, start + _ROWS)
-            covariance[rows, : start + _ROWS] = kernel.between(points[rows], points[: start + _ROWS])
+            covariance[rows, : start + _ROWS] = kernel.between(
+                points[rows], points[: start + _ROWS]
+            )
         covariance[np.diag_indices_from(covariance)] += kernel.noise
         self.factor = cholesky(covariance, lower=True, check_finite=False)
         self.known = ~np.isnan(values)
-        self.weights = solve_triangular(self.factor, np.where(self.known, values, 0.0), lower=True, check_finite=False)
+        self.weights = solve_triangular(
+            self.factor, np.where(self.known, values, 0.0), lower=True, check_finite=False
+        )
         self.weights *= self.known
         count = self.known.sum(0)
         self.size = (self.weights**2).sum(0) / np.maximum(count, 1)
         told = np.cumsum(np.log(np.diag(self.factor)))[np.maximum(count, 1) - 1]
-        self.likelihood = -(0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told)[count > 0].sum()
+        self.likelihood = -(0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told)[
+            count > 0
+        ].sum()
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
@@ -67,13 +77,15 @@ class Process:
         return reduced.T @ self.weights, np.sqrt(left * self.size)
 
     def left_out(self) -> tuple[Array, Array]:
-        """What each point's values ``(n, outputs)`` are predicted to be by the others, less what they are, and the
-        standard deviation of that (section 5.4.2); nan where unknown."""
+        """What each point's values ``(n, outputs)`` are predicted to be by the others, less what
+        they are, and the standard deviation of that (section 5.4.2); nan where unknown."""
         off, deviation = np.full((2, *self.known.shape), np.nan)
         for count in np.unique(self.known.sum(0)):
             if count < 2:
                 continue
-            inverse = solve_triangular(self.factor[:count, :count], np.eye(count), lower=True, check_finite=False)
+            inverse = solve_triangular(
+                self.factor[:count, :count], np.eye(count), lower=True, check_finite=False
+            )
             precision = (inverse**2).sum(0)
             columns = np.flatnonzero(self.known.sum(0) == count)
             off[:count, columns] = -(inverse.T @ self.weights[:count, columns]) / precision[:, None]

@@ -17,22 +17,28 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.floating]
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
-_SOFTER, _SOFTEST = 1.4, 2.5  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any
+_SOFTER, _SOFTEST = (
+    1.4,
+    2.5,
+)  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any
 
 
 @dataclass(frozen=True)
 class LawJoint:
-    """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any consistent units.
+    """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any
+    consistent units.
 
-    ``E_star`` is the contact modulus of the plane, ``pin_share`` the share of the pin in the compliance 1/E* (0: a
-    rigid pin, 1/2: like bodies), ``pin_yield`` and ``block_yield`` the yield stresses (None: elastic), ``k`` Winkler's
-    coefficient and ``c`` the plateau of the pressure over the yield stress (Hu et al., eqs 6 and 10), ``length`` along
-    the axis. ``plane`` is "strain" or "stress", ``nu`` Poisson's ratio of the block, ``pin_nu`` that of the pin (None:
-    the block's, or rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's modulus
-    of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a pin in a wide block, and say
-    so of a ``ring``, where ``block_size`` (None: wide) is small, the pin is ``whole``, not cut at the pressed
-    diameter, or there is ``friction`` or ``large_strain``, which no law knows; and archord's also where contact is of
-    the pairs of points of the undeformed curves (``fixed_pairs``). Raises ValueError for values that make no joint.
+    ``E_star`` is the contact modulus of the plane, ``pin_share`` the share of the pin in the
+    compliance 1/E* (0: a rigid pin, 1/2: like bodies), ``pin_yield`` and ``block_yield`` the yield
+    stresses (None: elastic), ``k`` Winkler's coefficient and ``c`` the plateau of the pressure over
+    the yield stress (Hu et al., eqs 6 and 10), ``length`` along the axis. ``plane`` is "strain" or
+    "stress", ``nu`` Poisson's ratio of the block, ``pin_nu`` that of the pin (None: the block's, or
+    rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's
+    modulus of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a
+    pin in a wide block, and say so of a ``ring``, where ``block_size`` (None: wide) is small, the
+    pin is ``whole``, not cut at the pressed diameter, or there is ``friction`` or ``large_strain``,
+    which no law knows; and archord's also where contact is of the pairs of points of the undeformed
+    curves (``fixed_pairs``). Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -58,7 +64,17 @@ class LawJoint:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("radius", "clearance", "E_star", "k", "c", "pin_yield", "block_yield", "length", "block_size"):
+        for name in (
+            "radius",
+            "clearance",
+            "E_star",
+            "k",
+            "c",
+            "pin_yield",
+            "block_yield",
+            "length",
+            "block_size",
+        ):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value:g} must be a positive number.")
@@ -67,7 +83,10 @@ class LawJoint:
         for name, value in (("nu", self.nu), ("pin_nu", self.pin_nu)):
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
-        for name, value in (("pin_hardening", self.pin_hardening), ("block_hardening", self.block_hardening)):
+        for name, value in (
+            ("pin_hardening", self.pin_hardening),
+            ("block_hardening", self.block_hardening),
+        ):
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value:g} must be a number that is not negative.")
         if self.plane not in (None, "strain", "stress"):
@@ -79,8 +98,14 @@ class LawJoint:
         plane, pin, block = scene.analysis.plane, scene.solids.get("pin"), scene.block
         given: dict[str, Any] = {"pin_share": 0.0}
         if pin is not None:
-            ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(block.E, block.nu, plane)
-            given = {"pin_share": 1 / (1 + ratio), "pin_yield": pin.yield_stress, "pin_hardening": _hardening(pin)}
+            ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(
+                block.E, block.nu, plane
+            )
+            given = {
+                "pin_share": 1 / (1 + ratio),
+                "pin_yield": pin.yield_stress,
+                "pin_hardening": _hardening(pin),
+            }
         return cls(
             scene.joint.radius,
             scene.joint.dR,
@@ -103,11 +128,15 @@ class LawJoint:
     @property
     def yield_stress(self) -> float | None:
         """Yield stress of the weaker body; None if neither yields."""
-        return min((stress for stress in (self.pin_yield, self.block_yield) if stress is not None), default=None)
+        return min(
+            (stress for stress in (self.pin_yield, self.block_yield) if stress is not None),
+            default=None,
+        )
 
     @property
     def yielding(self) -> str:
-        """Which bodies yield: "none", "pin", "block", "both" at one stress, or "unlike", each at its own."""
+        """Which bodies yield: "none", "pin", "block", "both" at one stress, or "unlike", each at
+        its own."""
         pin, block = self.pin_yield, self.block_yield
         if pin is None or block is None:
             return "pin" if pin is not None else "block" if block is not None else "none"
@@ -129,7 +158,9 @@ class LawJoint:
         """Dundurs' other constant; zero where plane and nu are unknown, as for like bodies."""
         if self.plane is None or self.nu is None:
             return 0.0
-        pin, block = (_transverse(self.nu if nu is None else nu, self.plane) for nu in (self.pin_nu, self.nu))
+        pin, block = (
+            _transverse(self.nu if nu is None else nu, self.plane) for nu in (self.pin_nu, self.nu)
+        )
         return (1 - self.pin_share) * block - self.pin_share * pin
 
     @property
@@ -144,16 +175,19 @@ class LawJoint:
 
     @property
     def softer(self) -> tuple[float, float]:
-        """By what share of itself P(delta) is about smaller in this block than in one of `LARGE` R, and at most: from
-        widths of 2.5 to 50 R, solved up to delta = 2 dR. The factor of ``(R/W)^2`` is 1.2 to 1.4 for like elastic
-        bodies, to 2 for a rigid pin, to 2.4 beyond yield."""
+        """By what share of itself P(delta) is about smaller in this block than in one of `LARGE` R,
+        and at most: from widths of 2.5 to 50 R, solved up to delta = 2 dR. The factor of
+        ``(R/W)^2`` is 1.2 to 1.4 for like elastic bodies, to 2 for a rigid pin, to 2.4 beyond
+        yield."""
         narrow = 0.0 if self.block_size is None else (self.radius / self.block_size) ** 2
         return _SOFTER * narrow, _SOFTEST * narrow
 
     @property
     def onset(self) -> float:
         """``s = sigY R/(E* dR)``; infinite without a yield stress."""
-        return math.inf if self.yield_stress is None else self.yield_stress * self.radius / self.unit
+        return (
+            math.inf if self.yield_stress is None else self.yield_stress * self.radius / self.unit
+        )
 
     @property
     def threshold(self) -> float:
@@ -162,7 +196,8 @@ class LawJoint:
 
     @property
     def first_yield(self) -> float:
-        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a yield stress."""
+        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a
+        yield stress."""
         return self.radius * self.threshold / (self.k * self.E_star)
 
 
@@ -173,6 +208,7 @@ def _hardening(solid: Solid) -> float | None:
 
 
 def _transverse(nu: float, plane: str) -> float:
-    """``(kappa - 1)/(kappa + 1)`` with Kolosov's constant: the part of Dundurs' beta that a body brings."""
+    """``(kappa - 1)/(kappa + 1)`` with Kolosov's constant: the part of Dundurs' beta that a body
+    brings."""
     kappa = 3 - 4 * nu if plane == "strain" else (3 - nu) / (1 + nu)
     return (kappa - 1) / (kappa + 1)

@@ -1,15 +1,18 @@
-"""P(delta) of one joint as a table, with its way back: what every law is reduced to before it is used or exported.
+"""P(delta) of one joint as a table, with its way back: what every law is reduced to before it is
+used or exported.
 
-All is dimensionless: ``x = delta/dR``, ``y = P/unit``. Between nodes curves are cubic (Hermite). Up to the first node
-above zero, where the contact is Hertz's, the table may follow the logarithmic law of line contact,
+All is dimensionless: ``x = delta/dR``, ``y = P/unit``. Between nodes curves are cubic (Hermite). Up
+to the first node above zero, where the contact is Hertz's, the table may follow the logarithmic law
+of line contact,
 
     pi x/y + ln(y/(1 + y)) = F(x),    F = a + b x + c x^2,
 
-which has no slope at x = 0. After yielding, a joint comes back along its ``back`` curve, that of an elastic joint of
-another clearance and origin: ``y = r back(h(a)/r)``, ``a = x - deepest + travel``, with the ``ratio`` r, a function of
-the deepest x, and the ``travel`` by which both curves meet there. As what has yielded does not fit any longer, contact
-ends more softly: ``h`` is a above the ``toe`` w, another such function, bends there, and is 0 at -w, where the joint
-opens. ``deepest`` is all that has to be remembered. Reloading goes the same way, and on along the first loading.
+which has no slope at x = 0. After yielding, a joint comes back along its ``back`` curve, that of an
+elastic joint of another clearance and origin: ``y = r back(h(a)/r)``, ``a = x - deepest + travel``,
+with the ``ratio`` r, a function of the deepest x, and the ``travel`` by which both curves meet
+there. As what has yielded does not fit any longer, contact ends more softly: ``h`` is a above the
+``toe`` w, another such function, bends there, and is 0 at -w, where the joint opens. ``deepest`` is
+all that has to be remembered. Reloading goes the same way, and on along the first loading.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ import numpy.typing as npt
 from archord.postprocess.laws.general.joint import Array
 from archord.report.readable import json_of
 
-_ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
+# of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
+_ITERATIONS = 6
 _INSIDE = 1 + 1e-9  # of the last node, but for round-off
 _NUMBER = 1e300  # beyond it nothing is a displacement
 _NEWER = ("length_unit", "force_unit", "pin_length")  # which files of earlier versions lack
@@ -34,9 +38,9 @@ _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which b
 
 
 class CurveState(NamedTuple):
-    """What a joint's law says at displacements ``(...)``: force, dP/d(delta), and the error of the force expected of 9
-    in 10 joints; largest pressure and semi-angle [rad] of the contact, nan on the way back after yielding. Beyond the
-    table all but the force are nan, and of nan all."""
+    """What a joint's law says at displacements ``(...)``: force, dP/d(delta), and the error of the
+    force expected of 9 in 10 joints; largest pressure and semi-angle [rad] of the contact, nan on
+    the way back after yielding. Beyond the table all but the force are nan, and of nan all."""
 
     load: Array
     stiffness: Array
@@ -47,17 +51,20 @@ class CurveState(NamedTuple):
 
 @dataclass(frozen=True)
 class JointCurve:
-    """The law of one joint, or of several: tables ``(..., n)`` over the nodes ``x`` ``(n,)``, which begin with 0.
+    """The law of one joint, or of several: tables ``(..., n)`` over the nodes ``x`` ``(n,)``, which
+    begin with 0.
 
-    ``length`` (dR), ``force`` and ``pressure`` are the units of x, y and p0, positive numbers or ``(..., 1)``. ``y``
-    and ``dy`` are force and slope on first loading, ``back`` and ``dback`` those of the curve that unloading follows,
-    ``ratio`` and ``dratio`` its r by the deepest x, ``toe``, straight between nodes, its toe. ``touch`` ``(..., 3)``
-    has a, b, c of the logarithmic law; empty ``(0,)`` without one. ``peak``, ``dpeak`` are of p0/sqrt(y), ``angle``,
-    ``dangle`` of eps/sqrt(y): nearly constant at first touch; nan where unknown. Beyond the last node curves go on
-    along their tangents. Expected errors are of 9 in 10 joints, straight between nodes: ``error`` that of y on loading,
-    over y, ``back_error`` on the way back, over the largest y. ``about`` says what it is the law of and where it comes
-    from, ``length_unit`` and ``force_unit`` name the units of displacement and force, and ``pin_length`` is the length
-    of the pin that carries the force: 1 where forces are per unit length.
+    ``length`` (dR), ``force`` and ``pressure`` are the units of x, y and p0, positive numbers or
+    ``(..., 1)``. ``y`` and ``dy`` are force and slope on first loading, ``back`` and ``dback``
+    those of the curve that unloading follows, ``ratio`` and ``dratio`` its r by the deepest x,
+    ``toe``, straight between nodes, its toe. ``touch`` ``(..., 3)`` has a, b, c of the logarithmic
+    law; empty ``(0,)`` without one. ``peak``, ``dpeak`` are of p0/sqrt(y), ``angle``, ``dangle`` of
+    eps/sqrt(y): nearly constant at first touch; nan where unknown. Beyond the last node curves go
+    on along their tangents. Expected errors are of 9 in 10 joints, straight between nodes:
+    ``error`` that of y on loading, over y, ``back_error`` on the way back, over the largest y.
+    ``about`` says what it is the law of and where it comes from, ``length_unit`` and ``force_unit``
+    name the units of displacement and force, and ``pin_length`` is the length of the pin that
+    carries the force: 1 where forces are per unit length.
     """
 
     x: Array
@@ -101,13 +108,14 @@ class JointCurve:
 
     @property
     def widest(self) -> Any:
-        """Semi-angle [rad] that cubics between nodes do not exceed: a quarter of a circle, or the largest node's."""
+        """Semi-angle [rad] that cubics between nodes do not exceed: a quarter of a circle, or the
+        largest node's."""
         largest = (self.angle * np.sqrt(self.y)).max(axis=-1, keepdims=self.y.ndim > 1)
         return np.where(largest > _INSIDE * np.pi / 2, largest, np.pi / 2)
 
     def at(self, delta: npt.ArrayLike, deepest: npt.ArrayLike = 0.0) -> CurveState:
-        """All quantities at ``delta`` after the joint has been as deep as ``deepest`` (both ``(..., k)``); 0 where the
-        joint is open. Warns beyond the table."""
+        """All quantities at ``delta`` after the joint has been as deep as ``deepest`` (both ``(...,
+        k)``); 0 where the joint is open. Warns beyond the table."""
         x = np.asarray(delta, float) / self.length
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
         x, most = np.broadcast_arrays(np.maximum(x, -1.0), most)
@@ -118,12 +126,14 @@ class JointCurve:
         x, most = (np.where(numbers, values, 0.0) for values in (x, most))
         if (np.maximum(x, most) > self.reach).any():
             warnings.warn(
-                f"archord: beyond {self.x[-1]:g} dR, where the joint's table ends, it goes on straight", stacklevel=2
+                f"archord: beyond {self.x[-1]:g} dR, where the joint's table ends, it goes on straight",
+                stacklevel=2,
             )
         y, dy = self._loading(np.maximum(x, 0.0))
         root = np.sqrt(y)
         peak, angle = (
-            hermite(self.x, f, df, x)[0] * root for f, df in ((self.peak, self.dpeak), (self.angle, self.dangle))
+            hermite(self.x, f, df, x)[0] * root
+            for f, df in ((self.peak, self.dpeak), (self.angle, self.dangle))
         )
         angle = np.minimum(angle, self.widest)
         error = y * linear(self.x, self.error, x)
@@ -138,22 +148,34 @@ class JointCurve:
             y, dy = np.where(returning, yb, y), np.where(returning, dyb, dy)
             error = np.where(returning, ymost * linear(self.x, self.back_error, most), error)
             peak, angle = (np.where(returning, np.nan, values) for values in (peak, angle))
-        y, dy, error, peak, angle = (np.where(x <= 0, 0.0, values) for values in (y, dy, error, peak, angle))
+        y, dy, error, peak, angle = (
+            np.where(x <= 0, 0.0, values) for values in (y, dy, error, peak, angle)
+        )
         y = np.where(numbers, y, np.nan)
-        dy, error, peak, angle = (np.where(known, values, np.nan) for values in (dy, error, peak, angle))
+        dy, error, peak, angle = (
+            np.where(known, values, np.nan) for values in (dy, error, peak, angle)
+        )
         return CurveState(
-            y * self.force, dy * self.force / self.length, error * self.force, peak * self.pressure, angle
+            y * self.force,
+            dy * self.force / self.length,
+            error * self.force,
+            peak * self.pressure,
+            angle,
         )
 
     def displacement(self, load: npt.ArrayLike) -> Array:
-        """The displacement of first loading at which the force is ``load`` ``(..., k)``; nan beyond the table's."""
+        """The displacement of first loading at which the force is ``load`` ``(..., k)``; nan beyond
+        the table's."""
         y = np.asarray(load, float) / self.force
         known = y <= self.y[..., -1:]
-        return np.where(known, self._inverse(self.y, self.dy, np.where(known, y, 0.0)), np.nan) * self.length
+        return (
+            np.where(known, self._inverse(self.y, self.dy, np.where(known, y, 0.0)), np.nan)
+            * self.length
+        )
 
     def residual(self, deepest: npt.ArrayLike) -> Array:
-        """The displacement ``(..., k)`` at which the joint opens on its way back from ``deepest``; nan beyond the table
-        if it yields."""
+        """The displacement ``(..., k)`` at which the joint opens on its way back from ``deepest``;
+        nan beyond the table if it yields."""
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
         known = most <= (self.reach if self.yields else _NUMBER)
         most = np.where(known, most, 0.0)
@@ -215,7 +237,9 @@ class JointCurve:
     def to_json(self) -> str:
         """The curve as JSON; numbers in full, null for nan."""
         data = {
-            name: np.where(np.isnan(value), np.array(None), value).tolist() if isinstance(value, np.ndarray) else value
+            name: np.where(np.isnan(value), np.array(None), value).tolist()
+            if isinstance(value, np.ndarray)
+            else value
             for name, value in asdict(self).items()
         }
         return json.dumps(data, indent=1, allow_nan=False) + "\n"
@@ -236,7 +260,8 @@ class JointCurve:
 
 
 def first_touch(touch: Array, x: Array) -> tuple[Array, Array]:
-    """``y`` and ``dy/dx`` of the logarithmic law of ``touch`` ``(..., 3)`` at ``x > 0`` ``(..., k)``."""
+    """``y`` and ``dy/dx`` of the logarithmic law of ``touch`` ``(..., 3)`` at ``x > 0`` ``(...,
+    k)``."""
     a, b, c = _each(touch)
     return line_contact(x, a + x * (b + c * x), b + 2 * c * x)
 
@@ -256,16 +281,16 @@ def line_contact(x: Array, F: Array, slope: Array) -> tuple[Array, Array]:
 
 
 def bent(a: Array, travel: Array, toe: Array) -> tuple[Array, Array]:
-    """``h(a)`` and its slope: ``t f(a)/f(t)``, ``f(a) = a + sqrt(a^2 + w^2) - (sqrt(2) - 1) w``, of ``travel`` t and
-    ``toe`` w, which is t at t and 0 at -w, negative below."""
+    """``h(a)`` and its slope: ``t f(a)/f(t)``, ``f(a) = a + sqrt(a^2 + w^2) - (sqrt(2) - 1) w``, of
+    ``travel`` t and ``toe`` w, which is t at t and 0 at -w, negative below."""
     root = np.maximum(np.hypot(a, toe), 1e-300)
     share = travel / np.maximum(travel + np.hypot(travel, toe) - _BEND * toe, 1e-300)
     return share * (a + root - _BEND * toe), share * (1 + a / root)
 
 
 def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
-    """The cubics through ``f`` with slopes ``df`` ``(..., n)``, and their slopes, at ``x`` ``(..., k)``; beyond the
-    ends straight on."""
+    """The cubics through ``f`` with slopes ``df`` ``(..., n)``, and their slopes, at ``x`` ``(...,
+    k)``; beyond the ends straight on."""
     i = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
     inside = np.clip(x, nodes[0], nodes[-1])
     h = nodes[i + 1] - nodes[i]
@@ -276,7 +301,8 @@ def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
 
 
 def linear(nodes: Array, f: Array, x: Array) -> Array:
-    """``f`` ``(..., n)`` at ``x`` ``(..., k)``, straight between nodes; beyond the ends as there."""
+    """``f`` ``(..., n)`` at ``x`` ``(..., k)``, straight between nodes; beyond the ends as
+    there."""
     i = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
     t = np.clip((x - nodes[i]) / (nodes[i + 1] - nodes[i]), 0.0, 1.0)
     return _at(f, i) * (1 - t) + _at(f, i + 1) * t
@@ -284,7 +310,11 @@ def linear(nodes: Array, f: Array, x: Array) -> Array:
 
 def _at(f: Array, i: npt.NDArray[np.intp]) -> Array:
     """Entries ``i`` ``(..., k)`` of the last axis of ``f`` ``(..., n)``."""
-    return f[i] if f.ndim == 1 else np.take_along_axis(f, np.broadcast_to(i, (*f.shape[:-1], i.shape[-1])), -1)
+    return (
+        f[i]
+        if f.ndim == 1
+        else np.take_along_axis(f, np.broadcast_to(i, (*f.shape[:-1], i.shape[-1])), -1)
+    )
 
 
 def _cubic(t: Array, f0: Array, f1: Array, d0: Array, d1: Array) -> Array:

@@ -1,10 +1,12 @@
-"""The general law from solved joints: its elastic polynomials, and what yielding adds, by least squares and likelihood.
+"""The general law from solved joints: its elastic polynomials, and what yielding adds, by least
+squares and likelihood.
 
     mpirun -n 2 archord sweep scenes/law.sweep.toml
     python3 -m archord.postprocess.laws.general.law_fit runs/law
 
-A joint that yields is solved with one step between nodes, and with two where yielding begins early; steps converge with
-the first order, so the two extrapolate (Richardson). What comes back tells the way back.
+A joint that yields is solved with one step between nodes, and with two where yielding begins early;
+steps converge with the first order, so the two extrapolate (Richardson). What comes back tells the
+way back.
 """
 
 from __future__ import annotations
@@ -55,13 +57,18 @@ from archord.postprocess.laws.general.yield_model import (
 from archord.postprocess.run import Run
 from archord.report.table import Table
 
-_TERMS = {"F": (4, 5), "peak": (2, 4), "angle": (2, 4)}  # degree in the joint's numbers, and in x/(1 + x)
+_TERMS = {
+    "F": (4, 5),
+    "peak": (2, 4),
+    "angle": (2, 4),
+}  # degree in the joint's numbers, and in x/(1 + x)
 EARLY = 0.6  # s below which steps count
 _LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
-# Fits of a way back begin with these travels, at most that share of the largest, and toes. In plane stress they find
-# the best fit. In plane strain deep dents have two, of which processes follow the one near the largest travel.
+# Fits of a way back begin with these travels, at most that share of the largest, and toes. In plane
+# stress they find the best fit. In plane strain deep dents have two, of which processes follow the
+# one near the largest travel.
 _WAYS = {
     "strain": ((1.5, 0.99, 1e-3), (1.5, 0.85, 0.2)),
     "stress": ((1.0, 0.99, 1e-3), (1.0, 0.99, 0.7), (0.9, 0.99, 0.3), (0.8, 0.99, 1e-3)),
@@ -74,34 +81,46 @@ _NOTHING: Array = np.zeros((1, len(_LAW)))
 
 
 def exponents(degree: int) -> Array:
-    """Those of all products of four numbers up to ``degree``, of which the clearance, whose influence is small, counts
-    twice."""
-    found = [e for e in product(range(degree + 1), repeat=4) if e[0] + e[1] + e[2] + 2 * e[3] <= degree]
+    """Those of all products of four numbers up to ``degree``, of which the clearance, whose
+    influence is small, counts twice."""
+    found = [
+        e for e in product(range(degree + 1), repeat=4) if e[0] + e[1] + e[2] + 2 * e[3] <= degree
+    ]
     return np.array(found, float)
 
 
 def fit_elastic(joints: Elastic, x: Array, y: Array, peak: Array, angle: Array) -> ElasticModel:
-    """The model of elastic ``joints`` ``(m,)`` from ``y``, p0 R/(E* dR) and eps ``(m, k)`` at ``x`` ``(k,)``, by least
-    squares of relative errors of y, and of the two others."""
+    """The model of elastic ``joints`` ``(m,)`` from ``y``, p0 R/(E* dR) and eps ``(m, k)`` at ``x``
+    ``(k,)``, by least squares of relative errors of y, and of the two others."""
     F = np.pi * x / y + np.log(y / (1 + y))
     felt = 1 / (np.pi * x / y - 1 / (1 + y))  # -d(ln y)/dF
     root = np.sqrt(y)
-    data = {"F": (F, felt), "peak": (peak / root, root / peak), "angle": (angle / root, root / angle)}
-    return ElasticModel(**{name: _polynomials(joints, x, *data[name], *_TERMS[name]) for name in data})
+    data = {
+        "F": (F, felt),
+        "peak": (peak / root, root / peak),
+        "angle": (angle / root, root / angle),
+    }
+    return ElasticModel(
+        **{name: _polynomials(joints, x, *data[name], *_TERMS[name]) for name in data}
+    )
 
 
-def _polynomials(joints: Elastic, x: Array, values: Array, weights: Array, degree: int, order: int) -> Polynomials:
+def _polynomials(
+    joints: Elastic, x: Array, values: Array, weights: Array, degree: int, order: int
+) -> Polynomials:
     powers = exponents(degree)
     shapes, series = products(joints, powers), np.polynomial.chebyshev.chebvander(depth(x), order)
     design = shapes[:, None, :, None] * series[None, :, None, :] * weights[:, :, None, None]
-    found = np.linalg.lstsq(design.reshape(values.size, -1), (values * weights).ravel(), rcond=1e-13)[0]
+    found = np.linalg.lstsq(
+        design.reshape(values.size, -1), (values * weights).ravel(), rcond=1e-13
+    )[0]
     return Polynomials(powers, found.reshape(len(powers), -1))
 
 
 @dataclass(frozen=True)
 class NodeRun:
-    """Of a run the ends of its stages: ``x``, y, p0 R/(E* dR) and eps ``(n, 4)``, of which the first ``loading`` are
-    first loading; ``steps`` lie between two."""
+    """Of a run the ends of its stages: ``x``, y, p0 R/(E* dR) and eps ``(n, 4)``, of which the
+    first ``loading`` are first loading; ``steps`` lie between two."""
 
     nodes: Array
     steps: int
@@ -111,7 +130,9 @@ class NodeRun:
         """That of a run which has all its steps."""
         each = curve.scene.load.stage_steps
         unit = curve.E_star * curve.dR
-        table = np.column_stack([curve.delta / curve.dR, curve.P / unit, curve.p0 * curve.R / unit, curve.eps])
+        table = np.column_stack(
+            [curve.delta / curve.dR, curve.P / unit, curve.p0 * curve.R / unit, curve.eps]
+        )
         return cls(table[np.cumsum(each) - 1], each[0])
 
     @property
@@ -122,7 +143,8 @@ class NodeRun:
 
     @property
     def back(self) -> Array:
-        """x and y ``(k, 2)`` of the first way back, with its deepest point; of a run without one that alone."""
+        """x and y ``(k, 2)`` of the first way back, with its deepest point; of a run without one
+        that alone."""
         rest = self.nodes[self.loading - 1 :, :2]
         rises = np.flatnonzero(np.diff(rest[:, 0]) > 0)
         return rest[: int(rises[0]) + 1] if len(rises) else rest
@@ -139,11 +161,18 @@ def solved_joints(curves: Iterable[RunCurve]) -> dict[tuple[float, ...], list[No
     return dict(found)
 
 
-def fit_law(solved: dict[tuple[float, ...], list[NodeRun]]) -> tuple[ElasticModel, SolvedJoints, dict[str, Any]]:
-    """The elastic model, the joints that yield as the processes take them, and the processes' kernels by side."""
-    elastic = {numbers: runs[0].nodes for numbers, runs in solved.items() if np.isinf(numbers[5:]).all()}
+def fit_law(
+    solved: dict[tuple[float, ...], list[NodeRun]],
+) -> tuple[ElasticModel, SolvedJoints, dict[str, Any]]:
+    """The elastic model, the joints that yield as the processes take them, and the processes'
+    kernels by side."""
+    elastic = {
+        numbers: runs[0].nodes for numbers, runs in solved.items() if np.isinf(numbers[5:]).all()
+    }
     tables = np.stack([*elastic.values()])
-    model = fit_elastic(Elastic(*np.array([*elastic]).T[1:5]), tables[0, :, 0], *np.moveaxis(tables[..., 1:], -1, 0))
+    model = fit_elastic(
+        Elastic(*np.array([*elastic]).T[1:5]), tables[0, :, 0], *np.moveaxis(tables[..., 1:], -1, 0)
+    )
     others = {numbers: runs for numbers, runs in solved.items() if np.isfinite(numbers[5:]).any()}
     alone = {numbers: runs for numbers, runs in others.items() if PIN_ALONE in sides_of(numbers)}
     pins = yielding_joints(model, alone)
@@ -153,7 +182,8 @@ def fit_law(solved: dict[tuple[float, ...], list[NodeRun]]) -> tuple[ElasticMode
 
 
 def first_loading(runs: list[NodeRun]) -> Array:
-    """Nodes of first loading ``(n, 4)``, extrapolated where there is a run of two steps between the same nodes."""
+    """Nodes of first loading ``(n, 4)``, extrapolated where there is a run of two steps between the
+    same nodes."""
     coarse = max((run for run in runs if run.steps == 1), key=lambda run: run.loading)
     nodes = coarse.nodes[: coarse.loading].copy()
     for run in runs:
@@ -163,14 +193,19 @@ def first_loading(runs: list[NodeRun]) -> Array:
 
 
 def yielding_joints(
-    model: ElasticModel, solved: dict[tuple[float, ...], list[NodeRun]], pins: YieldModel | None = None
+    model: ElasticModel,
+    solved: dict[tuple[float, ...], list[NodeRun]],
+    pins: YieldModel | None = None,
 ) -> SolvedJoints:
-    """The joints that yield relative to ``model``, with those digits that yield_model.npz keeps; of side `PIN_WEAKER`
-    beside what the process of ``pins`` tells."""
+    """The joints that yield relative to ``model``, with those digits that yield_model.npz keeps; of
+    side `PIN_WEAKER` beside what the process of ``pins`` tells."""
     rows: list[tuple[Any, ...]] = []
     back: list[tuple[float, ...]] = []
     for numbers, runs in solved.items():
-        joint, yielding = Elastic(*np.array(numbers[1:5])[:, None]), Yielding(*np.array(numbers[5:])[:, None])
+        joint, yielding = (
+            Elastic(*np.array(numbers[1:5])[:, None]),
+            Yielding(*np.array(numbers[5:])[:, None]),
+        )
         nodes, dense = first_loading(runs), model.at(joint, _FINE)
         base = model.at(joint, nodes[:, 0])
         total = np.log(nodes[:, 1:].T / np.stack([base.y[0], base.peak[0], base.angle[0]]))
@@ -179,19 +214,32 @@ def yielding_joints(
         for side in sides_of(numbers):
             curves, of_pins = total, _NOTHING
             if side == PIN_WEAKER and pins is not None:
-                own, fine = (total_loss({PIN_ALONE: pins}, model, joint, yielding, x) for x in (nodes[:, 0], _LAW))
-                curves, of_pins = total - np.concatenate([own.force, own.peak, own.angle]), fine.peak
+                own, fine = (
+                    total_loss({PIN_ALONE: pins}, model, joint, yielding, x)
+                    for x in (nodes[:, 0], _LAW)
+                )
+                curves, of_pins = (
+                    total - np.concatenate([own.force, own.peak, own.angle]),
+                    fine.peak,
+                )
             (x0,), (lost,) = onset(side, model, joint, yielding, _LAW, of_pins)
             back += [(len(rows), deepest / x0, *told) for deepest, *told in ways]
-            rows.append((SIDES.index(side), numbers, x0, lost, *_at_multiples(nodes[:, 0] / x0, curves)))
-    index, given, onsets, lost, counts, losses = (np.array(column) for column in zip(*rows, strict=True))
+            rows.append(
+                (SIDES.index(side), numbers, x0, lost, *_at_multiples(nodes[:, 0] / x0, curves))
+            )
+    index, given, onsets, lost, counts, losses = (
+        np.array(column) for column in zip(*rows, strict=True)
+    )
     force, peak, angle = np.moveaxis(losses, 1, 0)
     back.sort(key=lambda way: np.isnan(way[-1]))
-    return SolvedJoints(index, given, onsets, lost, counts, force, peak, angle, np.array(back)).stored()
+    return SolvedJoints(
+        index, given, onsets, lost, counts, force, peak, angle, np.array(back)
+    ).stored()
 
 
 def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
-    """How many of the `MULTIPLES` the nodes ``u`` ``(n,)`` reach, and ``lost`` ``(3, n)`` there; nan beyond."""
+    """How many of the `MULTIPLES` the nodes ``u`` ``(n,)`` reach, and ``lost`` ``(3, n)`` there;
+    nan beyond."""
     known = u > ELASTIC_BELOW * 1.05
     count = int(np.searchsorted(MULTIPLES, u[-1] * _SPACING)) if known.sum() > 1 else 0
     curves = np.full((3, len(MULTIPLES)), np.nan)
@@ -203,29 +251,38 @@ def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
 
 
 def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ...]:
-    """Of a way back its deepest x, the travel and toe of `Loss` that fit best by least squares, which count more where
-    little is left, and over the largest force how far P is from that way, rms, and at the first point of reloading, nan
-    without one."""
+    """Of a way back its deepest x, the travel and toe of `Loss` that fit best by least squares,
+    which count more where little is left, and over the largest force how far P is from that way,
+    rms, and at the first point of reloading, nan without one."""
     (deepest, largest), base = run.back[0], (_FINE, elastic.y[0], elastic.slope[0])
     unit = deepest * largest / np.interp(deepest, _FINE, elastic.y[0])
 
     def off(way: Array, points: Array) -> Array:
-        return (way_back(*base, points[:, 0] - deepest, largest, *(way * unit)) - points[:, 1]) / largest
+        return (
+            way_back(*base, points[:, 0] - deepest, largest, *(way * unit)) - points[:, 1]
+        ) / largest
 
     weights, most = 1 / (_LITTLE + run.back[:, 1] / largest), min(1.5, deepest / unit)
     starts = [[min(travel, share * most), toe] for travel, share, toe in _WAYS[plane]]
     bounds = [0.3, 0.0], [most, 1.0]
     tries = [
-        least_squares(lambda way: weights * off(way, run.back), start, bounds=bounds, x_scale=0.1) for start in starts
+        least_squares(lambda way: weights * off(way, run.back), start, bounds=bounds, x_scale=0.1)
+        for start in starts
     ]
     found = min(tries, key=lambda way: way.cost).x
     again = off(found, run.nodes[run.loading + len(run.back) - 1 :, :2][:1])
     rms = np.sqrt(np.mean(off(found, run.back[1:]) ** 2))
-    return float(deepest), *map(float, found), float(rms), float(abs(again[0])) if len(again) else np.nan
+    return (
+        float(deepest),
+        *map(float, found),
+        float(rms),
+        float(abs(again[0])) if len(again) else np.nan,
+    )
 
 
 def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
-    """The kernels of one of `SIDES`, largest in likelihood, and the spread of errors of joints left out."""
+    """The kernels of one of `SIDES`, largest in likelihood, and the spread of errors of joints left
+    out."""
     data = joints.of(side)
     shape = np.concatenate([data["peak"], data["angle"]], axis=1)
     values = {"force": data["force"], "shape": shape, "back": data["back"][:, :2] - [1, 0]}
@@ -236,7 +293,9 @@ def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
         found["kernels"][name] = {"lengths": kernel.lengths.tolist(), "noise": kernel.noise}
         off, deviation = Process(kernel, points, of).left_out()
         part = slice(1) if name == "back" else slice(None)  # errors of travel
-        found["spread"][name] = float(f"{np.nanquantile(np.abs(off / deviation)[:, part], 0.9):.3g}")
+        found["spread"][name] = float(
+            f"{np.nanquantile(np.abs(off / deviation)[:, part], 0.9):.3g}"
+        )
     return found
 
 
@@ -248,11 +307,15 @@ def fit_kernel(points: Array, values: Array, noise: float) -> Kernel:
         return Kernel(np.array(lengths), noise)
 
     def cost(logarithms: Array) -> float:
-        return -Process(Kernel(np.exp(logarithms[:-1]), np.exp(logarithms[-1])), points, values).likelihood
+        return -Process(
+            Kernel(np.exp(logarithms[:-1]), np.exp(logarithms[-1])), points, values
+        ).likelihood
 
     start = np.log([*_LENGTHS[: points.shape[1]], noise])
     bounds = [(np.log(0.1), np.log(60.0))] * points.shape[1] + [(np.log(1e-7), np.log(0.1))]
-    return kernel(minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x)
+    return kernel(
+        minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x
+    )
 
 
 def rms_largest(errors: Array) -> str:
@@ -261,9 +324,11 @@ def rms_largest(errors: Array) -> str:
 
 
 def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
-    """rms and largest errors of P, in per cent, of joints that the others predict; and the share within the expected
-    ones, 9 in 10 by construction."""
-    table = Table("process", "joints", "P 0.1 to 2 dR", "P 2 to 3 dR", "soft pins, to 3 dR", "inside", left=1)
+    """rms and largest errors of P, in per cent, of joints that the others predict; and the share
+    within the expected ones, 9 in 10 by construction."""
+    table = Table(
+        "process", "joints", "P 0.1 to 2 dR", "P 2 to 3 dR", "soft pins, to 3 dR", "inside", left=1
+    )
     for side in SIDES:
         off, deviation = side_model(joints, side, kernels[side]).processes["force"].left_out()
         chosen = joints.rows(side)
@@ -278,12 +343,16 @@ def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
 
 
 def main(folder: Path | None) -> None:
-    """Fit the law to the sweep in ``folder``, if one is given, and write its files beside this one; print how good it
-    is."""
+    """Fit the law to the sweep in ``folder``, if one is given, and write its files beside this one;
+    print how good it is."""
     if folder:
-        finished = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
+        finished = (
+            run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists()
+        )
         solved = solved_joints(Run(run).curve for run in finished)
-        model, joints, kernels = fit_law({numbers: runs for numbers, runs in solved.items() if complete(numbers, runs)})
+        model, joints, kernels = fit_law(
+            {numbers: runs for numbers, runs in solved.items() if complete(numbers, runs)}
+        )
         TABLE.write_text(model.to_json(), encoding="utf-8")
         KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
         arrays: dict[str, Any] = joints.compact()

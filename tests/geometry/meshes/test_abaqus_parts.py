@@ -73,7 +73,15 @@ def test_instances_are_moved_then_turned_and_their_sets_qualified(tmp_path, comm
     if mesh is None:
         return
     assert list(mesh.cell_sets) == ["Bar-1.all", "Bar-2.all"]
-    assert set(mesh.facet_sets) == {"Bar-1.top", "Bar-2.top", "Bar-1.left", "Bar-2.left", "ends", "right", "upper"}
+    assert set(mesh.facet_sets) == {
+        "Bar-1.top",
+        "Bar-2.top",
+        "Bar-1.left",
+        "Bar-2.left",
+        "ends",
+        "right",
+        "upper",
+    }
     assert ends(mesh, "Bar-1.left") == [(0, 0), (0, 1)]
     assert ends(mesh, "Bar-2.left") == [(9, 0), (10, 0)]
     assert ends(mesh, "Bar-2.top") == [(9, 0), (9, 2)]
@@ -85,7 +93,9 @@ def test_instances_are_moved_then_turned_and_their_sets_qualified(tmp_path, comm
 def test_a_part_without_an_instance_is_in_its_place(tmp_path):
     mesh = read(tmp_path, PART)
     assert (list(mesh.cell_sets), list(mesh.facet_sets)) == (["all"], ["top", "left"])
-    both = read(tmp_path, PART + PART.replace("name=Bar", "name=Rod").replace("1, 0., 0.", "1, 0.5, 0."))
+    both = read(
+        tmp_path, PART + PART.replace("name=Bar", "name=Rod").replace("1, 0., 0.", "1, 0.5, 0.")
+    )
     assert list(both.cell_sets) == ["Bar.all", "Rod.all"]
 
 
@@ -96,10 +106,18 @@ def test_a_part_without_an_instance_is_in_its_place(tmp_path):
         ("name=Bar-2", "name=bar-1", "the .INSTANCE 'bar-1' is there twice"),
         ("instance=bar-2", "instance=bar-3", "there is no .INSTANCE 'bar-3' above a set of it"),
         ("left,\n", "right,\n", "there is no .NSET 'right'"),
-        ("10., 0., 0., 10., 0., 1., 90.", "10., 0., 0., 10., 0., 0., 90.", "between two points that are one"),
+        (
+            "10., 0., 0., 10., 0., 1., 90.",
+            "10., 0., 0., 10., 0., 0., 90.",
+            "between two points that are one",
+        ),
         ("10., 0., 0., 10., 0., 1., 90.", "10., 0., 0., 11., 0., 0., 90.", "not plane: z differs"),
         ("10., 0., 0., 10., 0., 1., 90.", "90.", "one of 7 to turn it"),
-        ("nset=ends, instance=bar-2", "nset=Bar-1.left, instance=bar-2", "'Bar-1.left' is there twice"),
+        (
+            "nset=ends, instance=bar-2",
+            "nset=Bar-1.left, instance=bar-2",
+            "'Bar-1.left' is there twice",
+        ),
         ("1, 5., 5., 0.", "-1, 5., 5., 0.", "'-1' is no number of a node"),
     ],
 )

@@ -17,17 +17,23 @@ from archord.geometry.meshes.refine import Circle, refined
 
 def grid(n, m, corner=(0.0, 0.0), size=(1.0, 1.0)):
     """Nodes and counterclockwise quadrilaterals, in basix' order, of a rectangle."""
-    x = np.stack(np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1)), axis=-1).reshape(-1, 2)
+    x = np.stack(np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1)), axis=-1).reshape(
+        -1, 2
+    )
     first = (np.arange(n) + (n + 1) * np.arange(m)[:, None]).ravel()
     return x * size + corner, first[:, None] + [0, 1, n + 1, n + 2]
 
 
 def joined(*grids):
-    """One mesh of several, none of whose nodes are merged; sets "0", "1", ... and the facet sets "0 top", ..."""
+    """One mesh of several, none of whose nodes are merged; sets "0", "1", ... and the facet sets "0
+    top", ..."""
     x, cells, cell_sets, facet_sets, n, m = [], [], {}, {}, 0, 0
     for k, (nodes, found) in enumerate(grids):
         cell_sets[str(k)] = m + np.arange(len(found))
-        for name, row, ends in (("bottom", nodes[:, 1].min(), [0, 1]), ("top", nodes[:, 1].max(), [2, 3])):
+        for name, row, ends in (
+            ("bottom", nodes[:, 1].min(), [0, 1]),
+            ("top", nodes[:, 1].max(), [2, 3]),
+        ):
             at = (np.abs(nodes[found[:, ends], 1] - row) < 1e-9).all(axis=1)
             facet_sets[f"{k} {name}"] = n + found[at][:, ends]
         x.append(nodes)
@@ -55,7 +61,12 @@ def test_a_sound_mesh_has_nothing_said_of_it(comm):
     ("made", "bodies", "options", "said"),
     [
         (TWO, {"lower": "0", "upper": "2"}, {}, r"no cell set '2'"),
-        (TWO, BOTH, {"pairs": [("0 top", "1 bottm")]}, r"no facet set '1 bottm' \(did you mean '1 bottom'\?\)"),
+        (
+            TWO,
+            BOTH,
+            {"pairs": [("0 top", "1 bottm")]},
+            r"no facet set '1 bottm' \(did you mean '1 bottom'\?\)",
+        ),
         (TWO, {"lower": "0"}, {}, r"6 cells belong to no body, the first at \(0.166667, 1.26\)"),
         (
             TWO,
@@ -63,10 +74,30 @@ def test_a_sound_mesh_has_nothing_said_of_it(comm):
             {},
             "'upper' and 'again' share 12 nodes, as at .0, 1.01.",
         ),
-        (TWO, {"one": "both"}, {}, r"'one' has 2 unconnected parts, the smallest of 4 cells at \(0.25, 0.25\)"),
-        (TWO, BOTH, {"pairs": [("seam",)]}, "set 'seam' is of the bodies 'lower' and 'upper'; a surface is of one"),
-        (TWO, BOTH, {"pairs": [("middle",)]}, "set 'middle' lies inside the body 'lower'; a surface is on a boundary"),
-        (TWO, BOTH, {"millimetres": True, "scale": 0.01}, "the mesh is 0.0201 mm large; is it in metres?"),
+        (
+            TWO,
+            {"one": "both"},
+            {},
+            r"'one' has 2 unconnected parts, the smallest of 4 cells at \(0.25, 0.25\)",
+        ),
+        (
+            TWO,
+            BOTH,
+            {"pairs": [("seam",)]},
+            "set 'seam' is of the bodies 'lower' and 'upper'; a surface is of one",
+        ),
+        (
+            TWO,
+            BOTH,
+            {"pairs": [("middle",)]},
+            "set 'middle' lies inside the body 'lower'; a surface is on a boundary",
+        ),
+        (
+            TWO,
+            BOTH,
+            {"millimetres": True, "scale": 0.01},
+            "the mesh is 0.0201 mm large; is it in metres?",
+        ),
         (
             joined(grid(2, 2), grid(3, 2, (0.2, 0.9))),
             BOTH,
@@ -88,7 +119,12 @@ def test_each_fault_has_its_sentence(comm, made, bodies, options, said):
     seam = np.concatenate([facet_sets["0 top"], facet_sets["1 bottom"]])
     facet_sets = facet_sets | {"seam": seam, "middle": np.array([[3, 4], [4, 5]])}
     with pytest.raises(ValueError, match=said):
-        check(comm, (x * options.pop("scale", 1.0), cells, {**cell_sets, "both": both}, facet_sets), bodies, **options)
+        check(
+            comm,
+            (x * options.pop("scale", 1.0), cells, {**cell_sets, "both": both}, facet_sets),
+            bodies,
+            **options,
+        )
 
 
 def test_large_sides_elsewhere_hide_no_overlap():
@@ -119,7 +155,9 @@ def test_a_hole_of_one_cell_is_warned_of(n, warned):
     cells = np.delete(cells, [n + 1, 2 * n - 2], axis=0)
     said = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(len(cells))}, {}), {"body": "0"})
     assert len(said) == warned
-    assert all("'body' has 1 holes of the size of one cell, as at (0.5, 0.5)" in text for text in said)
+    assert all(
+        "'body' has 1 holes of the size of one cell, as at (0.5, 0.5)" in text for text in said
+    )
 
 
 def test_a_boundary_that_meets_itself_is_warned_of():
@@ -127,7 +165,9 @@ def test_a_boundary_that_meets_itself_is_warned_of():
     x, cells = grid(3, 3)
     cells = np.delete(cells, [0, 4], axis=0)
     (said,) = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(len(cells))}, {}), {"body": "0"})
-    assert said.startswith("the boundary of the body 'body' meets itself in 1 nodes, as at (0.333333, 0.333333)")
+    assert said.startswith(
+        "the boundary of the body 'body' meets itself in 1 nodes, as at (0.333333, 0.333333)"
+    )
 
 
 def test_a_body_of_one_cell_has_no_hole():
@@ -136,7 +176,8 @@ def test_a_body_of_one_cell_has_no_hole():
 
 
 def disc(n, radius, m=2):
-    """Quadrilaterals of a ring of straight sides inside the ``radius``, or outside if ``m`` is negative."""
+    """Quadrilaterals of a ring of straight sides inside the ``radius``, or outside if ``m`` is
+    negative."""
     x, cells = grid(n, abs(m))
     r, angle = radius * (0.5 + 0.5 * x[:, 1] if m > 0 else 2 - x[:, 1]), -np.pi * x[:, 0]
     return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1), cells
@@ -152,22 +193,33 @@ PAIR = {"pairs": [("0 top", "1 top")]}
 
 
 def test_straight_sides_of_arcs_are_told_with_their_sagitta():
-    """pi/20 squared over 8 is 0.0031, with middle nodes on straight sides, too; on the circles there is none. Tied arcs
-    may be as they are."""
+    """pi/20 squared over 8 is 0.0031, with middle nodes on straight sides, too; on the circles
+    there is none. Tied arcs may be as they are."""
     bodies = {"pin": "0", "plate": "1"}
-    with pytest.raises(ValueError, match=r"a sagitta of 0.0031, too much for their clearance of 0.01"):
+    with pytest.raises(
+        ValueError, match=r"a sagitta of 0.0031, too much for their clearance of 0.01"
+    ):
         check(MPI.COMM_SELF, arcs(0.01), bodies, **PAIR)
     (said,) = check(MPI.COMM_SELF, arcs(0.1), bodies, **PAIR)
     assert "a sagitta of 0.0034: their corners make the largest pressure too high" in said
     rigid = [(name, 0.99) for name in ("0 top", "1 top")]
-    with pytest.raises(ValueError, match=r"arcs '0 top' have .* a sagitta of 0.0031, too much for .* of 0.01"):
+    with pytest.raises(
+        ValueError, match=r"arcs '0 top' have .* a sagitta of 0.0031, too much for .* of 0.01"
+    ):
         check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[:1])
     (said,) = check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[1:])
     assert "their corners" in said
     straight = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2)
     with pytest.raises(ValueError, match=r"a sagitta of 0.0031"):
         check_mesh(distribute(MPI.COMM_SELF, straight), bodies, **PAIR)
-    assert check_mesh(distribute(MPI.COMM_SELF, straight), bodies, pairs=[(name,) for name in PAIR["pairs"][0]]) == []
+    assert (
+        check_mesh(
+            distribute(MPI.COMM_SELF, straight),
+            bodies,
+            pairs=[(name,) for name in PAIR["pairs"][0]],
+        )
+        == []
+    )
     circles = [Circle("0 top", (0.0, 0.0), 1.0), Circle("1 top", (0.0, 0.0), 1.01)]
     curved = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2, circles=circles)
     assert check_mesh(distribute(MPI.COMM_SELF, curved), bodies, **PAIR) == []
@@ -177,13 +229,20 @@ def test_straight_sides_of_arcs_are_told_with_their_sagitta():
     ("radius", "x", "warned"), [(1.0, 0.0, 0), (1.00005, 0.0, 0), (1.005, 0.0, 1), (1.0, 0.003, 1)]
 )
 def test_a_circle_that_is_not_the_drawn_one_is_told(radius, x, warned):
-    """It changes the clearance: nodes were moved by up to a twentieth of the radius without a word."""
+    """It changes the clearance: nodes were moved by up to a twentieth of the radius without a
+    word."""
     given = [Circle("0 top", (x, 0.0), radius), Circle("1 top", (0.0, 0.0), 1.1)]
     made = refined(PlaneMesh.of_sets(*arcs(0.1), {}), order=2, circles=given)
     for mesh in (made, gathered(distribute(MPI.COMM_SELF, made))):
         assert len(mesh.notes) == warned
-        assert all("'0 top' is drawn on the circle of radius 1 about (0, 0), but" in said for said in mesh.notes)
-    assert len(check_mesh(distribute(MPI.COMM_SELF, made), {"pin": "0", "plate": "1"}, **PAIR)) == warned
+        assert all(
+            "'0 top' is drawn on the circle of radius 1 about (0, 0), but" in said
+            for said in mesh.notes
+        )
+    assert (
+        len(check_mesh(distribute(MPI.COMM_SELF, made), {"pin": "0", "plate": "1"}, **PAIR))
+        == warned
+    )
 
 
 def test_the_circle_of_points():
@@ -220,7 +279,8 @@ def test_a_corner_of_two_sides_on_one_arc_is_a_warning():
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("kind", [TRIANGLE, QUADRILATERAL])
 def test_a_side_may_bend_until_the_jacobian_vanishes_at_a_point(kind, order, mirrored):
-    """The smallest determinant against a grid of 200 by 200 points, in and beyond the bend that turns a cell over."""
+    """The smallest determinant against a grid of 200 by 200 points, in and beyond the bend that
+    turns a cell over."""
     X = (np.stack(np.meshgrid(*[np.linspace(0, 1, 201)] * 2), axis=-1)).reshape(-1, 2)
     X = X[X.sum(axis=1) <= 1 + 1e-12] if kind == TRIANGLE else X
     verdicts = set()
@@ -239,7 +299,8 @@ def test_a_side_may_bend_until_the_jacobian_vanishes_at_a_point(kind, order, mir
 
 
 def test_a_fold_between_corners_and_nodes_is_found():
-    """Random cells: those with a negative determinant anywhere on a fine grid are refused, and no others."""
+    """Random cells: those with a negative determinant anywhere on a fine grid are refused, and no
+    others."""
     rng = np.random.default_rng(1)
     X = (np.stack(np.meshgrid(*[np.linspace(0, 1, 101)] * 2), axis=-1)).reshape(-1, 2)
     hidden = 0
@@ -247,10 +308,14 @@ def test_a_fold_between_corners_and_nodes_is_found():
         inside = X[X.sum(axis=1) <= 1 + 1e-12] if kind == TRIANGLE else X
         nodes = lagrange_element(kind, order).points
         x = nodes + rng.uniform(-0.35, 0.35, (300, *nodes.shape)) / order
-        made = PlaneMesh.of_sets(x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {})
+        made = PlaneMesh.of_sets(
+            x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {}
+        )
         table = tabulate(kind, order, inside)[1:]
         sampled = np.linalg.det(np.einsum("jqa,nai->nqij", table, x)).min(axis=1)
-        at_nodes = np.linalg.det(np.einsum("jqa,nai->nqij", tabulate(kind, order, nodes)[1:], x)).min(axis=1)
+        at_nodes = np.linalg.det(
+            np.einsum("jqa,nai->nqij", tabulate(kind, order, nodes)[1:], x)
+        ).min(axis=1)
         smallest, largest = smallest_determinants(made)
         assert (np.abs(smallest - sampled) < 2e-3 * largest).all()
         hidden += ((at_nodes > 0) & (smallest <= 0)).sum()
@@ -270,7 +335,9 @@ def test_collapsed_cells_say_so():
     x, cells = grid(2, 1)
     cells[1, 3] = cells[1, 1]
     said = faults(PlaneMesh.of_sets(x, cells, {"plate": np.arange(2)}, {}, {}))[0]
-    assert said.startswith("1 cells have a node twice, the first at (0.75, 0.25) in 'plate': a quadrilateral must not")
+    assert said.startswith(
+        "1 cells have a node twice, the first at (0.75, 0.25) in 'plate': a quadrilateral must not"
+    )
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -281,7 +348,9 @@ def test_cells_that_cannot_be_used(mirrored):
     made = PlaneMesh.of_sets(x, cells, {}, {}, {})
     assert faults(made) == []
     x[4] = [0.9 * np.sign(x[5, 0]), -0.6]
-    assert faults(PlaneMesh.of_sets(x, cells, {}, {}, {}))[0].startswith("2 cells are folded or have no area")
+    assert faults(PlaneMesh.of_sets(x, cells, {}, {}, {}))[0].startswith(
+        "2 cells are folded or have no area"
+    )
     x, cells = grid(2, 1)
     twice = PlaneMesh.of_sets(x, np.concatenate([cells, cells[:1]]), {}, {}, {})
     assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5) in 'all'"
@@ -290,10 +359,15 @@ def test_cells_that_cannot_be_used(mirrored):
     apart[1, 5] = apart[1, 6]
     bound[0, 4] = bound[1, 1]
     for wrong in (apart, bound):
-        assert "do not have all nodes of their common sides in common" in " ".join(faults(replace(curved, cells=wrong)))
+        assert "do not have all nodes of their common sides in common" in " ".join(
+            faults(replace(curved, cells=wrong))
+        )
     third = np.concatenate([cells, [[1, 6, 4, 7]]])
     crowded = PlaneMesh.of_sets(np.concatenate([x, [[2.0, 0], [2, 1]]]), third, {}, {}, {})
-    assert faults(crowded)[0] == "1 edges belong to more than two cells, the first at (0.5, 0.5): cells overlap"
+    assert (
+        faults(crowded)[0]
+        == "1 edges belong to more than two cells, the first at (0.5, 0.5): cells overlap"
+    )
 
 
 X, Y = np.array([1.0, 0.0]), np.array([0.0, 1.0])
@@ -335,7 +409,9 @@ def test_bodies_that_hold_each_other():
     assert free_motions(held, smooth) == {"pin": ["rotation"], "bushing": ["rotation"], "plate": []}
     tie = [("pin", "bushing", circle, np.tile(d, (9, 1))) for d in (X, Y)]
     assert free_motions(held, [*smooth, *tie])["pin"] == ["rotation"]
-    assert free_motions(held | {"pin": [along(Y, (0, 0), (1, 0))]}, [*smooth, *tie])["bushing"] == []
+    assert (
+        free_motions(held | {"pin": [along(Y, (0, 0), (1, 0))]}, [*smooth, *tie])["bushing"] == []
+    )
     loose = free_motions({"pin": [], "plate": clamp}, smooth[:0])
     assert loose["pin"] == ["x", "y", "rotation"]
 

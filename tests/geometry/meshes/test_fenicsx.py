@@ -36,8 +36,8 @@ def disc(gmsh):
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_quads_alone_with_their_middle_nodes_in_place(order, comm):
-    """The area of a disc whose curved edges are moved onto its circle converges with the order; no cell is degenerate
-    at any point."""
+    """The area of a disc whose curved edges are moved onto its circle converges with the order; no
+    cell is degenerate at any point."""
     tagged = gmsh_to_mesh(comm, disc, [Circle("circle", (0.0, 0.0), 1.0)], order=order, quads=True)
     mesh = tagged.mesh
     assert mesh.basix_cell() == QUADRILATERAL
@@ -48,13 +48,16 @@ def test_quads_alone_with_their_middle_nodes_in_place(order, comm):
     area = comm.allreduce(float((basis.measure @ w).sum()))
     assert abs(area - np.pi) < {1: 0.03, 2: 2e-5, 3: 3e-6}[order]
     straight = np.sign(basis.determinant[:, :1])
-    assert (basis.determinant * straight > 0.3 * np.abs(basis.determinant).max(axis=1, keepdims=True)).all()
+    assert (
+        basis.determinant * straight > 0.3 * np.abs(basis.determinant).max(axis=1, keepdims=True)
+    ).all()
     assert (tagged.facets.values == 7).all()
 
 
 @pytest.mark.mpi
 def test_an_error_of_rank_0_is_raised_on_every_rank(comm):
-    """No rank waits for a mesh that never comes, and the next mesh is not built on what is left of the failed one."""
+    """No rank waits for a mesh that never comes, and the next mesh is not built on what is left of
+    the failed one."""
     fresh = gmsh_to_mesh(comm, square).mesh
     with pytest.raises(RuntimeError, match="no such joint"):
         gmsh_to_mesh(comm, broken)

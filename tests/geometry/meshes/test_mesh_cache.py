@@ -1,4 +1,5 @@
-"""Kept meshes: the same to the last bit as new ones, on any number of ranks, told apart by all that shapes them."""
+"""Kept meshes: the same to the last bit as new ones, on any number of ranks, told apart by all that
+shapes them."""
 
 import pickle
 import time
@@ -11,7 +12,14 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 
 QUARTER = {"radius": 2.0, "clearance": 0.02, "block_size": 20.0, "element_size": 0.6, "growth": 1.0}
-RING = {"radius": 2.0, "clearance": 0.02, "outer_radius": 20.0, "element_size": 0.6, "growth": 1.0, "core_radius": 0.2}
+RING = {
+    "radius": 2.0,
+    "clearance": 0.02,
+    "outer_radius": 20.0,
+    "element_size": 0.6,
+    "growth": 1.0,
+    "core_radius": 0.2,
+}
 
 
 @pytest.fixture
@@ -33,7 +41,8 @@ def content(model: TaggedMesh) -> list[np.ndarray]:
 @pytest.mark.parametrize(("mesh", "sizes"), [(quarter_joint, QUARTER), (half_ring, RING)])
 @pytest.mark.parametrize("degree", [2, 3])
 def test_a_kept_mesh_is_the_one_that_was_made(comm, made, monkeypatch, mesh, sizes, degree):
-    """Every array and name of it; on rank 0 gmsh ran once, and each time where no mesh is to be kept."""
+    """Every array and name of it; on rank 0 gmsh ran once, and each time where no mesh is to be
+    kept."""
     monkeypatch.setenv("ARCHORD_KEEP_MESHES", "0")
     first = mesh(comm, **sizes, degree=degree)
     mesh(comm, **sizes, degree=degree)
@@ -50,7 +59,9 @@ def test_a_kept_mesh_is_the_one_that_was_made(comm, made, monkeypatch, mesh, siz
 def test_the_size_of_a_joint_does_not_matter_but_all_its_ratios_do(comm, made):
     """In other units it is the same mesh; any other shape or size of elements is another."""
     first = quarter_joint(comm, **QUARTER).mesh.geometry.x
-    twice = quarter_joint(comm, **{k: 2 * v if k != "growth" else v for k, v in QUARTER.items()}).mesh.geometry.x
+    twice = quarter_joint(
+        comm, **{k: 2 * v if k != "growth" else v for k, v in QUARTER.items()}
+    ).mesh.geometry.x
     assert (twice == 2 * first).all()
     assert len(made) == 1
     for key in ("clearance", "block_size", "element_size", "growth"):
@@ -80,7 +91,8 @@ def test_the_mesh_not_used_for_longest_is_forgotten(comm, made, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "spoil", [lambda path: path.write_bytes(b"x"), lambda path: path.write_bytes(path.read_bytes()[:300])]
+    "spoil",
+    [lambda path: path.write_bytes(b"x"), lambda path: path.write_bytes(path.read_bytes()[:300])],
 )
 def test_a_file_that_is_no_mesh_is_made_again(comm, made, tmp_path, spoil):
     first = content(quarter_joint(comm, **QUARTER))
@@ -100,7 +112,8 @@ class Planted:
 
 @pytest.mark.parametrize("mode", [0o600, 0o666])
 def test_nothing_in_the_cache_is_run(comm, made, tmp_path, mode):
-    """A planted pickle is no mesh; a mesh that others may write is made again, and kept for this user alone."""
+    """A planted pickle is no mesh; a mesh that others may write is made again, and kept for this
+    user alone."""
     first = content(quarter_joint(comm, **QUARTER))
     (path,) = tmp_path.glob("meshes/*.mesh")
     if mode == 0o600:

@@ -31,11 +31,19 @@ def draw(order, quads=False, size=0.5):
     model.occ.addDisk(0, 0, 0, 1.01, 1.01, hole)
     model.occ.cut([(2, plate)], [(2, hole)])
     model.occ.synchronize()
-    arc, edges = model.getBoundary([(2, disc)])[0][1], [abs(line) for _, line in model.getBoundary([(2, plate)])]
+    arc, edges = (
+        model.getBoundary([(2, disc)])[0][1],
+        [abs(line) for _, line in model.getBoundary([(2, plate)])],
+    )
     hole = [line for line in edges if np.ptp(model.getBoundingBox(1, line)) < 3]
     for name, faces in {"pin": [disc], "plate": [plate], "all": [disc, plate]}.items():
         model.addPhysicalGroup(2, faces, name=name)
-    for name, lines in {"arc": [arc], "hole": hole, "rim": sorted(set(edges) - set(hole)), "plate": edges}.items():
+    for name, lines in {
+        "arc": [arc],
+        "hole": hole,
+        "rim": sorted(set(edges) - set(hole)),
+        "plate": edges,
+    }.items():
         model.addPhysicalGroup(1, lines, name=name)
     model.addPhysicalGroup(0, [model.getBoundary([(1, arc)], combined=False)[0][1]], name="east")
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
@@ -55,16 +63,21 @@ def module():
 
 
 def content(mesh):
-    """Kind and order, and of every set the number of its entities and their measure; over all ranks."""
+    """Kind and order, and of every set the number of its entities and their measure; over all
+    ranks."""
     dolfinx_mesh, comm, found = mesh.mesh, mesh.mesh.comm, {}
 
     def total(measure):
-        return comm.allreduce(fem.assemble_scalar(fem.form(fem.Constant(dolfinx_mesh, 1.0) * measure)))
+        return comm.allreduce(
+            fem.assemble_scalar(fem.form(fem.Constant(dolfinx_mesh, 1.0) * measure))
+        )
 
     n = dolfinx_mesh.topology.index_map(2).size_local
     for name in mesh.cell_sets:
         cells = mesh.cells_in(name)[mesh.cells_in(name) < n]
-        dx = ufl.Measure("dx", dolfinx_mesh, subdomain_data=[(1, cells)], metadata={"quadrature_degree": 8})
+        dx = ufl.Measure(
+            "dx", dolfinx_mesh, subdomain_data=[(1, cells)], metadata={"quadrature_degree": 8}
+        )
         found["cells", name] = comm.allreduce(len(cells)), total(dx(1))
     for name in mesh.facet_sets:
         facets = np.sort(mesh.facets_in(name))
@@ -82,18 +95,25 @@ def like(measures):
 @pytest.mark.parametrize("quads", [False, True])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_every_format_gives_the_same_mesh(module, tmp_path, order, quads):
-    """All versions of gmsh's files, its live model, dolfinx's meshes and files, and Abaqus' input."""
+    """All versions of gmsh's files, its live model, dolfinx's meshes and files, and Abaqus'
+    input."""
     draw(order, quads)
     expected = read_mesh(gmsh, MPI.COMM_WORLD)
     kind, degree, measures = content(expected)
     assert (kind, degree) == ("quadrilateral" if quads else "triangle", order)
-    assert measures["cells", "all"][0] == measures["cells", "pin"][0] + measures["cells", "plate"][0]
+    assert (
+        measures["cells", "all"][0] == measures["cells", "pin"][0] + measures["cells", "plate"][0]
+    )
     np.testing.assert_allclose(expected.point_sets["east"], [[1, 0]], atol=1e-12)
     for version, binary in ((4.1, 0), (4.1, 1), (2.2, 0)):
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.write(str(tmp_path / "disc.msh"))
-        assert content(read_mesh(tmp_path / "disc.msh", MPI.COMM_WORLD)) == (kind, degree, like(measures))
+        assert content(read_mesh(tmp_path / "disc.msh", MPI.COMM_WORLD)) == (
+            kind,
+            degree,
+            like(measures),
+        )
     assert content(read_mesh(expected, MPI.COMM_WORLD)) == (kind, degree, like(measures))
     if order == 3:
         return  # dolfinx writes no tags of cubic lines
@@ -185,7 +205,8 @@ def deck(tmp_path):
 
 @pytest.mark.mpi
 def test_an_input_deck_of_sets_and_surfaces(comm, deck):
-    """Eight nodes become nine; names in any case, by number, by set, generated; sides as curved as their nodes say."""
+    """Eight nodes become nine; names in any case, by number, by set, generated; sides as curved as
+    their nodes say."""
     mesh = read_mesh(deck(), comm)
     kind, order, found = content(mesh)
     assert (kind, order) == ("quadrilateral", 2)
@@ -207,13 +228,20 @@ def test_an_input_deck_of_sets_and_surfaces(comm, deck):
     [
         (" 3, 2., 0.", "  ** half of them\n 3, 2., 0."),
         ("*ELEMENT, TYPE=CPE8R, ELSET=Left", "*ELEMENT, TYPE=CPE8R,\n ELSET=Left"),
-        ("*NSET, NSET=floor\n 1, 2, 3,", '*NSET, NSET="some of it"\n 1, 2\n*NSET, NSET=floor\n "some of it", 3,'),
+        (
+            "*NSET, NSET=floor\n 1, 2, 3,",
+            '*NSET, NSET="some of it"\n 1, 2\n*NSET, NSET=floor\n "some of it", 3,',
+        ),
         ("*INCLUDE, INPUT=more.inp\n", "*NODE, NSET=Nall, INPUT=more.inp\n"),
     ],
 )
 def test_what_an_input_deck_may_look_like(comm, deck, old, new):
-    """Comments, keywords on two lines and names between quotes, and data in other files lose nothing."""
-    expected, found = content(read_mesh(deck(), comm))[2], content(read_mesh(deck((old, new)), comm))[2]
+    """Comments, keywords on two lines and names between quotes, and data in other files lose
+    nothing."""
+    expected, found = (
+        content(read_mesh(deck(), comm))[2],
+        content(read_mesh(deck((old, new)), comm))[2],
+    )
     assert {key: found[key] for key in expected} == like(expected)
 
 
@@ -225,8 +253,16 @@ def test_what_an_input_deck_may_look_like(comm, deck, old, new):
         (" Both, S3", " Bath, S3", "there is no .ELSET 'Bath'"),
         (" Both, S3", " Both, S5", "surface 'Top' has the face 'S5', which is none of S1 to S4"),
         (" 8, 2, 3,", " 8, 2, 99,", "no node with the number 99"),
-        ("*ELSET, ELSET=right\n 8,", "*ELSET, ELSET=right\n 9,", "no element of the set 'right' with the number 9"),
-        ("*ELSET, ELSET=right", "*ELGEN, ELSET=right\n 7, 2, 1, 1\n*ELSET, ELSET=right", "ELGEN is not read"),
+        (
+            "*ELSET, ELSET=right\n 8,",
+            "*ELSET, ELSET=right\n 9,",
+            "no element of the set 'right' with the number 9",
+        ),
+        (
+            "*ELSET, ELSET=right",
+            "*ELGEN, ELSET=right\n 7, 2, 1, 1\n*ELSET, ELSET=right",
+            "ELGEN is not read",
+        ),
         ("*NODE, NSET=Nall", "*NODE, NSET=Nall, SYSTEM=C", "in rectangular coordinates"),
         (" 12, 1., 1.", " 12, 1., 1.\n 12, 1., 2.", "the node 12 is there twice"),
         (" 8, 2, 3,", " 7, 2, 3,", "the element 7 is there twice"),
@@ -234,8 +270,16 @@ def test_what_an_input_deck_may_look_like(comm, deck, old, new):
         ("more.inp", "mroe.inp", "No such file"),
         (" 12, 1., 1.", " 12, 1., 1., 0.5", "not plane: z differs"),
         (" 3, 2., 0.", " 3, 2., nan", "not finite"),
-        (" 12, 1., 1.", " 12, .1, .1", "cells are folded .* in 'Left' and 'BOTH' and 'again': its Jacobian"),
-        (" 7, 1, 2, 12, 11,", " 7, 1, 2, 12, 12,", "1 cells have a node twice, .* must not be collapsed"),
+        (
+            " 12, 1., 1.",
+            " 12, .1, .1",
+            "cells are folded .* in 'Left' and 'BOTH' and 'again': its Jacobian",
+        ),
+        (
+            " 7, 1, 2, 12, 11,",
+            " 7, 1, 2, 12, 12,",
+            "1 cells have a node twice, .* must not be collapsed",
+        ),
     ],
 )
 def test_a_deck_gone_wrong_is_refused_in_a_sentence(comm, deck, old, new, said):
@@ -265,7 +309,10 @@ def test_solids_and_lines_say_what_they_are(module, tmp_path, comm):
 
 def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
     (tmp_path / "mesh.stl").touch()
-    for path, said in ((tmp_path / "mesh.stl", "none of the files"), (tmp_path / "no.msh", "No such file")):
+    for path, said in (
+        (tmp_path / "mesh.stl", "none of the files"),
+        (tmp_path / "no.msh", "No such file"),
+    ):
         with pytest.raises(ValueError, match=said):
             read_mesh(path, comm)
     draw(1)
@@ -283,7 +330,8 @@ def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
 @pytest.mark.mpi
 @pytest.mark.parametrize("quads", [False, True])
 def test_refined_and_raised_meshes_become_round(comm, quads, tmp_path):
-    """The area of the disc: second-order arcs are off by h^4, and straight ones by h^2; other sets keep theirs."""
+    """The area of the disc: second-order arcs are off by h^4, and straight ones by h^2; other sets
+    keep theirs."""
     path = tmp_path / "disc.msh"
     if comm.rank == 0:
         gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -301,7 +349,9 @@ def test_refined_and_raised_meshes_become_round(comm, quads, tmp_path):
             assert found["facets", "rim"] == (found["facets", "rim"][0], pytest.approx(16.0))
             off[order, times] = abs(found["cells", "pin"][1] / np.pi - 1), found["cells", "pin"][0]
         assert off[order, 1][1] == 4 * off[order, 0][1]
-        assert off[order, 0][0] / off[order, 1][0] == pytest.approx(4 if order == 1 else 16, rel=0.1)
+        assert off[order, 0][0] / off[order, 1][0] == pytest.approx(
+            4 if order == 1 else 16, rel=0.1
+        )
     np.testing.assert_allclose(mesh.point_sets["east"], [[1, 0]], atol=1e-9)
 
 
@@ -316,7 +366,9 @@ def test_nodes_within_cubic_cells_follow_the_circles(module, quads):
         f, x = fem.Function(fem.functionspace(mesh, ("Lagrange", 3))), ufl.SpatialCoordinate(mesh)
         f.interpolate(lambda x: np.sin(3 * x[0] + x[1]))
         dx = ufl.dx(metadata={"quadrature_degree": 8})
-        off.append(fem.assemble_scalar(fem.form(abs(f - ufl.sin(3 * x[0] + x[1])) ** 4 * dx)) ** 0.25)
+        off.append(
+            fem.assemble_scalar(fem.form(abs(f - ufl.sin(3 * x[0] + x[1])) ** 4 * dx)) ** 0.25
+        )
     assert off[0] / off[1] == pytest.approx(16, rel=0.2)
 
 
@@ -335,11 +387,13 @@ def test_a_mesh_is_gathered_as_it_was_read(comm, deck):
 def test_wrong_circles_and_orders_are_refused(comm, deck):
     path = deck()
     with pytest.raises(
-        ValueError, match=r"node \(2, 0\) of the facet set 'floor' is 1.8 off its circle, .* must be wrong$"
+        ValueError,
+        match=r"node \(2, 0\) of the facet set 'floor' is 1.8 off its circle, .* must be wrong$",
     ):
         read_mesh(path, comm, circles=[Circle("floor", (0.5, 1.0), 1e-3)])
     with pytest.raises(
-        ValueError, match=r"radius 1000 must be wrong; or is the mesh in metres. Then give mesh.scale = "
+        ValueError,
+        match=r"radius 1000 must be wrong; or is the mesh in metres. Then give mesh.scale = ",
     ):
         read_mesh(path, comm, circles=[Circle("floor", (0.0, 0.0), 1e3)])
     with pytest.raises(ValueError, match=r"no facet set 'flor' .did you mean 'floor'"):
@@ -357,7 +411,10 @@ def test_a_dolfinx_mesh_keeps_its_tags_under_names(comm):
     tags = meshtags(square, 1, facets, np.full(len(facets), 7, dtype=np.int32))
     assert list(tagged(square, facets=tags).facet_sets) == ["7"]
     named = tagged(square, facets=tags, facet_sets={"rim": 7})
-    assert content(read_mesh(named, comm, scale=2.0))[2]["facets", "rim"] == (12, pytest.approx(8.0))
+    assert content(read_mesh(named, comm, scale=2.0))[2]["facets", "rim"] == (
+        12,
+        pytest.approx(8.0),
+    )
     with pytest.raises(ValueError, match="'none' is empty"):
         tagged(square, facets=tags, facet_sets={"none": 8}).facets_in("none")
 
@@ -387,24 +444,30 @@ def test_dolfinx_meshes_that_are_not_plane_and_tags_in_the_wrong_place_are_refus
 
 
 def write_tags(path, *values):
-    """A square of 32 triangles of which each array of ``values`` is a tag, and its first vertex with the tag 5."""
+    """A square of 32 triangles of which each array of ``values`` is a tag, and its first vertex
+    with the tag 5."""
     square = create_unit_square(MPI.COMM_SELF, 4, 4)
     square.topology.create_connectivity(0, 2)
     corner = meshtags(square, 0, np.zeros(1, dtype=np.int32), np.full(1, 5, dtype=np.int32))
     with io.XDMFFile(MPI.COMM_SELF, path, "w") as file:
         file.write_mesh(square)
         for k, found in enumerate(values):
-            tags = meshtags(square, 2, np.arange(len(found), dtype=np.int32), found.astype(np.int32))
+            tags = meshtags(
+                square, 2, np.arange(len(found), dtype=np.int32), found.astype(np.int32)
+            )
             tags.name = f"tags {k}"
             file.write_meshtags(tags, square.geometry)
         file.write_meshtags(corner, square.geometry)
 
 
 def test_no_tag_of_an_xdmf_file_is_lost(comm, tmp_path):
-    """Large values are told apart, a value that two tags have is refused, and vertices are points."""
+    """Large values are told apart, a value that two tags have is refused, and vertices are
+    points."""
     write_tags(tmp_path / "large.xdmf", np.repeat([1000001, 1000002], 16))
     mesh = read_mesh(tmp_path / "large.xdmf", comm)
-    assert {key: n for key, (n, _) in content(mesh)[2].items()} == {("cells", f"100000{k}"): 16 for k in (1, 2)}
+    assert {key: n for key, (n, _) in content(mesh)[2].items()} == {
+        ("cells", f"100000{k}"): 16 for k in (1, 2)
+    }
     assert mesh.point_sets["5"].shape == (1, 2)
     write_tags(tmp_path / "twice.xdmf", np.repeat([1, 2], 16), np.ones(3))
     with pytest.raises(ValueError, match="two tags have the value 1"):

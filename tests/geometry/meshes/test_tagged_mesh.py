@@ -11,7 +11,8 @@ from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 
 
 def squares(gmsh):
-    """Two unit squares side by side that share an edge; sets "left", "right", "all", "bottom", "lower left"."""
+    """Two unit squares side by side that share an edge; sets "left", "right", "all", "bottom",
+    "lower left"."""
     for x in (0, 1):
         gmsh.model.occ.addRectangle(x, 0, 0, 1, 1)
     gmsh.model.occ.fragment([(2, 1)], [(2, 2)])
@@ -19,7 +20,13 @@ def squares(gmsh):
     for name, faces in {"left": [1], "right": [2], "all": [1, 2]}.items():
         gmsh.model.addPhysicalGroup(2, faces, name=name)
     low = [
-        [line for _, line in gmsh.model.getEntitiesInBoundingBox(x - 0.1, -0.1, -1, x + 1.1, 0.1, 1, 1)] for x in (0, 1)
+        [
+            line
+            for _, line in gmsh.model.getEntitiesInBoundingBox(
+                x - 0.1, -0.1, -1, x + 1.1, 0.1, 1, 1
+            )
+        ]
+        for x in (0, 1)
     ]
     gmsh.model.addPhysicalGroup(1, low[0] + low[1], name="bottom")
     gmsh.model.addPhysicalGroup(1, low[0], name="lower left")
@@ -29,7 +36,9 @@ def squares(gmsh):
 @pytest.fixture
 def mesh(comm):
     tagged = gmsh_to_mesh(comm, squares)
-    return replace(tagged, point_sets={"corner": np.array([[2.0, 1.0]]), "nowhere": np.array([[3.0, 1.0]])})
+    return replace(
+        tagged, point_sets={"corner": np.array([[2.0, 1.0]]), "nowhere": np.array([[3.0, 1.0]])}
+    )
 
 
 def middles(mesh, dim, entities):
@@ -72,7 +81,9 @@ def test_dofs_are_those_of_facets_points_or_cells(mesh, comm):
 
 
 def test_a_name_that_is_none_gets_the_list(mesh):
-    with pytest.raises(ValueError, match=r"no cell set 'lift' .did you mean 'left'..; there are 'left', 'right'"):
+    with pytest.raises(
+        ValueError, match=r"no cell set 'lift' .did you mean 'left'..; there are 'left', 'right'"
+    ):
         mesh.cells_in("lift")
     with pytest.raises(ValueError, match="no facet set 'x'; there are 'bottom', 'lower left'"):
         mesh.facets_in("x")

@@ -15,7 +15,9 @@ XDMF = """<Xdmf><Domain><Grid>
 <Geometry><DataItem Dimensions="{rows} 2" Format="HDF">{file}:/x</DataItem></Geometry>
 </Grid></Domain></Xdmf>"""
 HUGE = 10**12
-MSH = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n{0} {1} 1 {1}\n2 1 0 {1}\n1\n0 0 0\n$EndNodes\n"
+MSH = (
+    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n{0} {1} 1 {1}\n2 1 0 {1}\n1\n0 0 0\n$EndNodes\n"
+)
 OLD_MSH = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{1}\n1 0 0 0\n$EndNodes\n"
 SUFFIXES = (".msh", ".inp", ".xdmf", ".npz")
 
@@ -79,7 +81,10 @@ def test_hdf5_larger_than_memory_or_elsewhere(tmp_path):
         file.create_dataset("x", shape=(HUGE, 2), dtype="f8", chunks=(1024, 2))
     path.write_text(XDMF.format(rows=HUGE, file="mesh.h5"))
     assert "claims an array of 1.6e+04 GB, more than half of the machine's" in refused(path)
-    for name, said in (("../mesh.h5", "is not in its folder"), ("none.h5", "cannot be read: No such file")):
+    for name, said in (
+        ("../mesh.h5", "is not in its folder"),
+        ("none.h5", "cannot be read: No such file"),
+    ):
         path.write_text(XDMF.format(rows=3, file=name))
         assert f"names the file '{name}', which {said}" in refused(path)
 

@@ -40,7 +40,9 @@ def area(joint, body, comm=MPI.COMM_SELF):
 def facet_nodes(joint, name):
     """Coordinates ``(n, degree + 1, 2)`` of the nodes of a facet set."""
     joint.mesh.topology.create_connectivity(1, 2)
-    return joint.mesh.geometry.x[entities_to_geometry(joint.mesh, 1, joint.facets_in(name))][..., :2]
+    return joint.mesh.geometry.x[entities_to_geometry(joint.mesh, 1, joint.facets_in(name))][
+        ..., :2
+    ]
 
 
 def length(joint, name):

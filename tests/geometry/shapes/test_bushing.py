@@ -16,7 +16,9 @@ R, BORE, OUTER, SLEEVE = 10.0, 13.98, 30.0, (10.05, 14.0)
 WALLS = [(10.02, 10.22), (10.22, 10.42)]  # of 0.02 R
 
 
-def made(sleeves=(SLEEVE,), bore=BORE, outer=OUTER, size=1.0, comm=MPI.COMM_SELF, scale=1.0, **options):
+def made(
+    sleeves=(SLEEVE,), bore=BORE, outer=OUTER, size=1.0, comm=MPI.COMM_SELF, scale=1.0, **options
+):
     rings = [[scale * r for r in ring] for ring in [*sleeves, (bore, outer)]]
     return bushing(comm, scale * R, rings, scale * size, 0.3, **options)
 
@@ -33,7 +35,10 @@ def test_areas_and_circles(sleeves, bore, touching, comm):
     sets = [*((f"{name} inside", f"{name} outside") for name in names), ("bore", "outer edge")]
     edge = R
     shift = (
-        sum(max(inner - within, 0) for (inner, _), within in zip(rings, [R, *(o for _, o in rings)], strict=False))
+        sum(
+            max(inner - within, 0)
+            for (inner, _), within in zip(rings, [R, *(o for _, o in rings)], strict=False)
+        )
         * touching
     )
     for name, pair, (inner, outer) in zip([*names, "housing"], sets, rings, strict=True):
@@ -59,7 +64,9 @@ def test_bodies_that_touch_do_so_on_the_axis():
 def test_thin_walls_have_two_layers_of_sound_triangles(sleeves):
     """Nodes of a P2 mesh at five depths; no edge longer than four times the shortest one."""
     joint = made(sleeves, sleeves[-1][1] - 0.01)
-    corners = joint.mesh.geometry.x[joint.mesh.geometry.dofmap[joint.cells_in("sleeve 1")][:, :3], :2]
+    corners = joint.mesh.geometry.x[
+        joint.mesh.geometry.dofmap[joint.cells_in("sleeve 1")][:, :3], :2
+    ]
     radii = np.linalg.norm(corners.reshape(-1, 2), axis=1)
     assert len(np.unique(radii.round(6))) == 3
     edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
@@ -68,39 +75,58 @@ def test_thin_walls_have_two_layers_of_sound_triangles(sleeves):
 
 def test_meshes_do_not_depend_on_units():
     in_mm, in_m = made(), made(scale=1e-3)
-    np.testing.assert_allclose(in_m.mesh.geometry.x, 1e-3 * in_mm.mesh.geometry.x, rtol=1e-13, atol=1e-17)
+    np.testing.assert_allclose(
+        in_m.mesh.geometry.x, 1e-3 * in_mm.mesh.geometry.x, rtol=1e-13, atol=1e-17
+    )
 
 
-def lame(pressure: float, inner: float, outer: float, material: Elastic, *, held: bool) -> tuple[float, float]:
-    """Radial displacement at inner and outer radius of a ring in plane strain, with the pressure within and held
-    outside, or with it outside and free within: u = a r + b/r, sigma_r = 2 G (a/(1 - 2 nu) - b/r^2)."""
+def lame(
+    pressure: float, inner: float, outer: float, material: Elastic, *, held: bool
+) -> tuple[float, float]:
+    """Radial displacement at inner and outer radius of a ring in plane strain, with the pressure
+    within and held outside, or with it outside and free within: u = a r + b/r, sigma_r = 2 G (a/(1
+    - 2 nu) - b/r^2)."""
     G, k = material.E / 2 / (1 + material.nu), 1 - 2 * material.nu
     at = lambda r: [2 * G / k, -2 * G / r**2]  # noqa: E731
     rows, right = (
-        ([at(inner), [outer, 1 / outer]], [-pressure, 0]) if held else ([at(inner), at(outer)], [0, -pressure])
+        ([at(inner), [outer, 1 / outer]], [-pressure, 0])
+        if held
+        else ([at(inner), at(outer)], [0, -pressure])
     )
     a, b = np.linalg.solve(rows, right)
     return a * inner + b / inner, a * outer + b / outer
 
 
 def test_a_press_fit_follows_lame():
-    """Pressure and radial displacements of a bronze sleeve pressed into aluminium, 0.02 on a radius of 14; what is left
-    is of the order of the displacement over the radius, as contact closes the gap of the deformed bodies."""
-    bronze, aluminium, steel = (Elastic(E, nu, "strain") for E, nu in ((110e3, 0.34), (70e3, 0.33), (210e3, 0.3)))
-    unit = lame(1.0, BORE, OUTER, aluminium, held=True)[0] - lame(1.0, *SLEEVE, bronze, held=False)[1]
+    """Pressure and radial displacements of a bronze sleeve pressed into aluminium, 0.02 on a radius
+    of 14; what is left is of the order of the displacement over the radius, as contact closes the
+    gap of the deformed bodies."""
+    bronze, aluminium, steel = (
+        Elastic(E, nu, "strain") for E, nu in ((110e3, 0.34), (70e3, 0.33), (210e3, 0.3))
+    )
+    unit = (
+        lame(1.0, BORE, OUTER, aluminium, held=True)[0] - lame(1.0, *SLEEVE, bronze, held=False)[1]
+    )
     pressure = (SLEEVE[1] - BORE) / unit
     assert pressure == pytest.approx(47.526, abs=1e-3)
     joint = made(size=0.5)
     supports = [Support("outer edge", "outer edge", axis) for axis in (0, 1)]
     supports += [Support("flat", "flat", 0, 1.0), Support("axis", "axis", 1)]
     bodies = [Body("pin", steel), Body("sleeve 1", bronze), Body("housing", aluminium)]
-    contacts = [Interaction("play", ("pin", "sleeve 1 inside")), Interaction("fit", ("sleeve 1 outside", "bore"))]
+    contacts = [
+        Interaction("play", ("pin", "sleeve 1 inside")),
+        Interaction("fit", ("sleeve 1 outside", "bore")),
+    ]
     system = System(Problem(joint, bodies, contacts, supports, symmetry=2.0, from_rest=False))
     system.solve([0.0])
     inside, outside = lame(pressure, *SLEEVE, bronze, held=False)
     bore, _ = lame(pressure, BORE, OUTER, aluminium, held=True)
     u = system.equilibrium.displacement()
-    for name, expected in (("sleeve 1 inside", inside), ("sleeve 1 outside", outside), ("bore", bore)):
+    for name, expected in (
+        ("sleeve 1 inside", inside),
+        ("sleeve 1 outside", outside),
+        ("bore", bore),
+    ):
         nodes = joint.dofs_in(system.V, name)
         x = system.V.tabulate_dof_coordinates()[nodes, :2]
         radial = (u[nodes] * x).sum(axis=1) / np.linalg.norm(x, axis=1)

@@ -29,10 +29,13 @@ def joint():
 
 
 def facet_nodes(joint, tag):
-    """Coordinates ``(n, 3, 2)`` of the nodes of the tagged facets: two vertices and the midpoint."""
+    """Coordinates ``(n, 3, 2)`` of the nodes of the tagged facets: two vertices and the
+    midpoint."""
     mesh = joint.mesh
     mesh.topology.create_connectivity(1, 2)
-    return mesh.geometry.x[dolfinx_mesh.entities_to_geometry(mesh, 1, joint.facets.find(tag))][..., :2]
+    return mesh.geometry.x[dolfinx_mesh.entities_to_geometry(mesh, 1, joint.facets.find(tag))][
+        ..., :2
+    ]
 
 
 def edge_lengths(joint, tag):
@@ -44,7 +47,9 @@ def area(joint, tag, comm=MPI.COMM_SELF):
     n_owned = joint.mesh.topology.index_map(2).size_local
     cells = joint.cells.find(tag)
     X, w = bulk_quadrature(TRIANGLE, 2)
-    return comm.allreduce(float((cell_basis(joint.mesh, 2, cells[cells < n_owned], X).measure @ w).sum()))
+    return comm.allreduce(
+        float((cell_basis(joint.mesh, 2, cells[cells < n_owned], X).measure @ w).sum())
+    )
 
 
 def sector(radius, n):
@@ -55,7 +60,8 @@ def sector(radius, n):
 
 
 def test_elements_shrink_toward_the_edge_of_the_contact():
-    """Edges of both arcs are a quarter as long at the given angle, and elsewhere no longer than without it."""
+    """Edges of both arcs are a quarter as long at the given angle, and elsewhere no longer than
+    without it."""
     angle, fine = 1.1, SIZE / 4
     joint = made(edge=(angle, fine))
     for tag, centre in ((Facets.PIN_ARC, -DR), (Facets.HOLE_ARC, 0.0)):
@@ -68,8 +74,9 @@ def test_elements_shrink_toward_the_edge_of_the_contact():
 
 
 def test_arcs_are_where_they_belong(joint):
-    """All nodes on their radius to the last bit but one, as the clearance is a small difference of large numbers; from
-    the symmetry axis to the height of the centre, with equal edges (to gmsh's 1e-8); touching at (0, -R - dR) alone."""
+    """All nodes on their radius to the last bit but one, as the clearance is a small difference of
+    large numbers; from the symmetry axis to the height of the centre, with equal edges (to gmsh's
+    1e-8); touching at (0, -R - dR) alone."""
     for tag, radius, centre in ((Facets.PIN_ARC, R, -DR), (Facets.HOLE_ARC, R + DR, 0.0)):
         x = facet_nodes(joint, tag) - [0, centre]
         assert np.abs(np.linalg.norm(x, axis=-1) - radius).max() < 1e-15
@@ -85,8 +92,8 @@ def test_arcs_are_where_they_belong(joint):
 @pytest.mark.mpi
 @pytest.mark.parametrize("size", [0.2, 0.1])
 def test_areas_and_edges(size, comm):
-    """A quarter disc, and a square without one: exact for parabolic arcs, whose edges are no longer than the element
-    size, and no shorter than a whole number of them asks for."""
+    """A quarter disc, and a square without one: exact for parabolic arcs, whose edges are no longer
+    than the element size, and no shorter than a whole number of them asks for."""
     joint = made(size, comm=comm)
     n = int(np.ceil(np.pi / 2 / size))
     for tag in (Facets.PIN_ARC, Facets.HOLE_ARC):
@@ -101,7 +108,8 @@ def test_areas_and_edges(size, comm):
 @pytest.mark.parametrize("ring", [False, True], ids=["quarter joint", "half ring"])
 @pytest.mark.parametrize(("size", "size_ratio"), [(0.2, 0.05), (0.01, 20.0)])
 def test_pin_and_block_can_have_elements_of_their_own(ring, size, size_ratio):
-    """1:20 and 20:1: each arc has its own edges, each body its own number of triangles, none of them a sliver."""
+    """1:20 and 20:1: each arc has its own edges, each body its own number of triangles, none of
+    them a sliver."""
     joint = made(size, ring=ring, size_ratio=size_ratio)
     for tag, longest in ((Facets.HOLE_ARC, size), (Facets.PIN_ARC, size_ratio * size)):
         lengths = edge_lengths(joint, tag)
@@ -110,12 +118,17 @@ def test_pin_and_block_can_have_elements_of_their_own(ring, size, size_ratio):
     assert (numbers[0] > 4 * numbers[1]) == (size_ratio < 1)
     corners = joint.mesh.geometry.x[joint.mesh.geometry.dofmap[:, :3], :2]
     edge, following = (np.roll(corners, -i, axis=1) - corners for i in (1, 2))
-    cosine = (edge * following).sum(axis=-1) / np.linalg.norm(edge, axis=-1) / np.linalg.norm(following, axis=-1)
+    cosine = (
+        (edge * following).sum(axis=-1)
+        / np.linalg.norm(edge, axis=-1)
+        / np.linalg.norm(following, axis=-1)
+    )
     assert np.degrees(np.arccos(cosine)).min() > 15
 
 
 def test_edges_grow_with_the_distance(joint):
-    """Around element_size + growth * distance, to the accuracy gmsh keeps: within a factor 2, 25 % in the mean."""
+    """Around element_size + growth * distance, to the accuracy gmsh keeps: within a factor 2, 25 %
+    in the mean."""
     corners = joint.mesh.geometry.x[joint.mesh.geometry.dofmap[:, :3], :2]
     following = np.roll(corners, 1, axis=1)
     distance = np.abs(np.linalg.norm((corners + following) / 2, axis=-1) - R - DR)
@@ -138,15 +151,22 @@ def test_a_whole_pin_has_a_free_half_above(joint):
     assert area(whole, Cells.PIN) == pytest.approx(2 * area(joint, Cells.PIN), rel=1e-9)
     assert area(whole, Cells.BLOCK) == pytest.approx(area(joint, Cells.BLOCK), rel=1e-12)
     for tag in (Facets.PIN_ARC, Facets.HOLE_ARC, Facets.PIN_TOP, Facets.BLOCK_HELD):
-        assert edge_lengths(whole, tag).sum() == pytest.approx(edge_lengths(joint, tag).sum(), rel=1e-12)
+        assert edge_lengths(whole, tag).sum() == pytest.approx(
+            edge_lengths(joint, tag).sum(), rel=1e-12
+        )
     x = facet_nodes(whole, whole.facet_sets["pin back"][0]) - [0, -DR]
     np.testing.assert_allclose(np.linalg.norm(x, axis=-1), R, rtol=1e-15)
     assert x[..., 1].min() > -1e-15
 
 
 def test_tagged_edges_are_where_their_names_say(joint):
-    """Tops on y = 0 and y = -dR, symmetry on x = 0 along pin and block, each with its full length."""
-    for tag, axis, place in ((Facets.PIN_TOP, 1, -DR), (Facets.BLOCK_HELD, 1, 0), (Facets.SYMMETRY, 0, 0)):
+    """Tops on y = 0 and y = -dR, symmetry on x = 0 along pin and block, each with its full
+    length."""
+    for tag, axis, place in (
+        (Facets.PIN_TOP, 1, -DR),
+        (Facets.BLOCK_HELD, 1, 0),
+        (Facets.SYMMETRY, 0, 0),
+    ):
         np.testing.assert_allclose(facet_nodes(joint, tag)[..., axis], place, atol=1e-15)
     assert edge_lengths(joint, Facets.PIN_TOP).sum() == pytest.approx(R)
     assert edge_lengths(joint, Facets.BLOCK_HELD).sum() == pytest.approx(W - R - DR)
@@ -154,20 +174,33 @@ def test_tagged_edges_are_where_their_names_say(joint):
 
 
 @pytest.mark.parametrize(
-    ("size", "growth", "width"), [(0.2, 0.4, 10.0), (0.02, 0.25, 100.0), (0.1, 0.05, 20.0), (0.01, 1.0, 3.0)]
+    ("size", "growth", "width"),
+    [(0.2, 0.4, 10.0), (0.02, 0.25, 100.0), (0.1, 0.05, 20.0), (0.01, 1.0, 3.0)],
 )
 def test_the_expected_number_of_triangles_is_about_what_the_mesh_has(size, growth, width):
     """The scene model refuses meshes by this estimate before they are made."""
-    keys = {"radius": R, "clearance": DR, "block_size": width, "relative_element_size": size, "growth": growth}
+    keys = {
+        "radius": R,
+        "clearance": DR,
+        "block_size": width,
+        "relative_element_size": size,
+        "growth": growth,
+    }
     cells = made(size, growth, width).mesh.topology.index_map(2).size_global
     assert 0.5 < JointGeometry(**keys).expected_cells / cells < 1.5
 
 
-@pytest.mark.parametrize(("ring", "degree"), [(False, 3), (True, 2)], ids=["quarter joint", "half ring"])
+@pytest.mark.parametrize(
+    ("ring", "degree"), [(False, 3), (True, 2)], ids=["quarter joint", "half ring"]
+)
 def test_a_mesh_made_by_cutting_is_like_one_made_at_once(ring, degree):
-    """The same edges on the arcs, nodes on their circles to the last digits, few more triangles, the same areas."""
+    """The same edges on the arcs, nodes on their circles to the last digits, few more triangles,
+    the same areas."""
     at_once, cut = (made(0.02, 0.05, ring=ring, degree=degree, refinements=k) for k in (0, 2))
-    for tag, radius, centre in ((Facets.HOLE_ARC, R + DR, 0.0), (Facets.PIN_ARC, R, 0.0 if ring else -DR)):
+    for tag, radius, centre in (
+        (Facets.HOLE_ARC, R + DR, 0.0),
+        (Facets.PIN_ARC, R, 0.0 if ring else -DR),
+    ):
         assert len(cut.facets.find(tag)) == pytest.approx(len(at_once.facets.find(tag)), abs=6)
         assert edge_lengths(cut, tag).max() <= 0.02 * (1 + DR)
         x = facet_nodes(cut, tag).reshape(-1, 2) - [0, centre]

@@ -1,4 +1,5 @@
-"""Functions of a Modelica package as Python's, statement by statement: enough to run what an export holds."""
+"""Functions of a Modelica package as Python's, statement by statement: enough to run what an export
+holds."""
 
 from __future__ import annotations
 
@@ -9,10 +10,14 @@ from typing import Any
 def functions_of(package: str) -> dict[str, Any]:
     """The package's functions and tables by name; tables count from 1, and asserts are left out."""
     lines = ["from math import log, sqrt", "def div(a, b): return a // b"]
-    for name, value in re.findall(r"constant (?:Real|Integer) (\w+)(?:\[\d+\])? = (.*?);", package, re.S):
+    for name, value in re.findall(
+        r"constant (?:Real|Integer) (\w+)(?:\[\d+\])? = (.*?);", package, re.S
+    ):
         lines.append(f"{name} = {value.replace('{', '[None, ').replace('}', ']')}")
     for name, body in re.findall(r'function (\w+) "[^"]*"\n(.*?)  end \1;', package, re.S):
-        inputs, outputs = (", ".join(re.findall(rf"{kind} \w+ (\w+)", body)) for kind in ("input", "output"))
+        inputs, outputs = (
+            ", ".join(re.findall(rf"{kind} \w+ (\w+)", body)) for kind in ("input", "output")
+        )
         lines.append(f"def {name}({inputs}):")
         depth = 1
         for statement in re.findall(r"    (\S.*)\n", body.split("algorithm\n")[1]):

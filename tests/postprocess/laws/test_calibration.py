@@ -19,7 +19,9 @@ DRAWS = 80
 
 
 @pytest.mark.parametrize("quantity", ["P", "p0"])
-@pytest.mark.parametrize(("k", "c", "sigY"), [(0.83, None, None), (0.83, 1.0, 0.002), (0.7, 1.6, 0.001)])
+@pytest.mark.parametrize(
+    ("k", "c", "sigY"), [(0.83, None, None), (0.83, 1.0, 0.002), (0.7, 1.6, 0.001)]
+)
 def test_exact_data_give_their_law_back(quantity, k, c, sigY):
     """k, and c where the joint yields, to round-off of the search; R2 = 1 and no error."""
     found = fit_curve(group([curve(k, c, sigY=sigY)]), quantity=quantity)
@@ -29,9 +31,12 @@ def test_exact_data_give_their_law_back(quantity, k, c, sigY):
     assert found.quality[0] == pytest.approx(1, abs=1e-12)
 
 
-@pytest.mark.parametrize(("quantity", "c", "sigY"), [("P", None, None), ("p0", None, None), ("P", 1.3, 0.002)])
+@pytest.mark.parametrize(
+    ("quantity", "c", "sigY"), [("P", None, None), ("p0", None, None), ("P", 1.3, 0.002)]
+)
 def test_the_interval_covers_the_truth_as_often_as_it_says(quantity, c, sigY):
-    """Noise of 1 % of E* dR, many times: intervals hold k (and c) at their level, within 3 binomial sigmas."""
+    """Noise of 1 % of E* dR, many times: intervals hold k (and c) at their level, within 3 binomial
+    sigmas."""
     truth = {"k": 0.83} | ({"c": c} if c else {})
     held = dict.fromkeys(truth, 0)
     for seed in range(DRAWS):
@@ -50,7 +55,9 @@ def test_the_error_of_k_is_that_of_a_straight_line():
     y, x = run.p0 / 0.005, LOADS
     k = (x @ y) / (x @ x)
     assert found.k.value == pytest.approx(k, rel=1e-8)
-    assert found.k.error == pytest.approx(np.sqrt(((y - k * x) ** 2).sum() / 19 / (x @ x)), rel=1e-6)
+    assert found.k.error == pytest.approx(
+        np.sqrt(((y - k * x) ** 2).sum() / 19 / (x @ x)), rel=1e-6
+    )
     off, r2 = k * x / y - 1, 1 - ((y - k * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
     quality = (r2, np.sqrt((off**2).mean()), max(off, key=abs), 20)
     assert found.quality == pytest.approx(quality, rel=1e-9)
@@ -68,13 +75,19 @@ def test_units_do_not_matter(c):
         assert b.joint.estimates[name].error == pytest.approx(found.error, rel=1e-5)
     law, other = a.law(), b.law()
     delta = np.array([0.3, 1.1, 2.0]) * 0.005
-    np.testing.assert_allclose(other.force(delta * 1e-2) / (2.1e11 * 1e-2), law.force(delta), rtol=1e-6)
+    np.testing.assert_allclose(
+        other.force(delta * 1e-2) / (2.1e11 * 1e-2), law.force(delta), rtol=1e-6
+    )
 
 
 def test_runs_of_other_clearance_and_strength_share_one_law():
-    """Four joints made with one k and c: the joint fit finds them, and the law is that of the first joint."""
+    """Four joints made with one k and c: the joint fit finds them, and the law is that of the first
+    joint."""
     joints = [(0.01, 0.004), (0.001, None), (0.005, 0.001), (0.002, 0.0005)]
-    runs = [curve(0.83, 1.2 if sigY else None, dR=dR, sigY=sigY, name=f"run{i}") for i, (dR, sigY) in enumerate(joints)]
+    runs = [
+        curve(0.83, 1.2 if sigY else None, dR=dR, sigY=sigY, name=f"run{i}")
+        for i, (dR, sigY) in enumerate(joints)
+    ]
     found = calibrate(runs)
     assert [fit.c is None for fit in found.each] == [False, True, False, False]
     assert found.joint.k.value == pytest.approx(0.83, rel=1e-8)
@@ -112,7 +125,9 @@ def test_before_yield_there_is_no_plateau_to_fit(quantity):
 
 def test_serial_correlation_tells_noise_from_a_wrong_shape():
     """White noise: near -1/n. A curve of another shape: near 1."""
-    noise = np.mean([fit_curve(group([curve(0.83, noise=0.01, seed=s)])).serial_correlation for s in range(40)])
+    noise = np.mean(
+        [fit_curve(group([curve(0.83, noise=0.01, seed=s)])).serial_correlation for s in range(40)]
+    )
     assert noise == pytest.approx(0, abs=0.15)
     run = curve(0.83)
     bent = replace(run, P=run.P * (1 - 0.1 * LOADS))
@@ -120,7 +135,8 @@ def test_serial_correlation_tells_noise_from_a_wrong_shape():
 
 
 def test_a_mesh_error_of_first_order_is_found_and_carried():
-    """Data off by 2 h/R: the fit to the finer run is off by as much, says so, and covers the truth."""
+    """Data off by 2 h/R: the fit to the finer run is off by as much, says so, and covers the
+    truth."""
     fine, coarse = (curve(0.83 * (1 + 2 * h), h=h, name=f"h{h}") for h in (0.02, 0.05))
     found = calibrate([coarse, fine])
     k = found.joint.k
@@ -129,12 +145,17 @@ def test_a_mesh_error_of_first_order_is_found_and_carried():
     assert k.error == pytest.approx(np.hypot(k.standard_error, k.discretisation_error))
     assert k.interval[0] < 0.83 < k.interval[1]
     assert [fit.k.discretisation_error for fit in found.each] == [None, k.discretisation_error]
-    stopped = replace(coarse, **{n: getattr(coarse, n)[:15] for n in ("delta", "P", "p0", "eps", "peeq_max")})
-    assert calibrate([stopped, fine]).joint.k.discretisation_error == pytest.approx(0.83 * 0.04, rel=1e-6)
+    stopped = replace(
+        coarse, **{n: getattr(coarse, n)[:15] for n in ("delta", "P", "p0", "eps", "peeq_max")}
+    )
+    assert calibrate([stopped, fine]).joint.k.discretisation_error == pytest.approx(
+        0.83 * 0.04, rel=1e-6
+    )
 
 
 def test_three_meshes_tell_the_order():
-    """Data off by A h^1.5, with ratios of mesh size that are no two alike: the error of k is exactly A h^1.5."""
+    """Data off by A h^1.5, with ratios of mesh size that are no two alike: the error of k is
+    exactly A h^1.5."""
     runs = [curve(0.83 * (1 + 2 * h**1.5), h=h, name=f"h{h}") for h in (0.03, 0.1, 0.05)]
     found = calibrate(runs).joint
     assert dict(found.orders)["h0.03"].value == pytest.approx(1.5, rel=1e-6)
@@ -155,7 +176,9 @@ def test_three_meshes_tell_the_order():
 )
 def test_the_order_is_bounded_or_assumed(errors, order, said):
     """Meshes of h = 1, 2, 4: differences in the ratio 2^p."""
-    runs = [curve(0.83 * e, h=h, name=f"h{h}") for e, h in zip(errors, (0.02, 0.04, 0.08), strict=True)]
+    runs = [
+        curve(0.83 * e, h=h, name=f"h{h}") for e, h in zip(errors, (0.02, 0.04, 0.08), strict=True)
+    ]
     (found,) = dict(calibrate(runs).joint.orders).values()
     assert (found.value, found.words) == (order, said)
 
@@ -173,7 +196,8 @@ def test_solved_runs(runs):
 
 
 def test_a_thickness_leaves_the_law_and_a_whole_pin_has_one_of_its_own(runs, tmp_path):
-    """P in history.csv is that of the thickness, P of a law never; k of a whole pin is told to be so."""
+    """P in history.csv is that of the thickness, P of a law never; k of a whole pin is told to be
+    so."""
     sections = {"analysis": {"thickness": 7.0}, "pin": {"whole": True}}
     thick = Run(solved({"thick": scene(0.1, 6, **sections)}, tmp_path)["thick"])
     half = Run(runs["elastic"]).curve
@@ -193,32 +217,48 @@ def joint_with(name, **sections):
 @pytest.mark.parametrize(
     ("second", "said"),
     [
-        (curve(0.83, name="other", analysis={"plane": "stress"}), "analysis.plane = 'stress' does not fit: run is in"),
+        (
+            curve(0.83, name="other", analysis={"plane": "stress"}),
+            "analysis.plane = 'stress' does not fit: run is in",
+        ),
         (curve(0.83, name="other", h=0.05, dR=0.005), "is the same scene on the same mesh as run"),
         (
             joint_with("other", block={"nu": 0.4}),
             "the Poisson's ratios or the ratio of the moduli are not ",
         ),
-        (joint_with("other", block={"yield_stress": 0.002, "hardening": 0.1}), "block.hardening = 0.1 does not fit"),
+        (
+            joint_with("other", block={"yield_stress": 0.002, "hardening": 0.1}),
+            "block.hardening = 0.1 does not fit",
+        ),
         (
             joint_with("other", pin={"whole": True}),
             "pin.whole = true does not fit: run has the other; one law is for one",
         ),
-        (joint_with("other", analysis={"friction": 0.2}), r"analysis.friction = 0\.2 does not fit: the law is for"),
+        (
+            joint_with("other", analysis={"friction": 0.2}),
+            r"analysis.friction = 0\.2 does not fit: the law is for",
+        ),
         (
             joint_with("other", analysis={"strain": "large"}),
             "analysis.strain = 'large' does not fit: run has the other",
         ),
-        (joint_with("other", analysis={"kinematics": "reference"}), "analysis.kinematics = 'reference' does not fit"),
+        (
+            joint_with("other", analysis={"kinematics": "reference"}),
+            "analysis.kinematics = 'reference' does not fit",
+        ),
         (
             joint_with("other", block={"yield_stress": 0.002, "back_stresses": [[1.0, 10.0]]}),
             "block.back_stresses does not fit: .* archord fit RUN --table FILE",
         ),
-        (joint_with("other", joint={"block_size": 5.0}), r"joint.block_size is 5 R and that of run 100 R, .* 5\.6%"),
+        (
+            joint_with("other", joint={"block_size": 5.0}),
+            r"joint.block_size is 5 R and that of run 100 R, .* 5\.6%",
+        ),
     ],
 )
 def test_runs_that_do_not_fit_together(second, said):
-    """One k is for one pair of materials in a plane, without hardening; a small block gives a softer joint."""
+    """One k is for one pair of materials in a plane, without hardening; a small block gives a
+    softer joint."""
     with pytest.raises(InputError, match=f"other: {said}"):
         calibrate([curve(0.83), second])
 
@@ -226,11 +266,16 @@ def test_runs_that_do_not_fit_together(second, said):
 def test_runs_whose_bodies_yield_otherwise_do_not_fit_together():
     """c depends on which body yields; elastic runs go with any."""
     block, both = (
-        replace(curve(0.83, 1.2, sigY=0.002), name=name, scene=scene(0.05, block={"yield_stress": 0.002}, **pin))
+        replace(
+            curve(0.83, 1.2, sigY=0.002),
+            name=name,
+            scene=scene(0.05, block={"yield_stress": 0.002}, **pin),
+        )
         for name, pin in (("block", {}), ("both", {"pin": {"yield_stress": 0.002}}))
     )
     with pytest.raises(
-        InputError, match=r"both: yield stresses \(both\) do not fit: block has them otherwise \(block\)"
+        InputError,
+        match=r"both: yield stresses \(both\) do not fit: block has them otherwise \(block\)",
     ):
         calibrate([block, both])
     assert calibrate([curve(0.83), block]).law().k == pytest.approx(0.83, rel=1e-3)

@@ -28,30 +28,38 @@ def test_plastic_law_is_the_force_of_the_cut_parabola(delta, k, c):
     l = 2 * JOINT.radius * np.sin(contact_angle(delta) / 2)  # noqa: E741
 
     def integral(a, b):
-        return 2 * l * quad(lambda t: min(p0 * (1 - t**2), plateau), a, b, epsabs=0, epsrel=1e-13)[0]
+        return (
+            2 * l * quad(lambda t: min(p0 * (1 - t**2), plateau), a, b, epsabs=0, epsrel=1e-13)[0]
+        )
 
     expected = integral(edge, 1) + (integral(0, edge) if edge else 0)
     assert plastic_winkler(joint, np.array(delta)).load == pytest.approx(expected, rel=1e-11)
     if delta <= 2 * JOINT.clearance:
         assert LAWS["paper-plastic"].force(joint, delta) == pytest.approx(expected, rel=1e-11)
-        assert LAWS["paper-plastic"].at_load(joint, expected).peak_pressure == pytest.approx(min(p0, plateau), rel=1e-9)
+        assert LAWS["paper-plastic"].at_load(joint, expected).peak_pressure == pytest.approx(
+            min(p0, plateau), rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("c", [1.0, 1.6])
 def test_up_to_the_onset_the_plastic_law_is_the_elastic_one(c):
-    """To round-off, and at delta0 Winkler's pressure is the plateau; without a yield stress, everywhere."""
+    """To round-off, and at delta0 Winkler's pressure is the plateau; without a yield stress,
+    everywhere."""
     joint = replace(JOINT, c=c)
     lower, deep = np.linspace(0, joint.first_yield, 7), 10 * joint.first_yield
     plastic, elastic = plastic_winkler(joint, lower), parabola(joint, lower)
     np.testing.assert_allclose(plastic.load, elastic.load, rtol=1e-14)
-    eq9 = 8 / 3 * joint.k * joint.E_star * DEPTHS * np.sqrt(DEPTHS / (2 * (joint.clearance + DEPTHS)))
+    eq9 = (
+        8 / 3 * joint.k * joint.E_star * DEPTHS * np.sqrt(DEPTHS / (2 * (joint.clearance + DEPTHS)))
+    )
     np.testing.assert_allclose(LAWS["paper"].force(joint, DEPTHS), eq9, rtol=1e-14)
     assert elastic.peak_pressure[-1] == pytest.approx(c * 300.0, rel=1e-14)
     assert parabola(joint, deep).load > plastic_winkler(joint, deep).load
 
 
 def test_at_first_touch_there_is_nothing():
-    """No force, pressure or stiffness at delta = 0, a little beyond; no floating point trouble on the way."""
+    """No force, pressure or stiffness at delta = 0, a little beyond; no floating point trouble on
+    the way."""
     with np.errstate(all="raise"):
         state = plastic_winkler(JOINT, np.array([0.0, 1e-30]))
     for nothing, little in (state.load, state.stiffness, state.peak_pressure):
@@ -79,7 +87,9 @@ def test_far_beyond_yield_the_chord_is_under_the_yield_stress():
     u = soft.first_yield / delta
     state, chord = plastic_winkler(soft, delta), 2 * np.sqrt(delta / (2 * (1e-3 + delta)))
     ratio = state.load / (2 * 1.3e-12 * chord)
-    np.testing.assert_allclose(ratio, 1 - u / 4, rtol=0, atol=2e-14)  # series of eq. 11 for small delta0/delta
+    np.testing.assert_allclose(
+        ratio, 1 - u / 4, rtol=0, atol=2e-14
+    )  # series of eq. 11 for small delta0/delta
     slope = 1.3e-12 * chord / delta * 1e-3 / (1e-3 + delta)  # of 2 c sigY l
     np.testing.assert_allclose(state.stiffness / slope, 1, rtol=2 * u.max())
 
@@ -114,5 +124,7 @@ def test_liu_is_the_force_of_the_ellipse(delta):
 
 @pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu"])
 def test_angle_is_that_of_overlapping_circles(name):
-    assert LAWS[name].at_displacement(JOINT, DEPTHS).angle == pytest.approx(contact_angle(DEPTHS), rel=1e-9)
+    assert LAWS[name].at_displacement(JOINT, DEPTHS).angle == pytest.approx(
+        contact_angle(DEPTHS), rel=1e-9
+    )
     assert LAWS[name].at_displacement(JOINT, 0.0).angle == 0

@@ -1,4 +1,5 @@
-"""Exports of a joint's law: what they say is what the table says, in every language that can be run here."""
+"""Exports of a joint's law: what they say is what the table says, in every language that can be run
+here."""
 
 from __future__ import annotations
 
@@ -70,12 +71,17 @@ file = fopen('out', 'w'); fwrite(file, out, 'double'); fclose(file);
 
 
 def curves() -> dict[str, JointCurve]:
-    """Joints that yield, that do not, without a law of first touch, with a title that comments and strings dislike."""
+    """Joints that yield, that do not, without a law of first touch, with a title that comments and
+    strings dislike."""
     about = {"title": 'a "joint" of */ formulas \\', "units": ["mm", "N/mm"], "largest error": 0.01}
     yielding = replace(yielding_curve(), length=0.05, force=7e3, pressure=210.0, about=about)
     one, none = np.ones_like(yielding.x), np.zeros_like(yielding.x)
     elastic = replace(yielding, back=yielding.y, dback=yielding.dy, ratio=one, dratio=none)
-    return {"yielding": yielding, "elastic": elastic, "without touch": replace(yielding, touch=np.zeros(0))}
+    return {
+        "yielding": yielding,
+        "elastic": elastic,
+        "without touch": replace(yielding, touch=np.zeros(0)),
+    }
 
 
 @pytest.fixture(params=["yielding", "elastic", "without touch"])
@@ -87,8 +93,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:archord. beyond")
 
 
 def inputs(curve: JointCurve, n: int = 10_000) -> np.ndarray:
-    """Pairs of displacement and deepest displacement ``(n + 100, 2)``: open, first touch, through the table and beyond;
-    and every pair of `EXTREMES`."""
+    """Pairs of displacement and deepest displacement ``(n + 100, 2)``: open, first touch, through
+    the table and beyond; and every pair of `EXTREMES`."""
     rng = np.random.default_rng(19)
     delta, deepest = curve.limit * rng.uniform([-0.05, -0.05], [1.3, 1.2], (n, 2)).T
     delta[: n // 10] = curve.limit * 10 ** rng.uniform(-12, -1, n // 10)
@@ -98,11 +104,19 @@ def inputs(curve: JointCurve, n: int = 10_000) -> np.ndarray:
 
 
 def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
-    """Force within 1e-12 of the largest, other columns likewise, stiffness within 1e-9, as the table says; but for the
-    stiffness next to where the joint opens on its way back, which has a logarithm's singularity."""
+    """Force within 1e-12 of the largest, other columns likewise, stiffness within 1e-9, as the
+    table says; but for the stiffness next to where the joint opens on its way back, which has a
+    logarithm's singularity."""
     delta, deepest = pairs.T
     state, first = curve.at(delta, deepest), curve.at(delta)
-    wanted = (state.load, state.stiffness, state.error, curve.residual(deepest), first.peak_pressure, first.angle)
+    wanted = (
+        state.load,
+        state.stiffness,
+        state.error,
+        curve.residual(deepest),
+        first.peak_pressure,
+        first.angle,
+    )
     for name, ours, theirs in zip(COLUMNS, values.T, wanted, strict=True):
         if name == "stiffness":
             near = np.abs(delta - curve.residual(deepest)) <= 1e-7 * curve.limit
@@ -110,13 +124,17 @@ def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
             np.testing.assert_allclose(ours[far], theirs[far], rtol=1e-9, err_msg=name)
         else:
             largest = np.nanmax(np.abs(theirs))
-            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * largest + 1e-16, err_msg=name)
+            np.testing.assert_allclose(
+                ours, theirs, rtol=0, atol=1e-12 * largest + 1e-16, err_msg=name
+            )
 
 
 def evaluate(law: dict[str, Any], pairs: np.ndarray) -> np.ndarray:
     """What functions say at the pairs, in the order of ``COLUMNS``."""
     force, error, residual, peak, angle = (law[name] for name in FUNCTIONS)
-    return np.array([(*force(x, z), error(x, z), residual(z), peak(x), angle(x)) for x, z in pairs.tolist()])
+    return np.array(
+        [(*force(x, z), error(x, z), residual(z), peak(x), angle(x)) for x, z in pairs.tolist()]
+    )
 
 
 def load(path: Path):
@@ -132,10 +150,15 @@ def write(curve: JointCurve, target: Path) -> Path:
 
 
 def test_python_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
-    """To 1e-12, on 10 000 random pairs; it imports math alone, but for the one warning beyond its tables."""
+    """To 1e-12, on 10 000 random pairs; it imports math alone, but for the one warning beyond its
+    tables."""
     path = write(curve, tmp_path / "law.py")
     law = load(path)
-    tops = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.Import | ast.ImportFrom)]
+    tops = [
+        node
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
     assert [ast.unparse(node) for node in tops] == ["import math"]
     pairs = inputs(curve)
     with pytest.warns(UserWarning, match="beyond the tables") as caught:
@@ -151,7 +174,8 @@ def test_python_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
 
 
 def test_c_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
-    """To 1e-12, on 10 000 random pairs, as strict C99 without a warning; and its state remembers."""
+    """To 1e-12, on 10 000 random pairs, as strict C99 without a warning; and its state
+    remembers."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if not compiler:
         pytest.skip("no C compiler is here")
@@ -159,9 +183,13 @@ def test_c_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
     (tmp_path / "main.c").write_text(C_CLIENT)
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2"]
     careful = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
-    subprocess.run([compiler, *strict, *careful, "main.c", "-o", "law", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run(
+        [compiler, *strict, *careful, "main.c", "-o", "law", "-lm"], cwd=tmp_path, check=True
+    )
     pairs = inputs(curve)
-    done = subprocess.run([tmp_path / "law"], input=pairs.tobytes(), capture_output=True, check=True)
+    done = subprocess.run(
+        [tmp_path / "law"], input=pairs.tobytes(), capture_output=True, check=True
+    )
     check(curve, pairs, np.frombuffer(done.stdout).reshape(-1, 6))
 
 
@@ -172,13 +200,15 @@ def test_octave_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
     write(curve, tmp_path / "law.m")
     pairs = inputs(curve, 1000)
     pairs.tofile(tmp_path / "in")
-    subprocess.run(["octave-cli", "--quiet", "--norc", "--eval", OCTAVE_CLIENT], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["octave-cli", "--quiet", "--norc", "--eval", OCTAVE_CLIENT], cwd=tmp_path, check=True
+    )
     check(curve, pairs, np.fromfile(tmp_path / "out").reshape(-1, 6))
 
 
 def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
-    """To 1e-12, on 10 000 random pairs, its statements read as Python's: no Modelica compiler is at hand. All blocks
-    end, and no function is called that is not there."""
+    """To 1e-12, on 10 000 random pairs, its statements read as Python's: no Modelica compiler is at
+    hand. All blocks end, and no function is called that is not there."""
     package = export_curve(curve, tmp_path / "Law.mo")
     assert package.startswith("package Law ")
     assert package.endswith("end Law;\n")
@@ -187,7 +217,8 @@ def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) ->
 
 
 def test_beyond_its_range_a_law_is_a_force_alone(curve: JointCurve) -> None:
-    """The force goes on along its tangent; what else is said there is nan, and so is everything of nan."""
+    """The force goes on along its tangent; what else is said there is nan, and so is everything of
+    nan."""
     end, step = curve.limit, 1e-6 * curve.limit
     beyond = np.array([1 + 1e-8, 1.2, 100.0]) * end
     state, edge = curve.at(beyond), curve.at([end])
@@ -201,12 +232,16 @@ def test_beyond_its_range_a_law_is_a_force_alone(curve: JointCurve) -> None:
     assert np.isnan(curve.displacement([np.nan])).all()
     back = curve.at([0.5 * end, -step], [1.2 * end])
     assert np.isfinite(back.load).all()
-    assert np.isnan([back.stiffness[0], back.error[0], curve.residual([1.2 * end])[0]]).all() == curve.yields
+    assert (
+        np.isnan([back.stiffness[0], back.error[0], curve.residual([1.2 * end])[0]]).all()
+        == curve.yields
+    )
     np.testing.assert_array_equal([values[1] for values in back], 0.0)
 
 
 def test_no_contact_is_wider_than_the_hole(tmp_path: Path) -> None:
-    """A quarter of a circle, in the table and in what is exported of it; a ring's may be wider, where its nodes are."""
+    """A quarter of a circle, in the table and in what is exported of it; a ring's may be wider,
+    where its nodes are."""
     joint = LawJoint(10.0, 0.05, 1e5, pin_share=0.68, plane="strain", nu=0.0, pin_nu=0.49)
     curve = general_law(joint)
     delta = np.linspace(0, curve.limit, 3000)
@@ -229,7 +264,8 @@ def test_a_joint_that_does_not_yield_needs_no_way_back(tmp_path: Path) -> None:
 
 
 def test_what_is_unknown_is_left_out(tmp_path: Path) -> None:
-    """No pressure and angle, no functions that say them; JSON has null for them, and gives the table back."""
+    """No pressure and angle, no functions that say them; JSON has null for them, and gives the
+    table back."""
     curve = replace(yielding_curve(), peak=np.full(61, np.nan), angle=np.full(61, np.nan))
     assert "peak_pressure" not in (text := export_curve(curve, tmp_path / "law.h"))
     assert "contact_angle" not in text
@@ -248,9 +284,19 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
     names = "lug-pin.h 2.py force.m class.py math.py print.py math.h time.h string.h namespace.h restrict.h Bolzen_ä.py"
     names += " model.mo end.mo Real.mo Modelica.mo sqrt.mo max.m function.m endif.m parfor.m plot.m the_law.m _x.h"
     for name in [*names.split(), f"{'x' * 64}.m", "a b.h"]:
-        with pytest.raises(ValueError, match=f"^{re.escape(name)}: .* cannot name a law: .*; choose another name"):
+        with pytest.raises(
+            ValueError, match=f"^{re.escape(name)}: .* cannot name a law: .*; choose another name"
+        ):
             export_curve(curve, tmp_path / name)
-    for name in ("function.json", "model.h", "end.h", "int_.h", f"{'x' * 63}.m", "Class.py", "real.mo"):
+    for name in (
+        "function.json",
+        "model.h",
+        "end.h",
+        "int_.h",
+        f"{'x' * 63}.m",
+        "Class.py",
+        "real.mo",
+    ):
         assert export_curve(curve, tmp_path / name)
     with pytest.raises(ValueError, match="several"):
         export_curve(replace(curve, y=np.stack([curve.y, curve.y])), tmp_path / "law.h")
@@ -265,7 +311,9 @@ def test_what_octave_has_cannot_name_a_law(tmp_path: Path) -> None:
     if not shutil.which("octave-cli"):
         pytest.skip("octave-cli is not here")
     keywords = "printf('%s ', iskeyword(){:});"
-    done = subprocess.run(["octave-cli", "--norc", "--eval", keywords], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        ["octave-cli", "--norc", "--eval", keywords], capture_output=True, text=True, check=True
+    )
     program = re.sub("%.*", "", export_curve(curves()["yielding"], tmp_path / "lug.m"))
     called = re.findall(r"[^@\w.]([a-z_]\w*)\(", program)
     assert {"sqrt", "min", "warning"} <= {*called}
@@ -292,13 +340,20 @@ def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
     wanted = [state.load[0], state.stiffness[0], curve.residual([0.05])[0]]
     for program, arguments in commands.items():
         if program == "./main" or shutil.which(program):
-            done = subprocess.run([program, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
-            np.testing.assert_allclose([float(word) for word in done.stdout.split()], wanted, rtol=1e-10)
+            done = subprocess.run(
+                [program, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True
+            )
+            np.testing.assert_allclose(
+                [float(word) for word in done.stdout.split()], wanted, rtol=1e-10
+            )
 
 
 @pytest.mark.parametrize(("thickness", "unit", "pin"), [(None, "N/mm", 1.0), (25.0, "N", 25.0)])
-def test_every_export_tells_the_unit_of_force_and_the_length(thickness, unit, pin, tmp_path: Path) -> None:
-    """In its head and as constants, alike in all languages; a force over its length is that of the unit length."""
+def test_every_export_tells_the_unit_of_force_and_the_length(
+    thickness, unit, pin, tmp_path: Path
+) -> None:
+    """In its head and as constants, alike in all languages; a force over its length is that of the
+    unit length."""
     sets = [] if thickness is None else ["--set", f"analysis.thickness={thickness}"]
     files = {suffix: tmp_path / f"law.{suffix}" for suffix in ("py", "h", "mo", "m", "json")}
     exports = [word for file in files.values() for word in ("--export", str(file))]
@@ -318,7 +373,9 @@ def test_every_export_tells_the_unit_of_force_and_the_length(thickness, unit, pi
         assert form.format(f"FORCE_UNIT{brackets}", unit) in text
         assert form.format(f"LENGTH_UNIT{brackets}", "mm") in text
         assert re.search(rf"PIN_LENGTH = {pin}", text)
-    rule = "do not multiply them by the length" if thickness else "multiply them by the pin's length"
+    rule = (
+        "do not multiply them by the length" if thickness else "multiply them by the pin's length"
+    )
     for file in files.values():
         words = " ".join(file.read_text().split())
         assert f"force P in {unit}, " in words
@@ -326,7 +383,9 @@ def test_every_export_tells_the_unit_of_force_and_the_length(thickness, unit, pi
     curve = JointCurve.from_json(files["json"].read_text())
     scene_law = general_law(LawJoint.from_scene(load_scene(scene)))
     assert law.force(0.05)[0] / pin == pytest.approx(float(scene_law.at(0.05).load), rel=1e-12)
-    assert float(curve.at(0.05).load) / curve.pin_length == pytest.approx(float(scene_law.at(0.05).load), rel=1e-12)
+    assert float(curve.at(0.05).load) / curve.pin_length == pytest.approx(
+        float(scene_law.at(0.05).load), rel=1e-12
+    )
 
 
 def test_files_of_earlier_versions_are_read() -> None:

@@ -15,14 +15,18 @@ from tests.postprocess.synthetic import curve
 
 
 def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys):
-    """The numbers of table and JSON agree; the module gives the run's forces; the picture is a picture."""
+    """The numbers of table and JSON agree; the module gives the run's forces; the picture is a
+    picture."""
     files = {name: tmp_path / f"law.{name}" for name in ("json", "py", "png")}
     arguments = ["--json", files["json"], "--python", files["py"], "--picture", files["png"]]
     assert run(["fit", *map(str, [runs["plastic"], *arguments])]) == 0
     printed = capsys.readouterr().out
     data = json.loads(files["json"].read_text())
     law = FittedLaw.from_json(files["json"].read_text())
-    assert [(row["of"], row["value"], row["steps"]) for row in data["fits"]] == [("k", law.k, 8), ("c", law.c, 8)]
+    assert [(row["of"], row["value"], row["steps"]) for row in data["fits"]] == [
+        ("k", law.k, 8),
+        ("c", law.c, 8),
+    ]
     assert f"law: k = {law.k:.5f}, c = {law.c:.5f}, from P(delta)" in printed
     assert "discretisation error is unknown" in printed
     assert files["png"].read_bytes()[1:4] == b"PNG"
@@ -63,9 +67,15 @@ def test_files_of_others_and_of_runs_stay(runs, tmp_path, capsys):
     capsys.readouterr()
     assert run(["fit", str(runs["elastic"]), "--json", str(link), "--force"]) == 2
     assert capsys.readouterr().err == f"{link}: cannot be written: it is an input of the command.\n"
-    for option, name in (("--json", "history.csv"), ("--python", "checkpoint.h5"), ("--picture", "run.json")):
+    for option, name in (
+        ("--json", "history.csv"),
+        ("--python", "checkpoint.h5"),
+        ("--picture", "run.json"),
+    ):
         before = (runs["elastic"] / name).read_bytes()
-        assert run(["fit", str(runs["plastic"]), option, str(runs["elastic"] / name), "--force"]) == 2
+        assert (
+            run(["fit", str(runs["plastic"]), option, str(runs["elastic"] / name), "--force"]) == 2
+        )
         assert "it belongs to the run" in capsys.readouterr().err
         assert (runs["elastic"] / name).read_bytes() == before
 
@@ -74,7 +84,10 @@ def test_two_meshes_give_a_mesh_error(runs, capsys):
     """Order does not matter; the finer run is the law's."""
     assert run(["fit", str(runs["coarse"]), str(runs["elastic"]), "--range", "0.3", "2"]) == 0
     printed = capsys.readouterr().out
-    assert f"{runs['coarse']} serves to estimate the discretisation error of {runs['elastic']}." in printed
+    assert (
+        f"{runs['coarse']} serves to estimate the discretisation error of {runs['elastic']}."
+        in printed
+    )
     assert "unknown" in printed.split(str(runs["elastic"]))[0]
 
 
@@ -107,7 +120,9 @@ def test_bad_input_is_one_sentence(runs, tmp_path, refused, arguments, said):
         shutil.copy(runs["elastic"] / "run.json", tmp_path / name)
         rewrite_report(tmp_path / name, files={}, status="running", steps=[])
         (tmp_path / name / "history.csv").write_text(text)
-    assert refused(["fit", *(a.format(**folders) for a in arguments)]).startswith(said.format(**folders))
+    assert refused(["fit", *(a.format(**folders) for a in arguments)]).startswith(
+        said.format(**folders)
+    )
     assert not list((tmp_path / "empty").iterdir())
 
 

@@ -44,7 +44,8 @@ def read_rows(file: Path) -> tuple[pd.DataFrame, dict[str, str]]:
 
 
 def test_a_small_sweep_gets_its_table(solved, capsys):
-    """k of every case is that of archord fit RUN; the coarse mesh and the hardening joint are named."""
+    """k of every case is that of archord fit RUN; the coarse mesh and the hardening joint are
+    named."""
     assert run(["fit", str(solved)]) == 0
     printed = capsys.readouterr().out
     cases = read_sweep(solved / "sweep.toml").distinct
@@ -68,18 +69,22 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
 
 
 def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys):
-    """k of a case is that of its own block; table and print say that there are such, of wide blocks they do not."""
+    """k of a case is that of its own block; table and print say that there are such, of wide blocks
+    they do not."""
     assert run(["fit", str(solved)]) == 0
     assert "small blocks" not in read_rows(solved / "fit.csv")[1]
     listed = "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }, { pin.whole = true }]\n[base]"
     (tmp_path / "blocks.sweep.toml").write_text(listed + SWEEP.partition("[base]")[2])
-    assert run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert (
+        run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0
+    )
     assert run(["fit", str(tmp_path / "out")]) == 0
     said = "small blocks: P up to about 5.6% smaller than in a wide block, and k with it"
     printed = capsys.readouterr().out
     assert said in printed
     assert re.search(
-        r"left out: .*: pin.whole = true does not fit: k and c of a sweep are those of half a pin", printed
+        r"left out: .*: pin.whole = true does not fit: k and c of a sweep are those of half a pin",
+        printed,
     )
     small, wide = read_rows(tmp_path / "out" / "fit.csv")[0].k
     assert small < 0.96 * wide
@@ -89,7 +94,10 @@ def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys
     ("words", "said"),
     [
         (["{out}", "{out}"], "a sweep is fitted alone"),
-        (["{out}", "--picture", "x.png"], "a sweep is fitted alone; --json, --python and --picture are for runs."),
+        (
+            ["{out}", "--picture", "x.png"],
+            "a sweep is fitted alone; --json, --python and --picture are for runs.",
+        ),
         (["{out}", "--range", "3", "4"], "holds no case that can be fitted"),
         (["nothing.csv"], "nothing.csv: is not a run folder"),
     ],

@@ -41,25 +41,36 @@ def test_a_file_of_version_0_1_is_read():
 def test_the_python_module_needs_only_math_and_gives_the_same(law, tmp_path):
     """In an interpreter without site packages, to the last digits, whatever runs are called."""
     source = law.to_python()
-    imports = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Import | ast.ImportFrom)]
+    imports = [
+        node
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
     assert [alias.name for node in imports for alias in node.names] == ["math"]
     (tmp_path / "joint.py").write_text(source)
-    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from joint import force, stiffness\n"
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from joint import force, stiffness\n"
+    )
     code += f"print([[f(d) for d in {DELTA.tolist()}] for f in (force, stiffness)])"
     command = [sys.executable, "-I", "-S", "-c", code]
-    force, stiffness = ast.literal_eval(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    force, stiffness = ast.literal_eval(
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    )
     np.testing.assert_allclose(force, law.force(DELTA), rtol=1e-14, atol=0)
     np.testing.assert_allclose(stiffness, law.stiffness(DELTA), rtol=1e-13, atol=0)
 
 
 @BOTH
 def test_stiffness_is_the_slope_and_displacement_the_inverse(law):
-    """Central differences away from first touch; of any shape, the open joint and the unreachable included."""
+    """Central differences away from first touch; of any shape, the open joint and the unreachable
+    included."""
     delta = DELTA[2:]
     h = 1e-5 * delta
     slope = (law.force(delta + h) - law.force(delta - h)) / (2 * h)
     np.testing.assert_allclose(law.stiffness(delta), slope, rtol=1e-7)
-    np.testing.assert_allclose(law.displacement(law.force(delta).reshape(2, 3)), delta.reshape(2, 3), rtol=1e-12)
+    np.testing.assert_allclose(
+        law.displacement(law.force(delta).reshape(2, 3)), delta.reshape(2, 3), rtol=1e-12
+    )
     np.testing.assert_array_equal(law.displacement([-1.0, 0.0]), 0)
     assert (law.stiffness(DELTA[:2]) == 0).all()
 
@@ -69,7 +80,9 @@ def test_beyond_what_it_was_fitted_to_it_warns():
     space = {}
     exec(ELASTIC.to_python(), space)
     assert space["RANGE"] == 2.0 * ELASTIC.dR
-    with pytest.warns(LawRangeWarning, match=r"delta = 3 dR is beyond the 2 dR that the law was fitted to"):
+    with pytest.warns(
+        LawRangeWarning, match=r"delta = 3 dR is beyond the 2 dR that the law was fitted to"
+    ):
         ELASTIC.force([0.01, 0.15])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -82,7 +95,10 @@ def test_beyond_what_it_was_fitted_to_it_warns():
 
 
 def test_the_module_says_how_good_it_is():
-    assert "against the runs that it was fitted to: 13.26% rms, -35.00% at worst." in PLASTIC.to_python()
+    assert (
+        "against the runs that it was fitted to: 13.26% rms, -35.00% at worst."
+        in PLASTIC.to_python()
+    )
     assert "fitted to: unknown." in ELASTIC.to_python()
 
 

@@ -1,4 +1,5 @@
-"""The general law of pin joints: laws of nature all over its range, its limits, and what it refuses."""
+"""The general law of pin joints: laws of nature all over its range, its limits, and what it
+refuses."""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ def joint(
     yields: str = "none",
     other: float = 1.0,
 ) -> LawJoint:
-    """A joint of R = E* = 1; ``yields`` is "none", "both", "pin", "block", or one of these with "weaker"."""
+    """A joint of R = E* = 1; ``yields`` is "none", "both", "pin", "block", or one of these with
+    "weaker"."""
     ends = [1 - nu**2 if plane == "strain" else 1.0 for nu in nus]
     p = 0.0 if math.isinf(ratio) else ends[0] / (ends[0] + ratio * ends[1])
     first, *weaker = yields.split()
@@ -51,7 +53,8 @@ def joint(
 
 @some.composite
 def joints(
-    draw: some.DrawFn, yields: tuple[str, ...] = ("none", "both", "pin", "block", "pin weaker", "block weaker")
+    draw: some.DrawFn,
+    yields: tuple[str, ...] = ("none", "both", "pin", "block", "pin weaker", "block weaker"),
 ) -> LawJoint:
     """Joints all over the range."""
     plane, kind = draw(some.sampled_from(("strain", "stress"))), draw(some.sampled_from(yields))
@@ -67,7 +70,8 @@ def joints(
 @given(joints(), some.floats(0.05, 3.0))
 @settings(max_examples=150, deadline=None)
 def test_laws_of_nature(pin: LawJoint, deepest: float) -> None:
-    """P is 0 up to first touch and rises; the way back lies below, meets first loading, and returns less work."""
+    """P is 0 up to first touch and rises; the way back lies below, meets first loading, and returns
+    less work."""
     law = general_law(pin)
     x = X * pin.clearance
     deepest *= pin.clearance
@@ -84,14 +88,16 @@ def test_laws_of_nature(pin: LawJoint, deepest: float) -> None:
     )
     assert 0 <= float(law.residual([deepest])[0]) < deepest
     inside = x[(x > 0) & (first.load < law.at([law.limit]).load[0])]
-    np.testing.assert_allclose(law.at(law.displacement(law.at(inside).load)).load, law.at(inside).load, rtol=1e-9)
+    np.testing.assert_allclose(
+        law.at(law.displacement(law.at(inside).load)).load, law.at(inside).load, rtol=1e-9
+    )
 
 
 @given(joints(yields=("both", "pin", "block", "pin weaker", "block weaker")), some.floats(0.3, 1.5))
 @settings(max_examples=60, deadline=None)
 def test_a_cycle_loses_energy_and_a_deeper_one_more(pin: LawJoint, deepest: float) -> None:
-    """The work lost between first loading and way back is not negative, and grows with the deepest displacement, but
-    for what the law states as the error of its way back."""
+    """The work lost between first loading and way back is not negative, and grows with the deepest
+    displacement, but for what the law states as the error of its way back."""
     law, lost = general_law(pin), 0.0
     for depth in (deepest, 1.4 * deepest, 2 * deepest):
         x = np.linspace(0.0, depth * pin.clearance, 4001)
@@ -106,17 +112,22 @@ def test_a_cycle_loses_energy_and_a_deeper_one_more(pin: LawJoint, deepest: floa
 @settings(max_examples=40, deadline=None)
 def test_yielding_beyond_the_range_is_none(pin: LawJoint, s: float) -> None:
     """A yield stress that 3 dR does not reach leaves the elastic law to the digit."""
-    strong = replace(pin, pin_yield=s * pin.clearance if pin.pin_share else None, block_yield=s * pin.clearance)
+    strong = replace(
+        pin, pin_yield=s * pin.clearance if pin.pin_share else None, block_yield=s * pin.clearance
+    )
     x = X * pin.clearance
     if s > 4:
         np.testing.assert_array_equal(general_law(strong).at(x).load, general_law(pin).at(x).load)
-        np.testing.assert_array_equal(general_law(strong).at(x, x[-1]).load, general_law(pin).at(x).load)
+        np.testing.assert_array_equal(
+            general_law(strong).at(x, x[-1]).load, general_law(pin).at(x).load
+        )
 
 
 @given(joints(yields=("none",)))
 @settings(max_examples=40, deadline=None)
 def test_first_touch_is_line_contact(pin: LawJoint) -> None:
-    """Toward first touch delta is P/(pi E*) times a constant less the logarithm of P (Johnson 1985, eq. 5.57)."""
+    """Toward first touch delta is P/(pi E*) times a constant less the logarithm of P (Johnson 1985,
+    eq. 5.57)."""
     law = general_law(pin)
     y = law.at(np.array([1e-9, 1e-7]) * pin.clearance).load / pin.unit
     constant = math.pi * np.array([1e-9, 1e-7]) / y + np.log(y)
@@ -128,18 +139,37 @@ def test_first_touch_is_line_contact(pin: LawJoint) -> None:
 @settings(max_examples=40, deadline=None)
 def test_units_do_not_matter(pin: LawJoint, length: float, stress: float) -> None:
     """The law of a joint in other units is the same law."""
-    units = {"radius": length, "clearance": length, "E_star": stress, "pin_yield": stress, "block_yield": stress}
-    scaled = {name: value * unit for name, unit in units.items() if (value := getattr(pin, name)) is not None}
+    units = {
+        "radius": length,
+        "clearance": length,
+        "E_star": stress,
+        "pin_yield": stress,
+        "block_yield": stress,
+    }
+    scaled = {
+        name: value * unit
+        for name, unit in units.items()
+        if (value := getattr(pin, name)) is not None
+    }
     x = X * pin.clearance
-    mine, theirs = general_law(pin).at(x, x[120]), general_law(replace(pin, **scaled)).at(x * length, x[120] * length)
-    np.testing.assert_allclose(theirs.load, mine.load * stress * length, rtol=1e-6, atol=1e-12 * stress * length)
+    mine, theirs = (
+        general_law(pin).at(x, x[120]),
+        general_law(replace(pin, **scaled)).at(x * length, x[120] * length),
+    )
+    np.testing.assert_allclose(
+        theirs.load, mine.load * stress * length, rtol=1e-6, atol=1e-12 * stress * length
+    )
     np.testing.assert_allclose(theirs.angle, mine.angle, rtol=1e-6)
 
 
 def test_many_joints_at_once_are_each_alone() -> None:
     """Laws of joints of all kinds in one call, evaluated at once, are those of each."""
     kinds = ("none", "both", "pin", "block", "pin weaker", "block weaker")
-    pins = [joint(plane, 2.0, (0.2, 0.4), 0.004, 0.4, kind, 1.6) for plane in SMALLEST_S for kind in kinds]
+    pins = [
+        joint(plane, 2.0, (0.2, 0.4), 0.004, 0.4, kind, 1.6)
+        for plane in SMALLEST_S
+        for kind in kinds
+    ]
     many = law_of_numbers([joint_numbers(pin) for pin in pins]).at(X, 1.5)
     for row, pin in enumerate(pins):
         alone = general_law(pin).at(X * 0.004, 1.5 * 0.004)
@@ -152,7 +182,9 @@ def test_both_planes_are_one_elastic_law() -> None:
     stress = joint("stress", 2.0, (0.3, 0.3), 0.005, 1.0)
     strain = joint("strain", 2.0, (nu, nu), 0.005, 1.0)
     x = X * 0.005
-    np.testing.assert_allclose(general_law(stress).at(x).load, general_law(strain).at(x).load, rtol=1e-12)
+    np.testing.assert_allclose(
+        general_law(stress).at(x).load, general_law(strain).at(x).load, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -180,6 +212,9 @@ def test_elastic_law_is_a_table_of_few_numbers() -> None:
     """At most 500 numbers, of three functions of 46, 11 and 11 products."""
     model = elastic_model()
     assert sum(of.coefficients.size for of in (model.F, model.peak, model.angle)) <= 500
-    state = model.at(Elastic(*(np.array([value]) for value in (0.5, 3 / 7, 3 / 7, 0.005))), np.array([1.0, 2.0]))
-    # like bodies, nu = 0.3, dR/R = 0.5 %, plane strain: GetFEM and the solver of this project (README)
+    state = model.at(
+        Elastic(*(np.array([value]) for value in (0.5, 3 / 7, 3 / 7, 0.005))), np.array([1.0, 2.0])
+    )
+    # like bodies, nu = 0.3, dR/R = 0.5 %, plane strain: GetFEM and the solver of this project
+    # (README)
     assert state.y[0, 1] * 0.005 == pytest.approx(0.01278, rel=2e-3)

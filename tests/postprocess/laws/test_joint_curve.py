@@ -1,4 +1,5 @@
-"""The table of a joint's law: continuity, slopes, inverse, the way back, first touch, units, several joints at once."""
+"""The table of a joint's law: continuity, slopes, inverse, the way back, first touch, units,
+several joints at once."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ X = np.linspace(0.0, 3.0, 500)
 
 
 def test_slopes_are_those_of_the_force() -> None:
-    """dP/d(delta) is the derivative of P, loading and coming back, but at kinks: where it opens, and the deepest."""
+    """dP/d(delta) is the derivative of P, loading and coming back, but at kinks: where it opens,
+    and the deepest."""
     curve, h = yielding_curve(), 1e-7
     for deepest in (0.0, 1.0, 2.5):
         z = float(curve.residual(np.array([deepest]))[0])
@@ -24,7 +26,8 @@ def test_slopes_are_those_of_the_force() -> None:
 
 
 def test_both_branches_meet_at_the_deepest_point_and_the_way_back_is_below() -> None:
-    """P is continuous, never above first loading on the way back, and zero up to the residual clearance."""
+    """P is continuous, never above first loading on the way back, and zero up to the residual
+    clearance."""
     curve = yielding_curve()
     first = curve.at(X).load
     for deepest in (0.3, 1.0, 2.5):
@@ -33,7 +36,10 @@ def test_both_branches_meet_at_the_deepest_point_and_the_way_back_is_below() -> 
         assert (np.diff(back) >= 0).all()
         assert 0 <= z < deepest
         np.testing.assert_array_equal(back > 0, (z < X) & (X > 0))
-        assert abs(float(curve.at([deepest - 1e-12], deepest).load[0] - curve.at([deepest]).load[0])) < 1e-10
+        assert (
+            abs(float(curve.at([deepest - 1e-12], deepest).load[0] - curve.at([deepest]).load[0]))
+            < 1e-10
+        )
     assert float(curve.residual(np.array([2.5]))[0]) > 0.5
 
 
@@ -62,7 +68,8 @@ def test_the_inverse_gives_the_displacement_back() -> None:
 
 
 def test_first_touch_is_line_contact() -> None:
-    """P at first touch solves pi x/y + ln(y/(1 + y)) = F, and its slope tends to zero with the logarithm."""
+    """P at first touch solves pi x/y + ln(y/(1 + y)) = F, and its slope tends to zero with the
+    logarithm."""
     curve, x = yielding_curve(), np.geomspace(1e-9, 0.019, 30)
     y, a = curve.at(x).load, curve.touch[0]
     F = np.pi * x / y + np.log(y / (1 + y))
@@ -84,8 +91,14 @@ def test_units_scale_and_nothing_else() -> None:
 def test_several_joints_at_once_and_json() -> None:
     """Tables of several joints give what each gives alone; JSON keeps every digit."""
     curves = [yielding_curve(onset) for onset in (0.4, 0.8)]
-    names = [name for name in vars(curves[0]) if name not in ("x", "length", "force", "pressure", "about")]
-    both = replace(curves[0], **{name: np.stack([getattr(curve, name) for curve in curves]) for name in names})
+    names = [
+        name
+        for name in vars(curves[0])
+        if name not in ("x", "length", "force", "pressure", "about")
+    ]
+    both = replace(
+        curves[0], **{name: np.stack([getattr(curve, name) for curve in curves]) for name in names}
+    )
     for deepest in (0.0, 2.0):
         for row, curve in enumerate(curves):
             np.testing.assert_array_equal(both.at(X, deepest).load[row], curve.at(X, deepest).load)

@@ -82,7 +82,9 @@ def test_extrapolation_ends_with_the_formula():
     """Hu et al.'s formula goes on, Johnson's has no number beyond its load limit."""
     dR = JOINT.clearance
     with pytest.warns(LawRangeWarning):
-        assert LAWS["paper"].force(JOINT, 5 * dR, extrapolate=True) > LAWS["paper"].force(JOINT, 2 * dR)
+        assert LAWS["paper"].force(JOINT, 5 * dR, extrapolate=True) > LAWS["paper"].force(
+            JOINT, 2 * dR
+        )
     with pytest.warns(LawRangeWarning):
         assert np.isnan(LAWS["johnson"].force(JOINT, dR, extrapolate=True))
 
@@ -96,17 +98,26 @@ def test_half_space_laws_have_hertz_pressure_in_its_range(name):
         hertz = LAWS["hertz"].at_load(JOINT, loads)
     assert np.isfinite(state.delta).all()
     assert np.isnan(hertz.angle).tolist() == [False, False, True]
-    np.testing.assert_allclose([state.peak_pressure, state.angle], [hertz.peak_pressure, hertz.angle], rtol=1e-12)
+    np.testing.assert_allclose(
+        [state.peak_pressure, state.angle], [hertz.peak_pressure, hertz.angle], rtol=1e-12
+    )
 
 
 WIDE, UNLIKE = {"clearance": 0.3}, {"pin_share": 0.25, "plane": "strain", "nu": 0.3}
-STRAY = [(name, WIDE, "no small clearance") for name in ("paper", "paper-plastic", "winkler", "liu", "persson")]
+STRAY = [
+    (name, WIDE, "no small clearance")
+    for name in ("paper", "paper-plastic", "winkler", "liu", "persson")
+]
 
 
-@pytest.mark.parametrize(("name", "change", "said"), [*STRAY, ("persson", UNLIKE, "beta = 0.143 is not zero")])
+@pytest.mark.parametrize(
+    ("name", "change", "said"), [*STRAY, ("persson", UNLIKE, "beta = 0.143 is not zero")]
+)
 def test_joints_that_a_law_does_not_hold_for(name, change, said):
     """A wide clearance, unlike bodies: no number, or that of the formula on request."""
-    joint = LawJoint(**{"radius": 1.0, "clearance": 0.01, "E_star": 1.0, "block_yield": 0.01} | change)
+    joint = LawJoint(
+        **{"radius": 1.0, "clearance": 0.01, "E_star": 1.0, "block_yield": 0.01} | change
+    )
     with pytest.warns(LawRangeWarning, match=said):
         assert np.isnan(LAWS[name].at_load(joint, 0.001).peak_pressure)
     with pytest.warns(LawRangeWarning, match=said):
@@ -115,7 +126,10 @@ def test_joints_that_a_law_does_not_hold_for(name, change, said):
 
 @pytest.mark.parametrize(
     ("of_scene", "said"),
-    [({"friction": 0.1}, "without friction; with the coefficient 0.1"), ({"large_strain": True}, "of small strain")],
+    [
+        ({"friction": 0.1}, "without friction; with the coefficient 0.1"),
+        ({"large_strain": True}, "of small strain"),
+    ],
 )
 def test_what_no_law_knows_of_a_scene_is_told(of_scene, said):
     """With a number all the same."""
@@ -136,7 +150,14 @@ def test_what_a_law_needs_or_lacks_is_a_sentence():
     assert np.isnan(LAWS["esdu-78035"].at_load(bare, 1.0).angle)
 
 
-NO_JOINT = {"radius": 0.0, "clearance": -1.0, "E_star": np.nan, "pin_share": 1.5, "length": 0.0, "plane": "axial"}
+NO_JOINT = {
+    "radius": 0.0,
+    "clearance": -1.0,
+    "E_star": np.nan,
+    "pin_share": 1.5,
+    "length": 0.0,
+    "plane": "axial",
+}
 NO_JOINT |= {"nu": 0.5, "pin_nu": -1.0, "pin_yield": 0.0, "block_hardening": -0.1}
 
 
@@ -147,17 +168,27 @@ def test_values_that_make_no_joint_are_refused(name):
 
 
 def test_joint_of_a_scene():
-    """Like bodies have neither alpha nor beta; a rigid pin has alpha = 1, and beta from the block alone."""
+    """Like bodies have neither alpha nor beta; a rigid pin has alpha = 1, and beta from the block
+    alone."""
     steel = LawJoint.from_scene(load_scene(SCENES / "steel_pin.toml"))
-    assert (steel.radius, steel.clearance, steel.dundurs_alpha, steel.dundurs_beta) == (10.0, 0.05, 0.0, 0.0)
+    assert (steel.radius, steel.clearance, steel.dundurs_alpha, steel.dundurs_beta) == (
+        10.0,
+        0.05,
+        0.0,
+        0.0,
+    )
     assert steel.E_star == pytest.approx(105000 / 0.91)
     assert steel.yield_stress == pytest.approx(0.002 * steel.E_star)
     rigid = LawJoint.from_scene(load_scene(SCENES / "rigid_pin.toml"))
     assert rigid.dundurs_alpha == 1.0
-    assert rigid.dundurs_beta == pytest.approx((1 - 0.34) / 2)  # (kappa - 1)/(kappa + 1), kappa = (3 - nu)/(1 + nu)
+    assert rigid.dundurs_beta == pytest.approx(
+        (1 - 0.34) / 2
+    )  # (kappa - 1)/(kappa + 1), kappa = (3 - nu)/(1 + nu)
     soft = LawJoint.from_scene(load_scene(SCENES / "steel_pin.toml", ["block.E=70000"]))
     assert soft.dundurs_alpha == pytest.approx(0.5)
-    assert soft.dundurs_beta == pytest.approx(0.5 * 0.4 / 1.4)  # like nu: beta = alpha (1 - 2 nu)/(2 (1 - nu))
+    assert soft.dundurs_beta == pytest.approx(
+        0.5 * 0.4 / 1.4
+    )  # like nu: beta = alpha (1 - 2 nu)/(2 (1 - nu))
 
 
 METALS = [
@@ -172,17 +203,22 @@ METALS = [
 @pytest.mark.parametrize(("change", "yielding", "ratio", "hardening"), METALS)
 def test_yielding_of_a_scene(change, yielding, ratio, hardening):
     """Each body's yield stress and H/E; the weaker body's decides the onset."""
-    scene = load_scene(SCENES / "steel_pin.toml", ["pin.yield_stress=230.77", "block.yield_stress=230.77", *change])
+    scene = load_scene(
+        SCENES / "steel_pin.toml", ["pin.yield_stress=230.77", "block.yield_stress=230.77", *change]
+    )
     joint = LawJoint.from_scene(scene)
     assert joint.yielding == yielding
-    assert (joint.pin_yield, joint.block_yield, joint.yield_stress) == pytest.approx((230.77 * ratio, 230.77, 230.77))
+    assert (joint.pin_yield, joint.block_yield, joint.yield_stress) == pytest.approx(
+        (230.77 * ratio, 230.77, 230.77)
+    )
     assert (joint.pin_hardening, joint.block_hardening) == hardening
     assert joint.hardens == (hardening != (0.0, 0.0))
     assert not replace(joint, pin_yield=None, block_yield=None).hardens
 
 
 def test_roots_of_rising_functions():
-    """Against the inverse, over twenty decades; nothing for nothing, nan for nan and for what is never reached."""
+    """Against the inverse, over twenty decades; nothing for nothing, nan for nan and for what is
+    never reached."""
     target = np.array([0.0, 1e-12, 1e-3, 1.0, 1e8, np.nan, -1.0])
     root = rising_root(lambda x: x**1.5, target, 1.0)
     assert root[:5] == pytest.approx(target[:5] ** (2 / 3), rel=1e-13)
@@ -202,19 +238,26 @@ TEXT = (Path(__file__).parents[3] / "docs" / "laws.md").read_text(encoding="utf-
 def rows(heading):
     """The cells of the table below ``heading`` in docs/laws.md, a list for each row."""
     lines = TEXT.split(f"### {heading}\n")[1].split("\n###")[0].splitlines()
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("|")]
+    return [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("|")
+    ]
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_documentation_has_the_words_of_every_law(law):
     needs = f" Needs {', '.join(law.needs)}." if law.needs else ""
-    said = f"### {law.name}\n\n{law.title[0].upper()}{law.title[1:]}.{needs}\n\n    {law.formula}\n\n"
+    said = (
+        f"### {law.name}\n\n{law.title[0].upper()}{law.title[1:]}.{needs}\n\n    {law.formula}\n\n"
+    )
     assert f"{said}- Range: {law.range}.\n- Source: {law.source}.\n- {law.remarks}\n" in TEXT
 
 
 def test_documentation_has_the_numbers_of_the_laws():
-    """P/(E* dR) at some displacements, in brackets outside the range; load limits; readings of Radzimovsky's d."""
-    joint = LawJoint(1.0, 0.005, 1.0, pin_yield=0.002, block_yield=0.002, length=2.0, plane="strain", nu=0.3)
+    """P/(E* dR) at some displacements, in brackets outside the range; load limits; readings of
+    Radzimovsky's d."""
+    joint = LawJoint(
+        1.0, 0.005, 1.0, pin_yield=0.002, block_yield=0.002, length=2.0, plane="strain", nu=0.3
+    )
     (_, *heads), _, *table = rows("P/(E* dR) against each other")
     assert [row[0] for row in table] == WITH_DISPLACEMENT
     for name, *cells in table:
@@ -225,16 +268,21 @@ def test_documentation_has_the_numbers_of_the_laws():
             assert cell == ("" if np.isnan(P) else f"({P:.4f})" if caught else f"{P:.4f}")
     for name, load, deepest in rows("Load limits")[2:]:
         delta = LAWS[name].limit(joint)
-        assert (load, deepest) == (f"{LAWS[name].force(joint, delta) / 0.005:.4f}", f"{delta / 0.005:.4f}")
+        assert (load, deepest) == (
+            f"{LAWS[name].force(joint, delta) / 0.005:.4f}",
+            f"{delta / 0.005:.4f}",
+        )
     for _, width, limit in rows("Readings of Radzimovsky's d")[2:]:
         assert 16 * np.exp(-1 / 3) / float(width) ** 2 == pytest.approx(float(limit), rel=1e-4)
 
 
 @pytest.mark.parametrize(
-    ("width", "sections"), [(2.5, {}), (5.0, {}), (5.0, {"pin": {"rigid": True}}), (10.0, {"yield_stress": 0.002})]
+    ("width", "sections"),
+    [(2.5, {}), (5.0, {}), (5.0, {"pin": {"rigid": True}}), (10.0, {"yield_stress": 0.002})],
 )
 def test_a_small_block_is_as_soft_as_is_said(width, sections):
-    """P of archord's solutions falls by what the joint tells: that share, and up to twice as much for other bodies."""
+    """P of archord's solutions falls by what the joint tells: that share, and up to twice as much
+    for other bodies."""
     blocks = [scene(0.1, 2, joint={"block_size": size}, **sections) for size in (width, LARGE)]
     small, wide = ([m.P for m in solve(problem).steps] for problem in blocks)
     fall = 1 - np.array(small) / wide
@@ -252,7 +300,9 @@ def test_the_room_needs_no_finite_elements():
         "for name in names: importlib.import_module(f'{room.__name__}.{name}')\n"
         "print(len(names), {'dolfinx', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'matplotlib'} & {*sys.modules})"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     number, _, loaded = result.stdout.strip().partition(" ")
     assert int(number) > 8
     assert loaded == "set()"

@@ -1,4 +1,5 @@
-"""Any run as a table: through its steps, back along its own unloading, with errors that hold; what is refused."""
+"""Any run as a table: through its steps, back along its own unloading, with errors that hold; what
+is refused."""
 
 from __future__ import annotations
 
@@ -44,11 +45,14 @@ def dissipated(x):
 def path(*targets, n=20):
     """Displacements from target to target."""
     ends = [0.0, *targets]
-    return np.concatenate([np.linspace(a, b, n + 1)[1:] for a, b in zip(ends, targets, strict=False)])
+    return np.concatenate(
+        [np.linspace(a, b, n + 1)[1:] for a, b in zip(ends, targets, strict=False)]
+    )
 
 
 def synthetic(x, yields=True, keep=None, **changes):
-    """A run over the clearances ``x`` of a joint whose unloading shifts by `opens` and is `elastic`."""
+    """A run over the clearances ``x`` of a joint whose unloading shifts by `opens` and is
+    `elastic`."""
     scene = paper_joint(0.1, 6, 0.002 if yields else None)
     deepest = np.maximum.accumulate(x)
     P, lost = elastic(x - yields * opens(deepest)), yields * dissipated(deepest)
@@ -67,7 +71,8 @@ SHIFTED = synthetic(CYCLES)
 
 
 def test_it_passes_through_the_steps_of_the_run() -> None:
-    """Force, pressure and angle at the steps of first loading; the force at those of the last unloading."""
+    """Force, pressure and angle at the steps of first loading; the force at those of the last
+    unloading."""
     curve, run = run_table(SHIFTED), SHIFTED.columns
     delta, P = np.array(run["delta"]), np.array(run["P"])
     first = np.append(True, np.diff(np.maximum.accumulate(delta)) > 0)
@@ -75,18 +80,26 @@ def test_it_passes_through_the_steps_of_the_run() -> None:
     np.testing.assert_allclose(state.load, P[first], rtol=1e-12)
     np.testing.assert_allclose(state.peak_pressure, np.array(run["p0"])[first], rtol=1e-9)
     np.testing.assert_allclose(state.angle, np.array(run["eps"])[first], rtol=1e-9)
-    np.testing.assert_allclose(curve.at(delta[-20:], delta.max()).load, P[-20:], rtol=1e-9, atol=1e-9 * P.max())
+    np.testing.assert_allclose(
+        curve.at(delta[-20:], delta.max()).load, P[-20:], rtol=1e-9, atol=1e-9 * P.max()
+    )
 
 
 def test_it_finds_every_way_back_from_one() -> None:
-    """Unloading that shifts by dD/P: from any displacement it opens where it does, and loses what it dissipates."""
+    """Unloading that shifts by dD/P: from any displacement it opens where it does, and loses what
+    it dissipates."""
     curve = run_table(synthetic(path(END, 0.0, n=40)))
     deepest = np.array([0.1, 0.4, 0.8, 1.3, 1.8])
-    np.testing.assert_allclose(curve.residual(deepest * curve.length) / curve.length, opens(deepest), atol=3e-3)
+    np.testing.assert_allclose(
+        curve.residual(deepest * curve.length) / curve.length, opens(deepest), atol=3e-3
+    )
     assert (curve.residual(np.linspace(0.0, curve.limit, 400)) >= 0).all()
     for most in deepest:
         x = np.linspace(0.0, most, 2001)
-        there, back = curve.at(x * curve.length).load, curve.at(x * curve.length, most * curve.length).load
+        there, back = (
+            curve.at(x * curve.length).load,
+            curve.at(x * curve.length, most * curve.length).load,
+        )
         assert (back <= there).all()
         lost = np.sum((there - back)[1:] + (there - back)[:-1]) / 2 * (x[1] / curve.force)
         work = np.sum(there[1:] + there[:-1]) / 2 * (x[1] / curve.force)
@@ -94,7 +107,8 @@ def test_it_finds_every_way_back_from_one() -> None:
 
 
 def test_errors_are_measured_where_they_can_be() -> None:
-    """9 in 10 forces between steps lie within the cubic's; that of the way back is of the unloadings not used."""
+    """9 in 10 forces between steps lie within the cubic's; that of the way back is of the
+    unloadings not used."""
     coarse, x = run_table(synthetic(path(END, 0.0, n=10))), np.linspace(0.0, END, 401)
     state = coarse.at(x * coarse.length)
     wrong = np.abs(state.load / coarse.force - elastic(x - opens(x)))
@@ -111,7 +125,8 @@ def test_errors_are_measured_where_they_can_be() -> None:
 
 @pytest.mark.parametrize("strength", [None, 150.0, 230.0])
 def test_it_tells_how_many_steps_one_per_cent_asks_for(strength) -> None:
-    """With a quarter more the error of equal steps is below 1 %, and it says that they are enough."""
+    """With a quarter more the error of equal steps is below 1 %, and it says that they are
+    enough."""
     joint = LawJoint(10.0, 0.05, 115385.0, strength, strength, plane="strain", nu=0.3)
 
     def said(n: int) -> str:
@@ -132,7 +147,9 @@ def test_an_elastic_joint_comes_back_as_it_went() -> None:
     for targets in ((END,), (END, 0.0)):
         curve = run_table(synthetic(path(*targets), yields=False))
         x = np.linspace(0.0, END, 101) * curve.length
-        np.testing.assert_allclose(curve.at(x, curve.limit).load, curve.at(x).load, atol=1e-10 * curve.force)
+        np.testing.assert_allclose(
+            curve.at(x, curve.limit).load, curve.at(x).load, atol=1e-10 * curve.force
+        )
         assert abs(curve.residual(curve.limit)) < 1e-10
 
 
@@ -146,19 +163,30 @@ def general(**changes):
     """A run of a general scene whose pin is pushed along -x and touches at 0.13."""
     scene = load_scene(SCENES / "bushing.toml", ["load.displacement=-0.8"])
     run, q = synthetic(path(0.8), yields=False), path(0.8)
-    run.scene, run.is_joint, run.units = scene, False, {"pull displacement": "mm", "pull force": "N/mm"}
+    run.scene, run.is_joint, run.units = (
+        scene,
+        False,
+        {"pull displacement": "mm", "pull force": "N/mm"},
+    )
     steps = np.append(0.0, q)  # the sleeve is pressed in first
-    run.columns = {"pull displacement": -steps, "pull force": -elastic(steps - 0.13), "plastic_dissipation": 0 * steps}
+    run.columns = {
+        "pull displacement": -steps,
+        "pull force": -elastic(steps - 0.13),
+        "plastic_dissipation": 0 * steps,
+    }
     run.columns |= changes
     run.steps = len(steps)
     return run
 
 
 def test_a_load_of_a_general_scene_has_a_table_too() -> None:
-    """In the units of the run, positive the way it goes, from where contact begins; of the load that is named."""
+    """In the units of the run, positive the way it goes, from where contact begins; of the load
+    that is named."""
     run = general()
     curve = run_table(run, "pull")
-    np.testing.assert_allclose(curve.at(path(0.8)).load, elastic(path(0.8) - 0.13), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        curve.at(path(0.8)).load, elastic(path(0.8) - 0.13), rtol=1e-12, atol=1e-12
+    )
     assert curve.about["contact begins at"].startswith("0.13")
     assert curve.residual([0.8])[0] == pytest.approx(0.13, abs=0.002)
     assert run_table(run).about == curve.about
@@ -189,14 +217,17 @@ def test_what_makes_no_table_is_refused(run, of, said) -> None:
 
 
 def test_runs_of_steel_that_hardens_become_laws(tmp_path, capsys, refused) -> None:
-    """A joint and a lug: a table of every second step is right at the others within its error, on both ways; the
-    command writes it."""
+    """A joint and a lug: a table of every second step is right at the others within its error, on
+    both ways; the command writes it."""
     keys = ["load.steps=[12,12]", "output.fields=false"]
     of_steel = ("yield_stress=355", "hardening=[[0,355],[0.1,500]]")
     steel = [f"{body}.{key}" for body in ("pin", "block") for key in of_steel]
     pressed = [*keys, *steel, "joint.relative_element_size=0.2", "load.displacement=[2,0]"]
     joint = load_scene(SCENES / "steel_pin.toml", pressed)
-    lug = load_scene(SCENES / "lug.toml", [*keys, "lug.element_size=3", "lug.growth=1", "load.displacement=[0.2,0]"])
+    lug = load_scene(
+        SCENES / "lug.toml",
+        [*keys, "lug.element_size=3", "lug.growth=1", "load.displacement=[0.2,0]"],
+    )
     for name, folder in solved({"joint": joint, "lug": lug}, tmp_path).items():
         run = Run(folder)
         names = ("pull displacement", "pull force") if name == "lug" else ("delta", "P")

@@ -1,4 +1,5 @@
-"""Seconds for force and stiffness of an exported law: ``python -m tests.postprocess.laws.time_exports``."""
+"""Seconds for force and stiffness of an exported law: ``python -m
+tests.postprocess.laws.time_exports``."""
 
 from __future__ import annotations
 
@@ -34,13 +35,17 @@ def main() -> None:
         law = load(write(curve, folder / "law.py"))
         write(curve, folder / "law.h")
         (folder / "main.c").write_text(CLIENT)
-        subprocess.run(["gcc", "-std=c99", "-O2", "main.c", "-o", "law", "-lm"], cwd=folder, check=True)
+        subprocess.run(
+            ["gcc", "-std=c99", "-O2", "main.c", "-o", "law", "-lm"], cwd=folder, check=True
+        )
         pairs = inputs(curve)
         delta, deepest = pairs.T
         pairs = pairs[(delta > 0) & (delta < curve.limit) & (deepest < curve.limit)]
         back = pairs[:, 0] < pairs[:, 1]
         for branch, chosen in (("first loading", pairs[~back]), ("way back", pairs[back])):
-            done = subprocess.run([folder / "law"], input=chosen.tobytes(), capture_output=True, check=True)
+            done = subprocess.run(
+                [folder / "law"], input=chosen.tobytes(), capture_output=True, check=True
+            )
             numbers = chosen.tolist()
             start = perf_counter()
             for x, most in numbers:

@@ -19,10 +19,13 @@ RADII = {"bore": 0.4 * R, "pin": R, "hole": R + DR, "outer": 2 * R}
 PUSH = 2 * DR
 
 
-def rings(comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **options) -> TaggedMesh:
-    """A "bush" with a bore in a "ring", so many ``quarters`` of them from the bottom on; with a ``gap`` in the set
-    "hole" at an angle of 120 to 150 degrees. Twice as many ``edges`` are on a quarter of the hole, 16 on one of the
-    pin. Sets are the circles, and the "cuts" where they end."""
+def rings(
+    comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **options
+) -> TaggedMesh:
+    """A "bush" with a bore in a "ring", so many ``quarters`` of them from the bottom on; with a
+    ``gap`` in the set "hole" at an angle of 120 to 150 degrees. Twice as many ``edges`` are on a
+    quarter of the hole, 16 on one of the pin. Sets are the circles, and the "cuts" where they
+    end."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -32,11 +35,16 @@ def rings(comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **op
             angles = np.radians(90.0 * np.arange(quarters + 1))
             if name == "hole" and gap:
                 angles = np.sort(np.append(angles, np.radians([120, 150])))
-            points = [geo.addPoint(radius * np.sin(a), -radius * np.cos(a), 0) for a in angles[: -1 if whole else None]]
+            points = [
+                geo.addPoint(radius * np.sin(a), -radius * np.cos(a), 0)
+                for a in angles[: -1 if whole else None]
+            ]
             points += points[:1] if whole else []
             arcs[name] = [geo.addCircleArc(a, centre, b) for a, b in pairwise(points)]
             for arc, turned in zip(arcs[name], np.diff(angles), strict=True):
-                geo.mesh.setTransfiniteCurve(arc, 1 + 2 * round((edges if name == "hole" else 8) * turned / np.pi * 2))
+                geo.mesh.setTransfiniteCurve(
+                    arc, 1 + 2 * round((edges if name == "hole" else 8) * turned / np.pi * 2)
+                )
             ends.append((points[0], points[-1]))
         cuts = []
         for body, (inner, outer) in {"bush": (0, 1), "ring": (2, 3)}.items():
@@ -46,7 +54,9 @@ def rings(comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **op
             else:
                 first, last = (geo.addLine(ends[inner][k], ends[outer][k]) for k in (0, 1))
                 cuts += [first, last]
-                loops = [geo.addCurveLoop([first, *outside, -last, *(-arc for arc in reversed(inside))])]
+                loops = [
+                    geo.addCurveLoop([first, *outside, -last, *(-arc for arc in reversed(inside))])
+                ]
             face = geo.addPlaneSurface(loops)
             geo.synchronize()
             gmsh.model.addPhysicalGroup(2, [face], name=body)
@@ -58,22 +68,30 @@ def rings(comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **op
             gmsh.model.addPhysicalGroup(1, lines, tag, [*arcs, "cuts"][tag - 1])
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
 
-    return gmsh_to_mesh(comm, build, [Circle(name, (0.0, 0.0), r) for name, r in RADII.items()], **options)
+    return gmsh_to_mesh(
+        comm, build, [Circle(name, (0.0, 0.0), r) for name, r in RADII.items()], **options
+    )
 
 
 def press(
     mesh: TaggedMesh, angle: float = 0.0, symmetry: float = 1.0, degree: int = 2, **contact
 ) -> tuple[System, float]:
-    """The bush's bore moved by ``PUSH``, down and turned by ``angle``; the system and the force along that way."""
+    """The bush's bore moved by ``PUSH``, down and turned by ``angle``; the system and the force
+    along that way."""
     way = np.array([np.sin(angle), -np.cos(angle)])
     supports = [Support("outer", "outer", axis) for axis in range(2)]
     supports += [Support("bore", "bore", axis, way[axis]) for axis in range(2)]
     supports += [Support("cuts", "cuts", 0)] if symmetry > 1 else []
     bodies = [Body("bush", ELASTIC), Body("ring", ELASTIC)]
     contact = Interaction("contact", ("pin", "hole"), **contact)
-    system = solve(Problem(mesh, bodies, [contact], supports, symmetry=symmetry, degree=degree), [PUSH])
+    system = solve(
+        Problem(mesh, bodies, [contact], supports, symmetry=symmetry, degree=degree), [PUSH]
+    )
     force = system.contact_force()
-    balance = max(np.abs(force + system.reaction("outer")).max(), np.abs(force - system.reaction("bore")).max())
+    balance = max(
+        np.abs(force + system.reaction("outer")).max(),
+        np.abs(force - system.reaction("bore")).max(),
+    )
     assert symmetry > 1 or balance < 1e-9 * np.abs(force).max()
     return system, float(force @ way)
 
@@ -87,7 +105,8 @@ def turned(mesh: TaggedMesh, angle: float) -> TaggedMesh:
 @pytest.mark.parametrize("quads", [False, True])
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_a_whole_pin_in_a_whole_hole_is_twice_its_half(quads, kinematics):
-    """P agrees within the discretisation; the whole one's pressure is symmetric, and no force acts aside."""
+    """P agrees within the discretisation; the whole one's pressure is symmetric, and no force acts
+    aside."""
     system, whole = press(rings(MPI.COMM_SELF, 4, quads=quads), kinematics=kinematics)
     _, half = press(rings(MPI.COMM_SELF, 2, quads=quads), symmetry=2.0, kinematics=kinematics)
     assert whole == pytest.approx(half, rel=1e-3)
@@ -97,25 +116,30 @@ def test_a_whole_pin_in_a_whole_hole_is_twice_its_half(quads, kinematics):
     assert abs(system.contact_force()[0]) < 2e-4 * whole
     pair = system.contact.pair_of(hole)
     force, x = (hole.weight * pair.pressure).sum(axis=1), hole.point.mean(axis=1)
-    left, right = (force[np.sign(x[:, 0]) == s][np.argsort(x[np.sign(x[:, 0]) == s, 1])] for s in (-1, 1))
+    left, right = (
+        force[np.sign(x[:, 0]) == s][np.argsort(x[np.sign(x[:, 0]) == s, 1])] for s in (-1, 1)
+    )
     assert np.abs(left - right).max() < 0.02 * force.max()
 
 
 @pytest.mark.parametrize("quads", [False, True])
 def test_cells_and_orders_agree(quads):
-    """Triangles and quads, geometry and displacements of second and third order, also one of each: P and its peak."""
+    """Triangles and quads, geometry and displacements of second and third order, also one of each:
+    P and its peak."""
     fine, expected = press(rings(MPI.COMM_SELF, 4, quads=not quads, order=3), degree=3)
     peak = fine.contact.pair_of(fine.sides["hole"]).pressure.max()
     for order, degree in ((2, 2), (2, 3), (3, 2)):
         system, force = press(rings(MPI.COMM_SELF, 4, quads=quads, order=order), degree=degree)
         assert force == pytest.approx(expected, rel=2e-4)
-        assert system.contact.pair_of(system.sides["hole"]).pressure.max() == pytest.approx(peak, rel=0.01)
+        assert system.contact.pair_of(system.sides["hole"]).pressure.max() == pytest.approx(
+            peak, rel=0.01
+        )
 
 
 @pytest.mark.parametrize("edges", [8, 9])
 def test_forces_do_not_depend_on_where_the_seam_lies(edges):
-    """The mesh turned with the load, so that the seam lies in, beside and opposite to the contact; nor on rounding,
-    which might choose between two facets where vertices face each other."""
+    """The mesh turned with the load, so that the seam lies in, beside and opposite to the contact;
+    nor on rounding, which might choose between two facets where vertices face each other."""
     forces, seams = [], []
     for angle in np.radians([0, 70, 145, 210, 328]):
         system, force = press(turned(rings(MPI.COMM_SELF, 4, edges=edges), angle), angle)
@@ -137,7 +161,8 @@ def test_forces_do_not_depend_on_the_ranks(quads, comm):
 
 
 def test_a_hole_in_pieces_carries_what_the_whole_one_does():
-    """A gap where there is no contact changes nothing; one within it takes its part of the force away."""
+    """A gap where there is no contact changes nothing; one within it takes its part of the force
+    away."""
     _, whole = press(rings(MPI.COMM_SELF, 4, gap=False))
     system, beside = press(rings(MPI.COMM_SELF, 4, gap=True))
     hole = system.sides["hole"].curve

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from tests.geometry.shapes.measures import Cells
-from tests.solver.parts import DR, ELASTIC, PERFECT, R, commit, contact_force, coordinates, joint_parts, nodes_of
+from tests.solver.parts import (
+    DR,
+    ELASTIC,
+    PERFECT,
+    R,
+    commit,
+    contact_force,
+    coordinates,
+    joint_parts,
+    nodes_of,
+)
 
 every_kinematics = pytest.mark.parametrize("kinematics", ["current", "reference", "tied"])
 every_integration = pytest.mark.parametrize("integrated", [None, 0, 1], ids=["both", "pin", "hole"])
@@ -20,10 +30,13 @@ def moment(x, force):
 @every_integration
 @pytest.mark.parametrize("material", [ELASTIC, PERFECT], ids=["elastic", "plastic"])
 def test_action_is_reaction(material, integrated, kinematics):
-    """The nodal contact forces of both bodies sum to zero, for any state; those on the hole are the resultant."""
+    """The nodal contact forces of both bodies sum to zero, for any state; those on the hole are the
+    resultant."""
     parts = joint_parts(pin=material, block=material, integrated=integrated, kinematics=kinematics)
     force = -contact_force(parts.contact, parts.pressed(1.5 * DR, noise=3e-4))
-    on_pin, on_hole = (force[nodes_of(parts.V, parts.cells, tag)].sum(axis=0) for tag in (Cells.PIN, Cells.BLOCK))
+    on_pin, on_hole = (
+        force[nodes_of(parts.V, parts.cells, tag)].sum(axis=0) for tag in (Cells.PIN, Cells.BLOCK)
+    )
     size = np.abs(force).sum()
     assert on_pin[1] > 0.1 * size
     assert np.abs(on_pin + on_hole).max() < 1e-14 * size
@@ -32,7 +45,8 @@ def test_action_is_reaction(material, integrated, kinematics):
 
 @every_integration
 def test_forces_have_no_moment(integrated):
-    """Under current kinematics: each force acts along the line through its two points (unless one is a vertex)."""
+    """Under current kinematics: each force acts along the line through its two points (unless one
+    is a vertex)."""
     parts = joint_parts(size=0.1, integrated=integrated)
     u = parts.pressed(1.5 * DR)
     force = contact_force(parts.contact, u)
@@ -47,7 +61,8 @@ def test_forces_have_no_moment(integrated):
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 @every_integration
 def test_the_resultant_is_the_integrated_pressure(integrated, kinematics):
-    """Shares of both sides' integrals of p n; the pressure is never negative and zero on points without a partner."""
+    """Shares of both sides' integrals of p n; the pressure is never negative and zero on points
+    without a partner."""
     parts = joint_parts(integrated=integrated, kinematics=kinematics)
     contact = parts.contact
     contact.evaluate(parts.pressed(1.5 * DR, noise=3e-4))
@@ -56,15 +71,23 @@ def test_the_resultant_is_the_integrated_pressure(integrated, kinematics):
         assert pair.pressure.min() == 0
         assert not pair.traction[~pair.projection.found].any()
         sign = 1 if pair.surface is parts.sides[-1] else -1
-        total += sign * pair.share * (pair.surface.weight * pair.pressure).ravel() @ pair.projection.normal
+        total += (
+            sign
+            * pair.share
+            * (pair.surface.weight * pair.pressure).ravel()
+            @ pair.projection.normal
+        )
         active += int((pair.pressure > 0).sum())
     assert sum(pair.share for pair in contact.pairs) == pytest.approx(1, rel=1e-15)
-    np.testing.assert_allclose(contact.resultant(), total, rtol=0, atol=1e-15 * np.abs(total).max() * 100)
+    np.testing.assert_allclose(
+        contact.resultant(), total, rtol=0, atol=1e-15 * np.abs(total).max() * 100
+    )
     assert contact.n_active() == active > 0
 
 
 def test_points_without_a_partner_carry_no_pressure():
-    """Hole points above the end of a pin pushed down and into the hole's side, though their gap is negative."""
+    """Hole points above the end of a pin pushed down and into the hole's side, though their gap is
+    negative."""
     parts = joint_parts(size=0.1)
     u = parts.pressed(0.0)
     u[nodes_of(parts.V, parts.cells, Cells.PIN)] += [0.05, -0.3]
@@ -83,7 +106,9 @@ def test_forces_push_and_never_pull(kinematics):
     for pair in parts.contact.pairs:
         on = pair.traction[:, 0] > 0
         assert on.any()
-        assert np.all((pair.projection.normal * pair.surface.outward.reshape(-1, 2)).sum(axis=1)[on] < -0.9)
+        assert np.all(
+            (pair.projection.normal * pair.surface.outward.reshape(-1, 2)).sum(axis=1)[on] < -0.9
+        )
 
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
@@ -106,8 +131,13 @@ def test_the_gap_at_rest_is_the_clearance(kinematics):
         pair = parts.contact.pair_of(side)
         phi = np.arctan2(side.point[..., 0], -side.point[..., 1])
         expected = DR * (1 - np.cos(phi))
-        geometry = 0.1**4 / 384  # sagitta error of a parabola through three points of an arc, 3 % of it
-        assert np.abs(pair.distance - expected).ravel()[pair.projection.found].max() < 1.5 * DR**2 + geometry
+        geometry = (
+            0.1**4 / 384
+        )  # sagitta error of a parabola through three points of an arc, 3 % of it
+        assert (
+            np.abs(pair.distance - expected).ravel()[pair.projection.found].max()
+            < 1.5 * DR**2 + geometry
+        )
 
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
@@ -127,7 +157,9 @@ def test_evaluation_leaves_no_trace_without_commit(kinematics):
     u = parts.pressed(1.2 * DR, noise=1e-4)
     before = contact_force(parts.contact, u)
     contact_force(parts.contact, parts.pressed(6 * DR, noise=1e-3))
-    np.testing.assert_allclose(contact_force(parts.contact, u), before, rtol=0, atol=1e-12 * np.abs(before).max())
+    np.testing.assert_allclose(
+        contact_force(parts.contact, u), before, rtol=0, atol=1e-12 * np.abs(before).max()
+    )
     contact_force(parts.contact, parts.pressed(6 * DR, noise=1e-3))
     commit(parts.contact)
     assert np.abs(contact_force(parts.contact, u) - before).max() > 0.01 * np.abs(before).max()

@@ -1,4 +1,5 @@
-"""Several interactions in one problem, each with its own law, gamma and sides; a law from outside."""
+"""Several interactions in one problem, each with its own law, gamma and sides; a law from
+outside."""
 
 from __future__ import annotations
 
@@ -15,10 +16,25 @@ from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.geometry.shapes.measures import Facets
 from tests.solver.contact.test_tangent import matrix
-from tests.solver.parts import DR, ELASTIC, NU, E, R, blocks, contact_force, coordinates, joint_parts, solve
+from tests.solver.parts import (
+    DR,
+    ELASTIC,
+    NU,
+    E,
+    R,
+    blocks,
+    contact_force,
+    coordinates,
+    joint_parts,
+    solve,
+)
 
 DEPTH = 0.01
-PRESSED = [Support("base", "base", 1), Support("lid", "lid", 1, -1.0), Support("left", "left", 0)]  # free to widen
+PRESSED = [
+    Support("base", "base", 1),
+    Support("lid", "lid", 1, -1.0),
+    Support("left", "left", 0),
+]  # free to widen
 LOW, HIGH = ("lower top", "middle bottom"), ("middle top", "upper bottom")
 
 
@@ -39,16 +55,21 @@ STACKS = {
 
 @pytest.mark.parametrize(("low", "high"), STACKS.values(), ids=STACKS)
 def test_a_stack_of_three_carries_a_uniform_pressure(low, high):
-    """The closed form of one column: pressure, resultants of both interactions by name, displacement."""
+    """The closed form of one column: pressure, resultants of both interactions by name,
+    displacement."""
     system = stack(low, high)
     pressure = contact_modulus(E, NU, "strain") * DEPTH / 3
     x = coordinates(system.V)
     expected = DEPTH / 3 * np.stack([NU / (1 - NU) * x[:, 0], -1 - x[:, 1]], axis=1)
-    np.testing.assert_allclose(system.equilibrium.displacement(), expected, rtol=0, atol=1e-9 * DEPTH)
+    np.testing.assert_allclose(
+        system.equilibrium.displacement(), expected, rtol=0, atol=1e-9 * DEPTH
+    )
     for pair in system.contact.pairs:
         np.testing.assert_allclose(pair.pressure, pressure, rtol=1e-8)
     for name in ("low", "high"):
-        np.testing.assert_allclose(system.contact.resultant(name), [0, pressure], atol=1e-9 * pressure)
+        np.testing.assert_allclose(
+            system.contact.resultant(name), [0, pressure], atol=1e-9 * pressure
+        )
     assert system.sides.keys() == {*LOW, *HIGH}
 
 
@@ -56,12 +77,16 @@ def test_the_tangent_of_several_interactions_is_the_derivative_of_their_forces()
     """In random directions that move every node."""
     system = stack({}, {"law": "tied"})
     contact, rng = system.contact, np.random.default_rng(0)
-    u = system.equilibrium.displacement() + 1e-3 * DEPTH * rng.normal(size=(len(coordinates(system.V)), 2))
+    u = system.equilibrium.displacement() + 1e-3 * DEPTH * rng.normal(
+        size=(len(coordinates(system.V)), 2)
+    )
     contact_force(contact, u)
     K, h = matrix(contact, u.size)[:-2, :-2], 1e-6 * DEPTH
     for _ in range(3):
         d = rng.normal(size=u.shape)
-        difference = (contact_force(contact, u + h * d) - contact_force(contact, u - h * d)).ravel() / (2 * h)
+        difference = (
+            contact_force(contact, u + h * d) - contact_force(contact, u - h * d)
+        ).ravel() / (2 * h)
         assert np.linalg.norm(K @ d.ravel() - difference) < 1e-6 * np.linalg.norm(difference)
 
 
@@ -89,11 +114,18 @@ class Bilateral(ContactLaw):
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_a_law_from_outside_pulls_and_slides(kinematics):
-    """Pulled, the column carries a uniform tension; pushed aside, its upper half drags nothing along."""
-    interaction = Interaction("joint", ("upper bottom", "lower top"), law=Bilateral(), kinematics=kinematics)
+    """Pulled, the column carries a uniform tension; pushed aside, its upper half drags nothing
+    along."""
+    interaction = Interaction(
+        "joint", ("upper bottom", "lower top"), law=Bilateral(), kinematics=kinematics
+    )
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     mesh = blocks(MPI.COMM_SELF, 4, 7)
-    supports = [Support("base", "base", 1), Support("lid", "lid", 1, 1.0), Support("left", "left", 0)]
+    supports = [
+        Support("base", "base", 1),
+        Support("lid", "lid", 1, 1.0),
+        Support("left", "left", 0),
+    ]
     system = solve(Problem(mesh, bodies, [interaction], supports), [DEPTH])
     tension = contact_modulus(E, NU, "strain") * DEPTH / 2
     np.testing.assert_allclose(system.reaction("lid"), [0, tension], atol=1e-9 * tension)
@@ -106,17 +138,26 @@ def test_a_law_from_outside_pulls_and_slides(kinematics):
 
 
 def test_every_rigid_disc_moves_by_itself():
-    """One in the hole, one on the block's upper edge: forces follow the motion of each, and the load factor moves both
-    by their rates."""
+    """One in the hole, one on the block's upper edge: forces follow the motion of each, and the
+    load factor moves both by their rates."""
     parts = joint_parts(pin=None)
     edge = Surface(parts.V, parts.facets.find(Facets.BLOCK_HELD), ELASTIC)
     pin = RigidSurface(RigidCircle(np.array([0.0, -DR]), R), (0.0, -1.0))
     disc = RigidSurface(RigidCircle(np.array([2.5, R]), R), (0.1, -2.0))
     sides = {"pin": [pin, parts.sides[0]], "disc": [disc, edge]}
-    interfaces = [Interface(Interaction(name, ("", "")), surfaces) for name, surfaces in sides.items()]
-    both, u, depth, h = Contact(parts.V, interfaces), np.zeros((len(coordinates(parts.V)), 2)), 1.5 * DR, 1e-6 * DR
+    interfaces = [
+        Interface(Interaction(name, ("", "")), surfaces) for name, surfaces in sides.items()
+    ]
+    both, u, depth, h = (
+        Contact(parts.V, interfaces),
+        np.zeros((len(coordinates(parts.V)), 2)),
+        1.5 * DR,
+        1e-6 * DR,
+    )
     both.move(np.array([depth]))
-    np.testing.assert_array_equal([pin.motion[0], disc.motion[0]], [depth * pin.rate[0], depth * disc.rate[0]])
+    np.testing.assert_array_equal(
+        [pin.motion[0], disc.motion[0]], [depth * pin.rate[0], depth * disc.rate[0]]
+    )
     contact_force(both, u)
     assert all(pair.active.any() for pair in both.pairs)
     along = sum(d.rate @ both.resultant(name) for d, name in ((pin, "pin"), (disc, "disc")))

@@ -15,7 +15,8 @@ from tests.solver.parts import DR, contact_force, interact, joint_parts, n_nodes
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_corrupted_start_does_not_change_the_forces(seed):
-    """Start facets drawn at random lead to the pairs, and the forces, of a search over the whole curve."""
+    """Start facets drawn at random lead to the pairs, and the forces, of a search over the whole
+    curve."""
     parts = joint_parts(size=0.1)
     contact, u = parts.contact, parts.pressed(1.5 * DR, noise=1e-4)
     contact.search()
@@ -24,7 +25,9 @@ def test_a_corrupted_start_does_not_change_the_forces(seed):
     for pair in contact.pairs:
         random = rng.integers(0, pair.opposite.n_facets, len(pair.projection.facet))
         pair.projection = replace(pair.projection, facet=random)
-    np.testing.assert_allclose(contact_force(contact, u), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        contact_force(contact, u), expected, rtol=0, atol=1e-12 * np.abs(expected).max()
+    )
 
 
 def test_the_path_to_a_state_does_not_change_its_pairs():
@@ -44,14 +47,18 @@ def test_the_path_to_a_state_does_not_change_its_pairs():
 
 
 def test_only_points_beyond_the_ends_have_no_partner():
-    """At rest every point within the arcs is paired; pressed down, those of the pin below the block's top still are."""
+    """At rest every point within the arcs is paired; pressed down, those of the pin below the
+    block's top still are."""
     parts = joint_parts(size=0.1)
     contact = parts.contact
     for depth in (0.0, 1.5 * DR, 0.05):
         u = parts.pressed(0.0)
         u[nodes_of(parts.V, parts.cells, Cells.PIN), 1] -= depth
         contact.evaluate(u)
-        pin, hole = (contact.pair_of(side).projection.found.reshape(side.weight.shape) for side in parts.sides)
+        pin, hole = (
+            contact.pair_of(side).projection.found.reshape(side.weight.shape)
+            for side in parts.sides
+        )
         below = parts.sides[0].point[..., 1] - depth < 0
         assert below.any()
         assert pin[below].all()
@@ -62,11 +69,15 @@ def test_only_points_beyond_the_ends_have_no_partner():
 @pytest.mark.mpi
 @pytest.mark.parametrize("when", ["at rest", "moving"])
 def test_a_lost_point_is_an_error_on_every_rank(when, comm, monkeypatch):
-    """A projection that fails on one rank is raised by all, at the start and at any later evaluation: none waits."""
+    """A projection that fails on one rank is raised by all, at the start and at any later
+    evaluation: none waits."""
     parts = joint_parts(comm)
     rest = np.zeros((n_nodes(parts.V), 2))
     parts.contact.evaluate(rest)
-    search = {"at rest": lambda: interact(parts.sides), "moving": lambda: parts.contact.evaluate(rest)}[when]
+    search = {
+        "at rest": lambda: interact(parts.sides),
+        "moving": lambda: parts.contact.evaluate(rest),
+    }[when]
     lost = comm.size - 1
     project = Curve._project
 
@@ -89,7 +100,8 @@ def test_a_point_that_does_not_converge_is_an_error(monkeypatch):
 
 
 def test_sliding_out_of_the_pattern_extends_it():
-    """The matrix pattern grows with the pairs, and says so; a state seen before needs no more room."""
+    """The matrix pattern grows with the pairs, and says so; a state seen before needs no more
+    room."""
     parts = joint_parts(size=0.1)
     u = parts.pressed(1.5 * DR)
     assert not parts.contact.evaluate(u)

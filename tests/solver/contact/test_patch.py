@@ -1,4 +1,5 @@
-"""Contact patch tests: two blocks pressed together carry a uniform stress, whether their meshes match or not."""
+"""Contact patch tests: two blocks pressed together carry a uniform stress, whether their meshes
+match or not."""
 
 from __future__ import annotations
 
@@ -20,13 +21,27 @@ every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 every_integration = pytest.mark.parametrize(
     "integrated", ["", "upper bottom", "lower top"], ids=["both", "upper", "lower"]
 )
-PRESSED = [Support("base", "base", 1), Support("lid", "lid", 1, -1.0), Support("left", "left", 0)]  # free to widen
+PRESSED = [
+    Support("base", "base", 1),
+    Support("lid", "lid", 1, -1.0),
+    Support("left", "left", 0),
+]  # free to widen
 
 
 class Blocks:
-    """Two unit squares with ``n_lower`` and ``n_upper`` edges on their common line; the upper side comes first."""
+    """Two unit squares with ``n_lower`` and ``n_upper`` edges on their common line; the upper side
+    comes first."""
 
-    def __init__(self, n_lower, n_upper, lower=ELASTIC, upper=ELASTIC, loads=(DEPTH,), supports=PRESSED, **contact):
+    def __init__(
+        self,
+        n_lower,
+        n_upper,
+        lower=ELASTIC,
+        upper=ELASTIC,
+        loads=(DEPTH,),
+        supports=PRESSED,
+        **contact,
+    ):
         mesh = blocks(MPI.COMM_SELF, n_lower, n_upper)
         bodies = [Body("lower", lower), Body("upper", upper)]
         joint = Interaction("joint", ("upper bottom", "lower top"), **contact)
@@ -51,7 +66,8 @@ def uniform(V):
 @every_integration
 @pytest.mark.parametrize(("n_lower", "n_upper"), [(4, 4), (4, 7), (9, 5), (2, 7)])
 def test_meshes_pass_whether_they_match_or_not(n_lower, n_upper, integrated, kind):
-    """Uniform pressure, linear displacement and the closed form's force, to round-off, whichever side is integrated."""
+    """Uniform pressure, linear displacement and the closed form's force, to round-off, whichever
+    side is integrated."""
     blocks = Blocks(n_lower, n_upper, integrated=integrated, **kind)
     pressure, expected = uniform(blocks.V)
     np.testing.assert_allclose(blocks.pressures(), pressure, rtol=1e-9)
@@ -60,7 +76,8 @@ def test_meshes_pass_whether_they_match_or_not(n_lower, n_upper, integrated, kin
 
 
 def test_unlike_materials_slide_on_each_other():
-    """Frictionless: each block widens by its own Poisson's ratio under the common pressure (reference pairs match)."""
+    """Frictionless: each block widens by its own Poisson's ratio under the common pressure
+    (reference pairs match)."""
     stiff = replace(ELASTIC, E=5 * E, nu=0.1)
     blocks = Blocks(4, 4, upper=stiff, kinematics="reference")
     u = blocks.u
@@ -85,9 +102,12 @@ def test_matching_plastic_blocks_pass(kind):
     np.testing.assert_allclose(blocks.pressures(), blocks.force, rtol=1e-8)
 
 
-@pytest.mark.parametrize(("n_lower", "n_upper", "integrated"), [(4, 4, ""), (4, 7, ""), (9, 5, "upper bottom")])
+@pytest.mark.parametrize(
+    ("n_lower", "n_upper", "integrated"), [(4, 4, ""), (4, 7, ""), (9, 5, "upper bottom")]
+)
 def test_a_tied_line_passes_shear_and_tension(n_lower, n_upper, integrated):
-    """Any linear displacement imposed all around leaves no force on the nodes within: the tie is not seen."""
+    """Any linear displacement imposed all around leaves no force on the nodes within: the tie is
+    not seen."""
     A = np.array([[0.3, 0.8], [-0.2, 1.0]])
     supports = [
         Support("around", facets, axis, lambda x, axis=axis: x @ A[axis])
@@ -95,12 +115,16 @@ def test_a_tied_line_passes_shear_and_tension(n_lower, n_upper, integrated):
         for axis in range(2)
     ]
     blocks = Blocks(n_lower, n_upper, supports=supports, law="tied", integrated=integrated)
-    np.testing.assert_allclose(blocks.u, DEPTH * coordinates(blocks.V) @ A.T, rtol=0, atol=1e-10 * DEPTH)
+    np.testing.assert_allclose(
+        blocks.u, DEPTH * coordinates(blocks.V) @ A.T, rtol=0, atol=1e-10 * DEPTH
+    )
 
 
 @pytest.mark.parametrize("rates", [(0.0, 1.0), (1.0, 0.0)], ids=["pulled", "pushed aside"])
 def test_frictionless_blocks_carry_no_shear_and_no_tension(rates):
     """A lid pulled up leaves the lower block at rest; one pushed aside drags nothing along."""
-    supports = [Support("base", "base", k) for k in range(2)] + [Support("lid", "lid", k, rates[k]) for k in range(2)]
+    supports = [Support("base", "base", k) for k in range(2)] + [
+        Support("lid", "lid", k, rates[k]) for k in range(2)
+    ]
     blocks = Blocks(4, 4, supports=supports)
     assert np.abs(blocks.u[coordinates(blocks.V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH

@@ -24,12 +24,15 @@ from tests.solver.solving import SEVERAL
 
 
 def body(_, vertices):
-    """Number of the connected body that a cell belongs to; all cells are on rank 0 when gmsh's mesh is cut."""
+    """Number of the connected body that a cell belongs to; all cells are on rank 0 when gmsh's mesh
+    is cut."""
     if not len(vertices):
         return np.zeros(0, dtype=int)
     n = vertices.max() + 1
     rows, columns = vertices[:, [0, 1]].ravel(), vertices[:, [1, 2]].ravel()
-    _, label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)
+    _, label = connected_components(
+        coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False
+    )
     _, number = np.unique(label[vertices[:, 0]], return_inverse=True)
     return number
 
@@ -45,10 +48,15 @@ PAIRS = {"elastic": (ELASTIC, ELASTIC), "plastic": (PERFECT, PERFECT), "rigid pi
 
 
 def state(comm, pin, block, kinematics, partitioner=None):
-    """Active points; norms of forces, energies, PEEQ and the tangent's action; the resultant: at a given state."""
+    """Active points; norms of forces, energies, PEEQ and the tangent's action; the resultant: at a
+    given state."""
     parts = joint_parts(comm, pin, block, kinematics=kinematics, partitioner=partitioner)
     x = coordinates(parts.V)
-    u = 0.3 * DR * np.stack([np.sin(9 * x[:, 0] + x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1)
+    u = (
+        0.3
+        * DR
+        * np.stack([np.sin(9 * x[:, 0] + x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1)
+    )
     if pin is None:
         parts.contact.rigid[0].motion = np.array([[0.0, -1.5 * DR]])
     else:
@@ -78,12 +86,15 @@ def state(comm, pin, block, kinematics, partitioner=None):
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("cut", CUTS if SEVERAL else ["dealt round"])
 def test_terms_do_not_depend_on_the_ranks(cut, pair, kinematics, comm):
-    """However the mesh is cut: residual, resultant, tangent, energies and PEEQ to 1e-12 of those on one rank."""
+    """However the mesh is cut: residual, resultant, tangent, energies and PEEQ to 1e-12 of those on
+    one rank."""
     active, norms, resultant = state(comm, *PAIRS[pair], kinematics, CUTS[cut])
     one_active, one_norms, one_resultant = state(MPI.COMM_SELF, *PAIRS[pair], kinematics)
     assert active == one_active > 0
     np.testing.assert_allclose(norms, one_norms, rtol=1e-12, atol=0)
-    np.testing.assert_allclose(resultant, one_resultant, rtol=0, atol=1e-12 * np.abs(one_resultant).max())
+    np.testing.assert_allclose(
+        resultant, one_resultant, rtol=0, atol=1e-12 * np.abs(one_resultant).max()
+    )
 
 
 @pytest.mark.mpi

@@ -21,19 +21,32 @@ from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
 from archord.geometry.curve import in_pieces
 from archord.solver.contact.surface import Surface, neighbours
 from tests.geometry.shapes.measures import Facets
-from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts, space
+from tests.solver.parts import (
+    DR,
+    ELASTIC,
+    PERFECT,
+    PLANE_STRESS,
+    R,
+    coordinates,
+    joint_parts,
+    space,
+)
 
 SIDES = {"pin": (0, R, np.array([0.0, -DR])), "hole": (1, R + DR, np.array([0.0, 0.0]))}
 BOTTOM = np.array([0.0, -R - DR])
-both_sides = pytest.mark.parametrize(("number", "radius", "centre"), SIDES.values(), ids=SIDES.keys())
+both_sides = pytest.mark.parametrize(
+    ("number", "radius", "centre"), SIDES.values(), ids=SIDES.keys()
+)
 MATERIALS = {"elastic": ELASTIC, "plastic": PERFECT, "plane stress": PLANE_STRESS}
 every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
 
 
 def trace_forms(side):
-    """Both sides of the trace inequality, ``(n, 12, 12)`` each, from strains of unit displacements of the cell's nodes.
+    """Both sides of the trace inequality, ``(n, 12, 12)`` each, from strains of unit displacements
+    of the cell's nodes.
 
-    The integral over the facet of sigma_n^2, and twice the elastic energy of the cell under the bulk's rule.
+    The integral over the facet of sigma_n^2, and twice the elastic energy of the cell under the
+    bulk's rule.
     """
     X, w = bulk_quadrature(TRIANGLE, 2)
     basis = cell_basis(side.V.mesh, 2, side.cells, X)
@@ -44,7 +57,11 @@ def trace_forms(side):
     for unit in units:
         u, nodes = unit.copy(), np.tile(np.arange(6, dtype=np.int32), (len(side.cells), 1))
         s = strain(side.gradient, nodes, u) @ C
-        sigma_n.append(n[..., 0] ** 2 * s[..., 0] + n[..., 1] ** 2 * s[..., 1] + 2 * n[..., 0] * n[..., 1] * s[..., 2])
+        sigma_n.append(
+            n[..., 0] ** 2 * s[..., 0]
+            + n[..., 1] ** 2 * s[..., 1]
+            + 2 * n[..., 0] * n[..., 1] * s[..., 2]
+        )
         eps.append(strain(basis.gradient, nodes, u))
     sigma_n, eps = np.stack(sigma_n, axis=1), np.stack(eps, axis=1)
     trace = np.einsum("nq,naq,nbq->nab", side.weight, sigma_n, sigma_n)
@@ -53,7 +70,8 @@ def trace_forms(side):
 
 @every_material
 def test_gamma_bounds_the_traction_by_the_energy(material):
-    """Integral over the facet of sigma_n^2 <= gamma a(v, v), for random displacements of every contact cell."""
+    """Integral over the facet of sigma_n^2 <= gamma a(v, v), for random displacements of every
+    contact cell."""
     parts = joint_parts(pin=material, block=material)
     rng = np.random.default_rng(0)
     for side in parts.sides:
@@ -84,13 +102,16 @@ def test_gamma_scales_as_stress_per_length():
     np.testing.assert_allclose(stiff.sides[0].gamma, 10 * soft.sides[0].gamma, rtol=1e-12)
     np.testing.assert_allclose(stiff.sides[1].gamma, soft.sides[1].gamma, rtol=1e-12)
     fine = joint_parts(size=0.1)
-    assert np.median(fine.sides[1].gamma) / np.median(soft.sides[1].gamma) == pytest.approx(2, rel=0.2)
+    assert np.median(fine.sides[1].gamma) / np.median(soft.sides[1].gamma) == pytest.approx(
+        2, rel=0.2
+    )
 
 
 @pytest.mark.mpi
 @both_sides
 def test_points_normals_and_weights(number, radius, centre, comm):
-    """Points on the arc, normals along the radius, weights that sum to its length: to the order of the geometry."""
+    """Points on the arc, normals along the radius, weights that sum to its length: to the order of
+    the geometry."""
     side = joint_parts(comm).sides[number]
     ray = side.point - centre
     distance = np.linalg.norm(ray, axis=-1)
@@ -106,7 +127,8 @@ def test_points_normals_and_weights(number, radius, centre, comm):
 @pytest.mark.mpi
 @both_sides
 def test_arc_position(number, radius, centre, comm):
-    """Angle from the bottom times radius, growing along the curve, whichever way it runs; the other end counts back."""
+    """Angle from the bottom times radius, growing along the curve, whichever way it runs; the other
+    end counts back."""
     side = joint_parts(comm).sides[number]
     s = side.arc_position(BOTTOM)
     order = s.ravel() if s[0, 0] < s[-1, -1] else s.ravel()[::-1]
@@ -121,7 +143,8 @@ def test_arc_position(number, radius, centre, comm):
 @pytest.mark.mpi
 @both_sides
 def test_every_rank_holds_the_same_curve(number, radius, centre, comm):
-    """Nodes and their dofs; each facet belongs to one rank, and its points lie where the curve has it."""
+    """Nodes and their dofs; each facet belongs to one rank, and its points lie where the curve has
+    it."""
     side = joint_parts(comm).sides[number]
     for item in (side.curve.X, side.curve_dofs):
         for other in comm.allgather(item):
@@ -140,10 +163,13 @@ def test_every_rank_holds_the_same_curve(number, radius, centre, comm):
 @pytest.mark.mpi
 @both_sides
 def test_curve_displacement_collects_the_nodes_of_all_ranks(number, radius, centre, comm):
-    """The field u = x gives the coordinates of the curve's nodes; forces go back to the rank that owns the node."""
+    """The field u = x gives the coordinates of the curve's nodes; forces go back to the rank that
+    owns the node."""
     parts = joint_parts(comm)
     side = parts.sides[number]
-    np.testing.assert_allclose(side.curve_displacement(coordinates(parts.V)), side.curve.X, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        side.curve_displacement(coordinates(parts.V)), side.curve.X, rtol=0, atol=1e-15
+    )
     force = np.zeros((parts.V.dofmap.index_map.size_local, 2))
     side.add_to_owned(side.curve.X, force)
     assert comm.allreduce((force**2).sum()) == pytest.approx((side.curve.X**2).sum(), rel=1e-13)
@@ -151,7 +177,8 @@ def test_curve_displacement_collects_the_nodes_of_all_ranks(number, radius, cent
 
 @every_material
 def test_points_see_the_strain_of_their_own_cell(material):
-    """A linear displacement gives its constant strain's stress at every point, and itself as displacement."""
+    """A linear displacement gives its constant strain's stress at every point, and itself as
+    displacement."""
     side = joint_parts(pin=material, block=material).sides[1]
     A = 1e-3 * np.array([[1.0, 0.4], [-0.2, -0.5]])
     displacement, force, moduli = side.deform(coordinates(side.V) @ A.T)
@@ -174,15 +201,24 @@ def test_a_gap_leaves_twoin_pieces():
     assert (torn.curve.before < 0).sum() == (torn.curve.after < 0).sum() == 2
     s = torn.curve.arc_length(np.array([0.0, 1.0]))
     np.testing.assert_allclose(s[torn.curve.before < 0, 0], 0, atol=1e-15)
-    assert s[torn.curve.after < 0, 1].sum() == pytest.approx(whole.facet_lengths().sum() * (1 - 1 / whole.n_facets))
+    assert s[torn.curve.after < 0, 1].sum() == pytest.approx(
+        whole.facet_lengths().sum() * (1 - 1 / whole.n_facets)
+    )
     vertices, normal = torn.curve.vertices()
     assert len(vertices) == torn.n_facets + 2
     assert np.all((normal * vertices).sum(axis=1) < 0)
     first = int(np.flatnonzero(torn.curve.after < 0)[0])
     place, near = neighbours(torn.curve, np.array([first, first + 1]), 1)
-    assert sorted(zip(place, near, strict=True)) == [(0, first - 1), (0, first), (1, first + 1), (1, first + 2)]
+    assert sorted(zip(place, near, strict=True)) == [
+        (0, first - 1),
+        (0, first),
+        (1, first + 1),
+        (1, first + 2),
+    ]
     y = torn.curve.X[torn.curve.connectivity[:, 1]]
-    found = torn.curve.closest_point(0.99 * y, y, np.zeros_like(torn.curve.X), np.zeros(len(y), dtype=int))
+    found = torn.curve.closest_point(
+        0.99 * y, y, np.zeros_like(torn.curve.X), np.zeros(len(y), dtype=int)
+    )
     np.testing.assert_array_equal(found.facet, np.arange(torn.n_facets))
     assert found.found.all()
 
@@ -190,11 +226,18 @@ def test_a_gap_leaves_twoin_pieces():
 @pytest.mark.mpi
 def test_a_surface_lies_on_the_boundary(comm):
     """A line within a body, between ranks too, and none at all, are refused."""
-    V = space(create_rectangle(comm, [[0, 0], [2.0, 3.0]], [4, 6], cell_type=CellType.quadrilateral))
+    V = space(
+        create_rectangle(comm, [[0, 0], [2.0, 3.0]], [4, 6], cell_type=CellType.quadrilateral)
+    )
     V.mesh.topology.create_connectivity(1, 2)
     for x, y in ((1.0, None), (None, 1.0), (None, 1.5), (None, 2.0), (5.0, None)):
-        facets = locate_entities(V.mesh, 1, lambda p, x=x, y=y: np.isclose(p[0] if y is None else p[1], y or x))
-        with pytest.raises(ValueError, match="'hole' has no facets" if x == 5 else "'hole' has facets within its body"):
+        facets = locate_entities(
+            V.mesh, 1, lambda p, x=x, y=y: np.isclose(p[0] if y is None else p[1], y or x)
+        )
+        with pytest.raises(
+            ValueError,
+            match="'hole' has no facets" if x == 5 else "'hole' has facets within its body",
+        ):
             Surface(V, facets, ELASTIC, "hole")
 
 

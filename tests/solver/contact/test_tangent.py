@@ -66,8 +66,8 @@ def branch(contact):
 
 
 def assert_tangent_is_derivative(parts, u, *, directions=3):
-    """Central differences in random directions that move the pin as a whole, a rigid one too, and every node by itself;
-    a rigid pin's own force is against the resultant."""
+    """Central differences in random directions that move the pin as a whole, a rigid one too, and
+    every node by itself; a rigid pin's own force is against the resultant."""
     contact, rng = parts.contact, np.random.default_rng(7)
     contact.search()
     contact_force(contact, u)
@@ -105,7 +105,9 @@ def indented(parts):
 
 CASES = [
     pytest.param(
-        bodies, integrated, id=f"{name}, {'both sides' if integrated is None else ('pin', 'hole')[integrated]}"
+        bodies,
+        integrated,
+        id=f"{name}, {'both sides' if integrated is None else ('pin', 'hole')[integrated]}",
     )
     for name, bodies in BODIES.items()
     for integrated in ((None, 0, 1) if bodies[0] else (None,))
@@ -115,8 +117,11 @@ CASES = [
 @every_kinematics
 @pytest.mark.parametrize(("bodies", "integrated"), CASES)
 def test_tangent_is_the_derivative_of_the_forces(bodies, integrated, kinematics):
-    """Of either body's points or both's, pairs moving, fixed or tied, whatever the bodies are made of."""
-    parts = joint_parts(pin=bodies[0], block=bodies[1], kinematics=kinematics, integrated=integrated)
+    """Of either body's points or both's, pairs moving, fixed or tied, whatever the bodies are made
+    of."""
+    parts = joint_parts(
+        pin=bodies[0], block=bodies[1], kinematics=kinematics, integrated=integrated
+    )
     active = assert_tangent_is_derivative(parts, indented(parts))
     points = sum(pair.surface.weight.size for pair in parts.contact.pairs)
     assert active > 0.2 * points
@@ -138,7 +143,8 @@ def test_tangent_when_the_pin_has_slid_along_the_hole(kinematics):
 
 
 def test_tangent_where_the_closest_points_are_vertices():
-    """A hole of bulging facets has corners between them: points that have one as partner do not slide."""
+    """A hole of bulging facets has corners between them: points that have one as partner do not
+    slide."""
     parts = joint_parts(size=0.3)
     u = parts.pressed(20 * DR)
     hole = parts.sides[1]
@@ -152,15 +158,21 @@ def test_tangent_where_the_closest_points_are_vertices():
     assert_tangent_is_derivative(parts, u)
 
 
-@pytest.mark.parametrize("kinematics", ["current", "reference", "current, rubbing", "reference, rubbing"])
+@pytest.mark.parametrize(
+    "kinematics", ["current", "reference", "current, rubbing", "reference, rubbing"]
+)
 @pytest.mark.parametrize("bodies", ["elastic", "elastic pin, plastic hole", "rigid pin"])
 def test_trial_tractions_follow_the_displacements(bodies, kinematics):
-    """At every point, open or closed, by central differences; between fixed pairs and where they rub shears as well."""
+    """At every point, open or closed, by central differences; between fixed pairs and where they
+    rub shears as well."""
     pin, block = BODIES[bodies]
     parts = joint_parts(pin=pin, block=block, kinematics=kinematics)
     contact, u = parts.contact, indented(parts)
     rng, h = np.random.default_rng(3), 1e-6 * DR
-    direction, levels = rng.normal(size=u.shape), rng.normal(size=max((len(s.rate) for s in contact.rigid), default=1))
+    direction, levels = (
+        rng.normal(size=u.shape),
+        rng.normal(size=max((len(s.rate) for s in contact.rigid), default=1)),
+    )
     motions = [surface.motion.copy() for surface in contact.rigid]
     contact.evaluate(u)
     at = partners(contact)
@@ -176,13 +188,16 @@ def test_trial_tractions_follow_the_displacements(bodies, kinematics):
         difference = (ahead - behind) / (2 * h)
         assert 0.1 < pair.active.mean() < 0.95
         components = slice(0, 1 if kinematics == "current" else 2)
-        found = pair.projection.found | ("rubbing" not in kinematics)  # the others are told to carry nothing
+        found = pair.projection.found | (
+            "rubbing" not in kinematics
+        )  # the others are told to carry nothing
         off = (rate - difference)[found, components]
         assert np.abs(off).max() < 1e-6 * np.abs(difference).max()
 
 
 def test_the_points_that_are_expected_to_close_do():
-    """Under reference kinematics pressures are linear where signs do not matter: the next evaluation finds no other."""
+    """Under reference kinematics pressures are linear where signs do not matter: the next
+    evaluation finds no other."""
     parts = joint_parts(kinematics="reference")
     contact = parts.contact
     u, v = parts.pressed(DR), parts.pressed(3 * DR, noise=1e-4)
@@ -192,7 +207,9 @@ def test_the_points_that_are_expected_to_close_do():
     assert contact.anticipate(v - u, still)
     assert not contact.anticipate(v - u, still)
     expected = [pair.active for pair in contact.pairs]
-    assert any((pair.traction[:, 0] < 0).any() for pair in contact.pairs), "closed points pull where they were open"
+    assert any((pair.traction[:, 0] < 0).any() for pair in contact.pairs), (
+        "closed points pull where they were open"
+    )
     contact.evaluate(v)
     assert contact.active_set_changes == 0
     assert contact.n_active() > few
@@ -207,7 +224,9 @@ def test_tangent_of_a_tied_elastic_contact_is_constant():
     at_u = contact_force(parts.contact, u).ravel()
     K = matrix(parts.contact, u.size)[:-2, :-2]
     at_v = contact_force(parts.contact, v).ravel()
-    np.testing.assert_allclose(at_v - at_u, K @ (v - u).ravel(), rtol=0, atol=1e-12 * np.abs(at_v).max())
+    np.testing.assert_allclose(
+        at_v - at_u, K @ (v - u).ravel(), rtol=0, atol=1e-12 * np.abs(at_v).max()
+    )
 
 
 @every_kinematics

@@ -30,7 +30,8 @@ def as_it_is(increment):
 
 
 def test_solves_are_those_with_the_whole_matrix():
-    """Rows that come, go and come again, in any order: product and solution as of the dense matrix."""
+    """Rows that come, go and come again, in any order: product and solution as of the dense
+    matrix."""
     rng = np.random.default_rng(5)
     nodes = 20
     dense, A = stiffness(2 * nodes, rng)
@@ -65,7 +66,8 @@ def test_a_singular_system_has_no_number_for_an_answer():
 
 
 def test_nothing_keeps_a_system_that_is_used_no_more():
-    """Its responses are most of the memory of a run; sweeps solve thousands of runs in one process."""
+    """Its responses are most of the memory of a run; sweeps solve thousands of runs in one
+    process."""
     _, A = stiffness(8, np.random.default_rng(1))
     condensed, ksp = Condensed(A, np.array([0, 2]), as_it_is), PETSc.KSP().create(MPI.COMM_SELF)
     condensed.attach(ksp)
@@ -79,15 +81,20 @@ def test_nothing_keeps_a_system_that_is_used_no_more():
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 @pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
 def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin, monkeypatch):
-    """As with the whole matrix factorised each time, in far fewer iterations: each finds the points that open or close.
-    With fixed partners nothing else is nonlinear: where all of them are found, the first iteration is the last."""
+    """As with the whole matrix factorised each time, in far fewer iterations: each finds the points
+    that open or close. With fixed partners nothing else is nonlinear: where all of them are found,
+    the first iteration is the last."""
     scene = paper_joint(0.08, 3, pin=pin, analysis={"kinematics": kinematics})
     short = solve(scene)
     monkeypatch.setattr(look_ahead, "MOST_REVISIONS", 20)
     patient = solve(scene)
     monkeypatch.setattr(choose, "LEFT_OUT", {"condensed", "look_ahead"})
     long = solve(scene)
-    assert short.joint.equilibrium.tangent.factorisations == 1 < long.joint.equilibrium.tangent.factorisations
+    assert (
+        short.joint.equilibrium.tangent.factorisations
+        == 1
+        < long.joint.equilibrium.tangent.factorisations
+    )
     counts = [[m.iterations for m in run.steps] for run in (short, long)]
     assert max(counts[0]) <= 4
     assert sum(counts[0]) < 0.8 * sum(counts[1])
@@ -106,7 +113,11 @@ def test_the_ranks_take_the_same_way(comm, pin):
     for a, b in zip(many.steps, one.steps, strict=True):
         assert a.iterations == b.iterations
         assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-10)
-    assert many.joint.equilibrium.tangent.factorisations == one.joint.equilibrium.tangent.factorisations == 1
+    assert (
+        many.joint.equilibrium.tangent.factorisations
+        == one.joint.equilibrium.tangent.factorisations
+        == 1
+    )
 
 
 def test_only_joints_that_stay_elastic_and_held_are_condensed():

@@ -21,9 +21,12 @@ def small_is_large(monkeypatch):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("kind", [{}, {"pin": {"rigid": True}}, FORCE, RING], ids=["moved", "rigid", "pressed", "ring"])
+@pytest.mark.parametrize(
+    "kind", [{}, {"pin": {"rigid": True}}, FORCE, RING], ids=["moved", "rigid", "pressed", "ring"]
+)
 def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
-    """To the tolerance of the residual, with fewer factorisations than iterations; on two ranks as on one."""
+    """To the tolerance of the residual, with fewer factorisations than iterations; on two ranks as
+    on one."""
     scene = paper_joint(0.15, 2, **kind)
     iterative = solve(scene, MPI.COMM_WORLD)
     monkeypatch.setattr(lagged, "_MANY_DOFS", 10**9)
@@ -36,12 +39,17 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
 
 
 @pytest.mark.parametrize(("limit", "few"), [("_MANY_SOLVES", 1), ("_MANY_CHANGES", 0)])
-def test_many_solves_or_changes_of_the_contact_bring_a_new_factorisation(limit, few, small_is_large, monkeypatch):
+def test_many_solves_or_changes_of_the_contact_bring_a_new_factorisation(
+    limit, few, small_is_large, monkeypatch
+):
     scene = paper_joint(0.15, 2)
     usual = solve(scene)
     monkeypatch.setattr(lagged, limit, few)
     often = solve(scene)
-    assert often.joint.equilibrium.tangent.factorisations > usual.joint.equilibrium.tangent.factorisations
+    assert (
+        often.joint.equilibrium.tangent.factorisations
+        > usual.joint.equilibrium.tangent.factorisations
+    )
     assert pytest.approx(usual.steps[-1].P, rel=1e-9) == often.steps[-1].P
 
 
@@ -49,16 +57,22 @@ def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
     scene = paper_joint(0.12, 2, 0.002)
     usual = solve(scene)
     monkeypatch.setattr(lagged, "_MANY_DOFS", 10**9)
-    assert solve(scene).joint.equilibrium.tangent.factorisations == usual.joint.equilibrium.tangent.factorisations
+    assert (
+        solve(scene).joint.equilibrium.tangent.factorisations
+        == usual.joint.equilibrium.tangent.factorisations
+    )
 
 
 def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
-    """The preconditioner stays the inverse of the old bordered matrix, while the product is of the new one."""
+    """The preconditioner stays the inverse of the old bordered matrix, while the product is of the
+    new one."""
     rng = np.random.default_rng(3)
     n = 6
     old, new = (rng.normal(size=(n, n)) + 5 * np.eye(n) for _ in range(2))
     m = 2
-    borders = [(rng.normal(size=(n, m)), rng.normal(size=(n, m)), 3 * k * np.eye(m)) for k in (1, 2)]
+    borders = [
+        (rng.normal(size=(n, m)), rng.normal(size=(n, m)), 3 * k * np.eye(m)) for k in (1, 2)
+    ]
     A = PETSc.Mat().createAIJ((n, n), nnz=n, comm=MPI.COMM_SELF)
 
     def fill(values):

@@ -14,14 +14,17 @@ SCENES = {
     "rigid pin": paper_joint(0.08, 4, 0.002, pin={"rigid": True}, analysis={"friction": 0.3}),
     "by force": paper_joint(0.08, 4, load=FORCE),
     "rigid pin by force": paper_joint(0.08, 4, pin={"rigid": True}, load=FORCE),
-    "released": paper_joint(0.1, 1, 0.002, load={"displacement": [1.5, 1.0, 0.2]}, analysis={"friction": 0.3}),
+    "released": paper_joint(
+        0.1, 1, 0.002, load={"displacement": [1.5, 1.0, 0.2]}, analysis={"friction": 0.3}
+    ),
 }
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", SCENES)
 def test_the_states_are_those_without_it_in_fewer_iterations(name, comm, monkeypatch):
-    """To the tolerance of Newton's method, on one rank or several, which take as many iterations."""
+    """To the tolerance of Newton's method, on one rank or several, which take as many
+    iterations."""
     short = solve(SCENES[name], comm)
     alone = solve(SCENES[name]) if SEVERAL else short
     monkeypatch.setattr(choose, "LEFT_OUT", {"look_ahead"})
@@ -35,21 +38,30 @@ def test_the_states_are_those_without_it_in_fewer_iterations(name, comm, monkeyp
 @pytest.mark.parametrize("load", [{}, FORCE], ids=["moved", "pressed"])
 @pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
 def test_what_is_linear_but_for_the_contact_takes_one_iteration(pin, load, monkeypatch):
-    """Elastic bodies and fixed partners, where all points that change are found and systems are solved to the end."""
+    """Elastic bodies and fixed partners, where all points that change are found and systems are
+    solved to the end."""
     monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
     monkeypatch.setattr(look_ahead, "MOST_REVISIONS", 20)
     monkeypatch.setattr(look_ahead, "_TOLERANCE", 1e-12)
     monkeypatch.setattr(look_ahead, "_MOST_SOLVES", 200)
-    steps = solve(paper_joint(0.08, 3, pin=pin, load=load, analysis={"kinematics": "reference"})).steps
+    steps = solve(
+        paper_joint(0.08, 3, pin=pin, load=load, analysis={"kinematics": "reference"})
+    ).steps
     assert [m.iterations for m in steps] == [1, 1, 1]
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.499])
 def test_large_strain_takes_few_more_iterations_than_small(nu):
-    """Nearly incompressible bodies, too, whose pressure an iteration changes that is off in the second order."""
+    """Nearly incompressible bodies, too, whose pressure an iteration changes that is off in the
+    second order."""
     body = {"nu": nu}
     small, large = (
-        sum(m.iterations for m in solve(paper_joint(0.06, 4, pin=body, block=body, analysis={"strain": strain})).steps)
+        sum(
+            m.iterations
+            for m in solve(
+                paper_joint(0.06, 4, pin=body, block=body, analysis={"strain": strain})
+            ).steps
+        )
         for strain in ("small", "large")
     )
     assert large <= small + 1.5 * 4
@@ -62,7 +74,10 @@ def test_an_old_factorisation_preconditions_as_well(monkeypatch):
     usual = solve(scene)
     monkeypatch.setattr(lagged, "_MANY_DOFS", 0)
     kept = solve(scene)
-    assert kept.joint.equilibrium.tangent.factorisations < usual.joint.equilibrium.tangent.factorisations
+    assert (
+        kept.joint.equilibrium.tangent.factorisations
+        < usual.joint.equilibrium.tangent.factorisations
+    )
     for a, b in zip(kept.steps, usual.steps, strict=True):
         assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-8)
 

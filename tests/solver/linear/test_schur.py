@@ -20,7 +20,9 @@ def created(matrix, kept):
     place[np.argsort(last, kind="stable")] = np.arange(1, len(matrix) + 1)
     arrays = rows, columns, kept.astype(np.int32) + 1, place, np.zeros(1, dtype=np.int32)
     at = [pointer(a) for a in arrays]
-    made = schur_kernels().schur_create(MPI.COMM_SELF.py2f(), len(matrix), len(rows), *at[:2], len(kept), *at[2:])
+    made = schur_kernels().schur_create(
+        MPI.COMM_SELF.py2f(), len(matrix), len(rows), *at[:2], len(kept), *at[2:]
+    )
     assert arrays[-1][0] == 0
     return made, arrays
 
@@ -39,7 +41,9 @@ def test_complement_and_solution_are_those_of_the_dense_matrix():
             values, S = A[pattern], np.zeros((m, m))
             assert kernels.schur_factorise(made, pointer(values), pointer(S)) == 0
             inverse = np.linalg.inv(A[np.ix_(others, others)])
-            expected = A[np.ix_(kept, kept)] - A[np.ix_(kept, others)] @ inverse @ A[np.ix_(others, kept)]
+            expected = (
+                A[np.ix_(kept, kept)] - A[np.ix_(kept, others)] @ inverse @ A[np.ix_(others, kept)]
+            )
             assert pytest.approx(expected, abs=1e-12) == S
             b, reduced = rng.normal(size=n), np.zeros(m)
             x = np.linalg.solve(A, b)

@@ -18,7 +18,8 @@ from archord.solver.linear.substructured import substructures
 from tests.solver.solving import MUMPS_FROM_C, solve
 
 SEVERAL = pytest.mark.skipif(
-    MPI.COMM_WORLD.size == 1 or not MUMPS_FROM_C, reason="one rank has no interface, or MUMPS no headers"
+    MPI.COMM_WORLD.size == 1 or not MUMPS_FROM_C,
+    reason="one rank has no interface, or MUMPS no headers",
 )
 
 
@@ -93,7 +94,9 @@ def test_without_the_interface_no_rank_knows_of_another():
     inner = ~np.isin(rows, interface) & ~np.isin(columns, interface)
     assert ((columns[inner] >= start) & (columns[inner] < end)).all()
     ghosts = MPI.COMM_WORLD.allreduce(joint.V.dofmap.index_map.num_ghosts)
-    assert len(interface) < 2 * ghosts + 100  # but for few of the contact, those on cells of several ranks
+    assert (
+        len(interface) < 2 * ghosts + 100
+    )  # but for few of the contact, those on cells of several ranks
 
 
 @pytest.mark.mpi
@@ -112,8 +115,13 @@ def test_a_singular_block_on_one_rank_has_no_number_for_an_answer_on_all():
 @SEVERAL
 @pytest.mark.parametrize("control", ["displacement", "force"])
 def test_a_joint_is_solved_as_without(control, monkeypatch):
-    """Same iterations, same force, whether ranks eliminate their own unknowns or MUMPS works on all together."""
-    load = {} if control == "displacement" else {"load": {"displacement": None, "relative_force": 0.004}}
+    """Same iterations, same force, whether ranks eliminate their own unknowns or MUMPS works on all
+    together."""
+    load = (
+        {}
+        if control == "displacement"
+        else {"load": {"displacement": None, "relative_force": 0.004}}
+    )
     scene = paper_joint(0.15, 2, 0.002, **load)
     ours = solve(scene, MPI.COMM_WORLD)
     monkeypatch.setattr(choose, "LEFT_OUT", {"substructured"})
@@ -127,8 +135,8 @@ def test_a_joint_is_solved_as_without(control, monkeypatch):
 @pytest.mark.mpi
 @pytest.mark.parametrize("degree", [2, 3])
 def test_corners_are_those_of_the_edge_or_triangle(degree):
-    """Nodes lie on the edge, or in the middle of the triangle, of their corners (on straight ones, to a hundredth of
-    them)."""
+    """Nodes lie on the edge, or in the middle of the triangle, of their corners (on straight ones,
+    to a hundredth of them)."""
     joint, _ = pressed(degree)
     index_map = joint.V.dofmap.index_map
     everywhere = np.zeros((index_map.size_global, 2))
@@ -143,7 +151,11 @@ def test_corners_are_those_of_the_edge_or_triangle(degree):
     assert (size[alone] == 0).all()
     assert (size[~alone] > 0).all()
     weights = {2: [1 / 2], 3: [1 / 3, 2 / 3]}[degree]
-    on_edge = [np.abs((1 - w) * ends[:, 0] + w * ends[:, k] - x).max(axis=1) for w in weights for k in (1, 2)]
+    on_edge = [
+        np.abs((1 - w) * ends[:, 0] + w * ends[:, k] - x).max(axis=1)
+        for w in weights
+        for k in (1, 2)
+    ]
     off = np.minimum.reduce([*on_edge, np.abs(ends.mean(axis=1) - x).max(axis=1)])
     assert (off[~alone] <= 0.05 * size[~alone]).all()
 
@@ -151,7 +163,8 @@ def test_corners_are_those_of_the_edge_or_triangle(degree):
 @pytest.mark.mpi
 @pytest.mark.parametrize("degree", [2, 3])
 def test_corners_of_quads(degree):
-    """As those of triangles: a node is the mean of its corners, or at a third between two (straight cells)."""
+    """As those of triangles: a node is the mean of its corners, or at a third between two (straight
+    cells)."""
     equispaced = {"lagrange_variant": LagrangeVariant.equispaced, "shape": (2,)}
     element = basix.ufl.element("P", "quadrilateral", degree, **equispaced)
     V = fem.functionspace(create_unit_square(MPI.COMM_WORLD, 4, 3, CellType.quadrilateral), element)
@@ -168,7 +181,8 @@ def test_corners_of_quads(degree):
 
 
 def grid(n):
-    """Couplings of a square grid of ``n`` by ``n``, and of nodes between neighbours with both; corners of all."""
+    """Couplings of a square grid of ``n`` by ``n``, and of nodes between neighbours with both;
+    corners of all."""
     number = np.arange(n * n).reshape(n, n)
     neighbours = (number[:, :-1], number[:, 1:]), (number[:-1], number[1:])
     ends = np.concatenate([np.stack(pair, -1).reshape(-1, 2) for pair in neighbours])
@@ -191,7 +205,8 @@ def fill_in(n, rows, columns, place):
 
 
 def test_few_entries_fill_in():
-    """Orders are permutations; less fill-in than with the rows as they come, and not more for the sake of corners."""
+    """Orders are permutations; less fill-in than with the rows as they come, and not more for the
+    sake of corners."""
     n, rows, columns, corner = grid(24)
     whole = nested_dissection(n, rows, columns)
     quick = before_corners(n, rows, columns, corner)
@@ -199,7 +214,9 @@ def test_few_entries_fill_in():
         assert sorted(place) == list(range(n))
     middle = np.flatnonzero(corner[:, 0] != np.arange(n))
     assert (quick[middle] < quick[corner[middle]].min(axis=1)).all()
-    natural, metis, ours = (fill_in(n, rows, columns, place) for place in (np.arange(n), whole, quick))
+    natural, metis, ours = (
+        fill_in(n, rows, columns, place) for place in (np.arange(n), whole, quick)
+    )
     assert metis < natural / 1.5
     assert ours < 1.1 * metis
     none = np.zeros(0, dtype=np.int64)  # coupled
