@@ -143,8 +143,8 @@ class _Words(ast.NodeTransformer):
 
 @dataclass(frozen=True)
 class Signature:
-    """A function's name, doc, inputs and locals with their types, the names that it returns, and
-    its body."""
+    """A function's name, its doc in one line (a comment of Octave ends with its line), inputs and
+    locals with their types, the names that it returns, and its body."""
 
     name: str
     doc: str
@@ -167,7 +167,8 @@ class Signature:
             elif isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store) and part.id != "_":
                 own.setdefault(part.id, "float")
         outputs = ast.unparse(last.value).strip("()").split(", ")
-        return cls(node.name, ast.get_docstring(node) or "", inputs, outputs, own, body)
+        doc = " ".join((ast.get_docstring(node) or "").split())
+        return cls(node.name, doc, inputs, outputs, own, body)
 
 
 def in_python(node: ast.FunctionDef, name: str) -> str:

@@ -206,6 +206,21 @@ def test_octave_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
     check(curve, pairs, np.fromfile(tmp_path / "out").reshape(-1, 6))
 
 
+def test_every_line_is_a_statement_or_a_comment(curve: JointCurve, tmp_path: Path) -> None:
+    """In Octave's functions, whatever the length of the docstrings that became comments; and
+    Modelica's descriptions end on the line on which they begin."""
+    functions = export_curve(curve, tmp_path / "law.m").split("\nfunction [doubt] = beyond")[1]
+    statement = re.compile(
+        r"function .*\)|persistent T|break;|(if|while|for) [^;]*|else|end|warn_outside\(.*\);"
+        r"|[\[\]\w, ]+ = .*;|%.*|"
+    )
+    for line in functions.splitlines()[1:]:
+        assert statement.fullmatch(line.strip()), line
+    for line in export_curve(curve, tmp_path / "law.mo").splitlines():
+        if line.strip().startswith("function "):
+            assert re.fullmatch(r'  function \w+ ".*"', line)
+
+
 def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
     """To 1e-12, on 10 000 random pairs, its statements read as Python's: no Modelica compiler is at
     hand. All blocks end, and no function is called that is not there."""
