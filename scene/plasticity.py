@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from archord.materials.hardening import (
     Hardening,
@@ -19,110 +21,179 @@ from archord.materials.named import metal, metals
 from archord.scene.keys import Fault, Pair, Positive, Section, key, require
 
 ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
-_LAWS = {
-    "Voce": {"saturation", "rate"},
-    "Swift": {"offset", "exponent"},
-    "a tension test": {"engineering"},
-}
+Exponent = Annotated[float, Field(gt=0, le=1)]
+Points = Annotated[list[Pair], Field(min_length=1)]
 
 
-class HardeningLaw(Section):
-    """Parameters of one law: ``saturation`` and ``rate`` (Voce), ``offset`` and ``exponent``
-    (Swift), or ``engineering``, the points (strain, stress) of a tension test from first yield
-    on."""
+@dataclass(frozen=True)
+class NamedLaw:
+    """A hardening law as a scene states it: a table of ``parameters``.
 
-    saturation: Positive | None = key("Voce: yield stress at large PEEQ", "stress", default=None)
-    rate: Positive | None = key("Voce: how fast it gets there", default=None)
-    offset: Positive | None = key("Swift: PEEQ by which the power law is shifted", default=None)
-    exponent: Annotated[float, Field(gt=0, le=1)] | None = key(
-        "Swift: exponent of the power law", default=None
-    )
-    engineering: list[Pair] | None = key(
-        "points [strain, stress] of a tension test", default=None, min_length=1
-    )
+    ``parameters`` are the type and the meaning of each key; ``make`` takes the yield stress, E and
+    the parameters by name, and returns the `Hardening`. ``begins`` takes the parameters of a law
+    that says itself where it begins, and returns the stresses that a ``yield_stress`` beside it may
+    repeat; the last one is the true stress.
+    """
+
+    name: str
+    parameters: dict[str, tuple[Any, str]]
+    make: Callable[..., Hardening]
+    begins: Callable[[dict[str, Any]], tuple[float, ...]] | None = None
+
+
+def _tension_test(yield_stress: float, E: float, engineering: list[list[float]]) -> Hardening:
+    return TabularHardening.from_engineering(engineering, E)
+
+
+def _first_of_test(parameters: dict[str, Any]) -> tuple[float, float]:
+    strain, stress = parameters["engineering"][0]
+    return float(stress), float(stress * (1 + strain))
+
+
+def _voce(yield_stress: float, E: float, saturation: float, rate: float) -> Hardening:
+    return VoceHardening(yield_stress, saturation, rate)
+
+
+def _swift(yield_stress: float, E: float, offset: float, exponent: float) -> Hardening:
+    return SwiftHardening(yield_stress / offset**exponent, offset, exponent)
+
+
+# A new law is a class in materials/hardening.py and a row here.
+LAWS = (
+    NamedLaw(
+        "Voce",
+        {
+            "saturation": (Positive, "yield stress at large PEEQ"),
+            "rate": (Positive, "how fast it gets there"),
+        },
+        _voce,
+    ),
+    NamedLaw(
+        "Swift",
+        {
+            "offset": (Positive, "PEEQ by which the power law is shifted"),
+            "exponent": (Exponent, "exponent of the power law"),
+        },
+        _swift,
+    ),
+    NamedLaw(
+        "a tension test",
+        {"engineering": (Points, "points [strain, stress] from first yield on")},
+        _tension_test,
+        _first_of_test,
+    ),
+)
+IN_WORDS = ", ".join(f"{{{', '.join(law.parameters)}}} ({law.name})" for law in LAWS)
+
+
+def _law_of(names: Any) -> NamedLaw | None:
+    """The law that has just the parameters of these ``names``."""
+    return next((law for law in LAWS if law.parameters.keys() == set(names)), None)
+
+
+class _HardeningTable(Section):
+    """The parameters of one of the `LAWS`."""
 
     @model_validator(mode="after")
-    def _one_law(self) -> HardeningLaw:
-        laws = "; or ".join(f"{' and '.join(sorted(keys))} ({law})" for law, keys in _LAWS.items())
-        require(set(self.model_dump(exclude_none=True)) in _LAWS.values(), (), f"must have {laws}")
+    def _one_law(self) -> _HardeningTable:
+        laws = (f"{' and '.join(sorted(law.parameters))} ({law.name})" for law in LAWS)
+        known = _law_of(self.model_dump(exclude_none=True)) is not None
+        require(known, (), f"must have {'; or '.join(laws)}")
         return self
 
 
+_KEYS: dict[str, Any] = {
+    name: (kind | None, key(f"{law.name}: {meaning}", default=None))
+    for law in LAWS
+    for name, (kind, meaning) in law.parameters.items()
+}
+HardeningLaw = create_model("HardeningLaw", __base__=_HardeningTable, **_KEYS)
+
+
 def _kind(value: Any) -> str:
-    return (
-        "list"
-        if isinstance(value, list)
-        else "law"
-        if isinstance(value, dict | HardeningLaw)
-        else "number"
-    )
+    if isinstance(value, list):
+        return "list"
+    return "law" if isinstance(value, dict | HardeningLaw) else "number"
 
 
 HardeningKey = Annotated[
     Annotated[float, Field(ge=0), Tag("number")]
-    | Annotated[list[Pair], Field(min_length=1), Tag("list")]
-    | Annotated[HardeningLaw, Tag("law")],
+    | Annotated[Points, Tag("list")]
+    | Annotated[HardeningLaw, Tag("law")],  # type: ignore[valid-type]
     Discriminator(_kind),
 ]
 
 
 def filled(data: Any, unit: str) -> Any:
-    """The keys ``data`` of a solid with those that they leave open: what the metal brings that
-    ``material`` names, in the ``unit`` of stress, and the yield stress that a table or a tension
-    test says. Raises `Fault`."""
+    """The keys ``data`` of a solid, with the keys that the scene leaves open.
+
+    A metal that ``material`` names brings its numbers, in the ``unit`` of stress. A table or a
+    tension test says the yield stress. Raises `Fault`.
+    """
     if not isinstance(data, dict):
         return data
     if isinstance(data.get("material"), int) and str(data["material"]) in metals():
         data = data | {"material": str(data["material"])}  # as --set reads 4340
     if isinstance(data.get("material"), str) and not data.get("rigid"):
         data = _brought(data, unit) | data
-    with suppress(
-        TypeError, ValueError, LookupError, OverflowError
-    ):  # what is no table is refused later
+    # what is no table is refused later
+    with suppress(TypeError, ValueError, LookupError, OverflowError):
         begin = first_yield(data.get("hardening"))
         said = data.get("yield_stress")
-        near = [math.isclose(said, stress, rel_tol=ROUNDED) for stress in begin if said is not None]
-        if begin and (said is None or any(near)):
+        repeated = said is not None and any(
+            math.isclose(said, stress, rel_tol=ROUNDED) for stress in begin
+        )
+        if begin and (said is None or repeated):
             return data | {"yield_stress": begin[-1]}
     return data
 
 
 def _brought(data: dict[str, Any], unit: str) -> dict[str, Any]:
-    """What the metal brings that ``data`` names: its whole curve from first yield on; or the listed
-    yield strength, where the scene says how the metal hardens from there; or its elasticity alone,
-    where the scene says the yield stress, too. Raises `Fault`."""
+    """What the metal brings that ``data`` names.
+
+    It brings its whole curve from first yield on; or the listed yield strength, where the scene
+    says how the metal hardens from there; or its elasticity alone, where the scene says the yield
+    stress, too. Raises `Fault`.
+    """
     try:
         found = metal(data["material"], unit)
     except ValueError as error:
         raise Fault(("material",), str(error)) from None
     elastic = {"E": found["E"], "nu": found["nu"]}
-    hardening = data.get("hardening")
-    if "yield_stress" in data or _begins(hardening):
+    if "yield_stress" in data or _beginning_of(data.get("hardening")) is not None:
         return elastic
     if "hardening" in data:
         return elastic | {"yield_stress": found["yield"]}
-    said = "would add to the curve of the material, which is all of its hardening: give hardening, too (0.0 for none)"
+    said = (
+        "would add to the curve of the material, which is all of its hardening: give hardening, "
+        "too (0.0 for none)"
+    )
     require(not data.get("back_stresses"), ("back_stresses",), said)
     curve = found["hardening"]
     return elastic | {"yield_stress": curve[0][1], "hardening": curve}
 
 
-def _begins(hardening: Any) -> bool:
-    """Whether this hardening says itself where it begins: a table, or a tension test."""
-    return isinstance(hardening, list) or (
-        isinstance(hardening, dict) and "engineering" in hardening
-    )
+def _first_of_table(points: list[list[float]]) -> tuple[float]:
+    return (float(points[0][1]),)
+
+
+def _beginning_of(hardening: Any) -> Callable[[Any], tuple[float, ...]] | None:
+    """What tells where this hardening begins, of a table and of a law that says it itself."""
+    if isinstance(hardening, list):
+        return _first_of_table
+    if not isinstance(hardening, dict):
+        return None
+    begins = (law.begins for law in LAWS if law.begins and law.parameters.keys() & hardening.keys())
+    return next(begins, None)
 
 
 def first_yield(hardening: Any) -> tuple[float, ...]:
-    """The stress at which a table begins; of a tension test the engineering stress and the true
-    one; of others ()."""
-    if not _begins(hardening):
-        return ()
-    if isinstance(hardening, list):
-        return (float(hardening[0][1]),)
-    strain, stress = hardening["engineering"][0]
-    return float(stress), float(stress * (1 + strain))
+    """The stresses at which a ``hardening`` begins that says it itself, the true one last.
+
+    A table has one. A tension test has the engineering stress and the true one. Others have none.
+    """
+    beginning = _beginning_of(hardening)
+    return beginning(hardening) if beginning else ()
 
 
 def hardening_law(yield_stress: float, hardening: Any, E: float) -> Hardening:
@@ -132,9 +203,7 @@ def hardening_law(yield_stress: float, hardening: Any, E: float) -> Hardening:
         return TabularHardening(tuple(map(tuple, hardening)))
     if not isinstance(hardening, HardeningLaw):
         return LinearHardening(yield_stress, hardening)
-    if hardening.engineering is not None:
-        return TabularHardening.from_engineering(hardening.engineering, E)
-    if hardening.rate is not None and hardening.saturation is not None:
-        return VoceHardening(yield_stress, hardening.saturation, hardening.rate)
-    offset, exponent = hardening.offset or 0.0, hardening.exponent or 0.0
-    return SwiftHardening(yield_stress / offset**exponent, offset, exponent)
+    parameters = hardening.model_dump(exclude_none=True)
+    law = _law_of(parameters)
+    assert law is not None  # `_one_law` has checked it
+    return law.make(yield_stress, E, **parameters)

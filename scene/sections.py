@@ -13,7 +13,7 @@ from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
 from archord.scene.keys import Fault, Name, Positive, Section, given, key, require
-from archord.scene.plasticity import HardeningKey, filled, hardening_law
+from archord.scene.plasticity import IN_WORDS, HardeningKey, filled, hardening_law
 
 NotNegative = Annotated[float, Field(ge=0)]
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
@@ -105,8 +105,8 @@ class Solid(Section):
         "yield stress; elastic if absent", "stress", default=None, example=300.0
     )
     hardening: HardeningKey = key(
-        "modulus d(yield stress)/d(PEEQ), 0: perfect plasticity; or points [PEEQ, true stress]; or a law: {saturation, "
-        "rate} (Voce), {offset, exponent} (Swift), {engineering = points [strain, stress] of a tension test}",
+        "modulus d(yield stress)/d(PEEQ), 0: perfect plasticity; or points [PEEQ, true stress]; or "
+        f"the parameters of a law: {IN_WORDS}",
         "stress",
         default=0.0,
     )
