@@ -63,7 +63,10 @@ def run_on_ranks(command: str, work: Callable[[], int]) -> int:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     code = work()
     if code == 1 and launcher_rank() == 0:
-        said = "ends with exit code 1, for what is told above; the launcher may add a page about that code"
+        said = (
+            "ends with exit code 1, for what is told above; the launcher may add a page about "
+            "that code"
+        )
         print(f"archord {command}: {said}.", file=sys.stderr, flush=True)
     if code == 2:
         from mpi4py import MPI

@@ -29,17 +29,16 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
     target = output or folder / "picture.png"
     if is_sweep(folder):
         sweep = Sweep(folder)
-        text, drawn = sweep_text(sweep), None
+        text = sweep_text(sweep)
+        drawn = None
         if pictures and sweep.runs:
             drawn = draw_runs(
                 list(sweep.runs.values()), [sweep.label(case) for case in sweep.runs], target
             )
     else:
         run = Run(folder)
-        text, drawn = (
-            run_text(run, terminal_width()),
-            draw_run(run, target) if pictures and run.steps else None,
-        )
+        text = run_text(run, terminal_width())
+        drawn = draw_run(run, target) if pictures and run.steps else None
     print(text, *([f"\n{drawn}"] if drawn else []), sep="\n")
     return 0
 

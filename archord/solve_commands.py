@@ -91,7 +91,8 @@ def _solve(
             print(f"archord: warning: {warning}.", file=sys.stderr, flush=True)
         return scene
 
-    comm, told = MPI.COMM_WORLD, list[str]()
+    comm = MPI.COMM_WORLD
+    told = list[str]()
     scene, outcome = solve_and_report(doubted, folder, comm, silent=quiet, begun=begun, **options)
     if outcome.warnings:
         from archord.postprocess.tables import first_of_each_kind
@@ -109,7 +110,8 @@ def _solve(
     elif comm.rank == 0 and not quiet:
         said = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
         if outcome.accuracy is not None and outcome.accuracy.estimated is not None:
-            name, asked = scene.accurate, outcome.accuracy.asked
+            name = scene.accurate
+            asked = outcome.accuracy.asked
             said += (
                 f", estimated error of {name} {outcome.accuracy.estimated:.1e} (asked {asked:g})"
             )

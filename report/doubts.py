@@ -55,4 +55,6 @@ def tell(told: dict[str, Told], step: int, warnings: Iterable[str]) -> None:
         size = getattr(said, "size", 0.0)
         known = told.setdefault(kind(said), Told(str(said), size, step, step))
         if size > known.size:
-            known.said, known.size, known.worst = str(said), size, step
+            known.said = str(said)
+            known.size = size
+            known.worst = step

@@ -37,7 +37,8 @@ def require_memory(size: float) -> None:
     if size > _SHARE * memory:
         gigabytes = 1e9
         raise ValueError(
-            f"claims an array of {size / gigabytes:.3g} GB, more than half of the machine's {memory / gigabytes:.3g} GB"
+            f"claims an array of {size / gigabytes:.3g} GB, more than half of the machine's "
+            f"{memory / gigabytes:.3g} GB"
         )
 
 

@@ -16,7 +16,8 @@ class Table:
     def __init__(
         self, *headings: str, rows: Iterable[Iterable[object]] = (), left: int = 0
     ) -> None:
-        self.headings, self.left = headings, left
+        self.headings = headings
+        self.left = left
         self.rows: list[list[str]] = []
         for row in rows:
             self.add(*row)

@@ -96,7 +96,8 @@ def shortened(text: str, length: int = 80) -> str:
 def _sentence(
     error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]
 ) -> str:
-    place, context = error["loc"], dict(error.get("ctx", {}))
+    place = error["loc"]
+    context = dict(error.get("ctx", {}))
     fault = context.get("error")
     if isinstance(fault, Fault):
         place += fault.place
@@ -108,7 +109,8 @@ def _sentence(
             if isinstance(place[1], int)
             else [table["name"] for table in value].index(place[1])
         )
-        value, place = value[at], place[1:]
+        value = value[at]
+        place = place[1:]
         named = value.get("name") if isinstance(value, dict) else None
         label += f" {json.dumps(named or at + 1, default=str)}"
     keys = [

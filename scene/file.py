@@ -49,7 +49,8 @@ def parse_any(
     """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
     preset: Any = next((scene for name, scene in PRESETS.items() if name in data), None)
     if preset is not None:
-        data, origin = preset(source, origin, **data).general(), None
+        data = preset(source, origin, **data).general()
+        origin = None
     general = "joint" not in data and not {"mesh", "body", "interaction"}.isdisjoint(data)
     scene: Any = ProblemScene if general else Scene
     return scene(source, origin, **data)
@@ -123,13 +124,11 @@ def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
     """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other
     way round."""
     given = {override.partition("=")[0].strip() for override in overrides if not _drops(override)}
-    dropped = (
-        CHOSEN
-        if "analysis.accuracy" in given
-        else ["analysis.accuracy"]
-        if given & {*CHOSEN}
-        else []
-    )
+    dropped: Sequence[str] = ()
+    if "analysis.accuracy" in given:
+        dropped = CHOSEN
+    elif given & {*CHOSEN}:
+        dropped = ("analysis.accuracy",)
     for section, name in (key.split(".") for key in dropped):
         if isinstance(data.get(section), dict):
             data[section].pop(name, None)

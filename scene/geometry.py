@@ -20,7 +20,8 @@ class JointGeometry(Section):
     """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
 
     model: Literal["block", "ring"] = key(
-        "block: the paper's quarter joint; ring: a ring and half a pin, loaded at its core (Persson)",
+        "block: the paper's quarter joint; ring: a ring and half a pin, loaded at its core "
+        "(Persson)",
         default="block",
     )
     radius: float = key("radius R of the pin", "length", gt=0, example=10.0)
@@ -60,7 +61,8 @@ class JointGeometry(Section):
             "radius",
             "must be between 1e-30 and 1e30; choose other units",
         )
-        dR, h = self.dR / self.radius, self.h / self.radius
+        dR = self.dR / self.radius
+        h = self.h / self.radius
         require(
             dR > 0 or self.is_ring,
             name,
@@ -107,7 +109,9 @@ class JointGeometry(Section):
         """About how many triangles the mesh will have: the bodies' area over that of equilateral
         triangles of the size ``t = h + growth |r - R|`` at radius r, integrated in closed form
         (lengths in R)."""
-        h, g, width = self.h / self.radius, self.growth, self.W / self.radius
+        h = self.h / self.radius
+        g = self.growth
+        width = self.W / self.radius
 
         def ring(
             sign: int, depth: float

@@ -35,18 +35,24 @@ _SHAPED = {
 }
 _MEETING = (
     "### Sets that meet\n",
-    "Supports, loads and rigid couplings may have nodes in common. The order of the sections has no part in what "
+    "Supports, loads and rigid couplings may have nodes in common. The order of the sections has "
+    "no part in what "
     "holds there:\n",
-    "- A support wins over a displacement: its nodes stay, and a warning names the sets and a place.\n"
-    "- A set that moves as one must not meet a support that bends it: an edge under a force, and a rigid coupling. "
-    "The scene is refused, unless the set leaves the node at rest. Fix the same freedoms of the coupling, or load the "
+    "- A support wins over a displacement: its nodes stay, and a warning names the sets and a "
+    "place.\n"
+    "- A set that moves as one must not meet a support that bends it: an edge under a force, and "
+    "a rigid coupling. "
+    "The scene is refused, unless the set leaves the node at rest. Fix the same freedoms of the "
+    "coupling, or load the "
     "set by a pressure or a distributing coupling.\n"
     "- A displacement is refused where supports hold every node of its set.\n"
     "- All other motions of a node must be alike, in value and path. Different ones are refused.\n"
     "- Supports that fix a node together have equal parts of its reaction.\n",
     "### Press fits\n",
-    "The mesh shows a fit, or it does not. `overlap` is for surfaces that cross in the mesh: a pin of radius 10.03 is "
-    "drawn in a hole of radius 10. `interference` is for surfaces that lie on one line in the mesh: a pin of radius "
+    "The mesh shows a fit, or it does not. `overlap` is for surfaces that cross in the mesh: a "
+    "pin of radius 10.03 is "
+    "drawn in a hole of radius 10. `interference` is for surfaces that lie on one line in the "
+    "mesh: a pin of radius "
     "10 is drawn in a hole of radius 10, and is made 0.03 too large.\n",
     "```text\n"
     "overlap = 0.03                     interference = 0.03\n"
@@ -70,7 +76,10 @@ def example(general: bool = False) -> str:
     """A commented scene that shows every key, of a joint or a ``general`` one; alternatives and
     absent defaults are commented out."""
     sections, version = (_GENERAL, FORMAT) if general else (_JOINT, JOINT_FORMAT)
-    text = f"# An archord scene: archord solve scene.toml\n\nformat = {version}  # version of the scene format\n"
+    text = (
+        f"# An archord scene: archord solve scene.toml\n\nformat = {version}  # version of the "
+        "scene format\n"
+    )
     for section, info in sections.items():
         text += f"\n{_heading(section, info)}  # {info.description}\n"
         for name, key, schema in _keys(info):
@@ -89,24 +98,31 @@ def reference() -> str:
     """All sections and keys as Markdown tables."""
     parts = [
         "# Scene reference\n",
-        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A scene may begin with "
-        f"the version of its format, `format = {JOINT_FORMAT}`, of a general scene `format = {FORMAT}`, and what is "
+        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A "
+        "scene may begin with "
+        f"the version of its format, `format = {JOINT_FORMAT}`, of a general scene `format = "
+        f"{FORMAT}`, and what is "
         "written by archord does so. A scene of a newer version is refused.\n",
         "## Joints\n",
         "A scene with the section `[joint]` is one of a pin in a hole.\n",
         *_tables(_JOINT, {}),
         "## General scenes\n",
-        "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The sections units, stepping "
-        "and output are those of joints. Headings in double brackets may stand any number of times.\n",
+        "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The "
+        "sections units, stepping "
+        "and output are those of joints. Headings in double brackets may stand any number of "
+        "times.\n",
         *_tables(
             _GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}
         ),
         *_shapes(),
         *_MEETING,
         "## Presets\n",
-        "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, `[outer]`), or "
-        "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, which "
-        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, sleeves and "
+        "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, "
+        "`[outer]`), or "
+        "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, "
+        "which "
+        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, "
+        "sleeves and "
         "housing have materials like it, and the other sections are those of general scenes.\n",
         *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
         *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
@@ -143,8 +159,10 @@ def _shapes() -> Iterator[str]:
         table.add(f'`"{name}"`', f"[{name}]", "; ".join(more))
     yield "### [mesh.shape]\n"
     yield (
-        "Instead of a file: the shape of a preset, as `archord scene --expand` prints it. Its `kind` tells which keys "
-        "it has. `--set mesh.shape.radius=12.0` changes one. The other sections stay as they are, also the `overlap` "
+        "Instead of a file: the shape of a preset, as `archord scene --expand` prints it. Its "
+        "`kind` tells which keys "
+        "it has. `--set mesh.shape.radius=12.0` changes one. The other sections stay as they are, "
+        "also the `overlap` "
         "of an interaction, which is the clearance below 0.\n"
     )
     yield table.markdown()
@@ -160,7 +178,8 @@ def materials() -> str:
         "name", "what", "E", "nu", "yield", "tensile", "hardens from", "to", "at PEEQ", "source"
     )
     for name, m in metals().items():
-        (_, first), (peeq, last) = m["hardening"][0], m["hardening"][-1]
+        (_, first) = m["hardening"][0]
+        (peeq, last) = m["hardening"][-1]
         values = (
             f"{value:g}" for value in (m["E"], m["nu"], m["yield"], m["tensile"], first, last, peeq)
         )
@@ -184,4 +203,7 @@ def _allowed(schema: dict[str, Any]) -> str:
     if "enum" in one:
         return ", ".join(f"`{toml_value(value)}`" for value in one["enum"])
     kind = " or ".join(_KINDS.get(s.get("type"), "table") for s in (one, *more))
-    return f"{kind} {', '.join(f'{sign} {one[limit]:g}' for limit, sign in _SIGNS.items() if limit in one)}".strip()
+    return (
+        f"{kind} "
+        f"{', '.join(f'{sign} {one[limit]:g}' for limit, sign in _SIGNS.items() if limit in one)}"
+    ).strip()

@@ -15,7 +15,7 @@ from archord.scene.errors import InputError
 from archord.scene.faults import in_sentences
 from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Section, key, plain, require, unused
-from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
+from archord.scene.sections import Analysis, JointLoad, Output, Pin, Solid, Stepping, Units
 
 # version of the scene format: rises when a scene gets a meaning that an older archord would get
 # wrong
@@ -49,7 +49,8 @@ class Checked(Section):
             raise InputError(
                 f"{source}: is not a scene: its tables are nested too deeply."
             ) from None
-        version, newest = data.get("format"), type(self).model_fields["format"].default
+        version = data.get("format")
+        newest = type(self).model_fields["format"].default
         if (
             isinstance(version, int) and version > newest
         ):  # it may hold anything else that is unknown here
@@ -88,7 +89,8 @@ class Checked(Section):
     def materials(self: Any) -> dict[str, dict[str, Any]]:
         """The numbers that each body is solved with, by its name: E, nu, the yield stress, and in
         words how it hardens."""
-        unit, solids = self.units.stress, self.solids.items()
+        unit = self.units.stress
+        solids = self.solids.items()
         return {
             name: solid.model_dump(include={"E", "nu", "yield_stress"})
             | {"strength": solid.strength(unit)}
@@ -117,7 +119,7 @@ class Scene(Checked):
     pin: Pin = Field(description="material of the pin")
     block: Solid = Field(description="material of the block")
     analysis: Analysis = Field(default_factory=Analysis, description="model and solver")
-    load: Load = Field(description="loading")
+    load: JointLoad = Field(description="loading")
     stepping: Stepping = Field(
         default_factory=Stepping, description="control of the steps between outputs"
     )
@@ -125,7 +127,9 @@ class Scene(Checked):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        joint, pin, load = self.joint, self.pin, f"load.{self.load.kind}"
+        joint = self.joint
+        pin = self.pin
+        load = f"load.{self.load.kind}"
         self.require_open(CHOSEN)
         require_solids({(name,): body for name, body in self.solids.items()})
         said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
@@ -142,10 +146,8 @@ class Scene(Checked):
         scale, what = (
             (self.E_star * self.thickness, "E* R") if self.force_controlled else (1.0, "the radius")
         )
-        most, unit = (
-            0.5 * scale * joint.radius,
-            " clearances" if self.load.kind == "displacement" else "",
-        )
+        most = 0.5 * scale * joint.radius
+        unit = " clearances" if self.load.kind == "displacement" else ""
         said = f"must not exceed {most / self.load_unit:g}{unit}, half {what}"
         require(max(map(abs, self.targets)) <= most, load, said)
         return self
@@ -154,7 +156,8 @@ class Scene(Checked):
         """Raise `InputError` if the scene leaves its mesh to `archord.studies.accuracy`."""
         if self.analysis.accuracy is not None:
             raise InputError(
-                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it here."
+                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it "
+                "here."
             )
 
     @property
@@ -170,7 +173,8 @@ class Scene(Checked):
     @property
     def _unused(self) -> list[str]:
         """Warnings of keys that say nothing about this joint."""
-        joint, load = self.joint, self.load
+        joint = self.joint
+        load = self.load
         found: list[str] = []
         if not joint.is_ring:
             found += unused(load, "load", "core_radius", 'joint.model = "ring"')
@@ -186,24 +190,26 @@ class Scene(Checked):
         if self.force_controlled or lifted <= 2 * self.joint.dR:
             return []
         return [
-            f"load.{self.load.kind} lifts the pin by {lifted / self.joint.dR:.3g} dR: beyond 2 dR it would meet the "
-            "upper half of the hole, which is not modelled, so P stays 0 there; a joint that is loaded both ways takes "
+            f"load.{self.load.kind} lifts the pin by {lifted / self.joint.dR:.3g} dR: beyond 2 dR "
+            "it would meet the "
+            "upper half of the hole, which is not modelled, so P stays 0 there; a joint that is "
+            "loaded both ways takes "
             "two scenes, one for each direction"
         ]
 
     @property
     def doubts_of_strain(self) -> list[str]:
         """A warning of loads for which small strain is not meant."""
-        farthest, least = max(map(abs, self.targets)) / self.joint.radius, ""
+        farthest = max(map(abs, self.targets)) / self.joint.radius
+        least = ""
         if self.force_controlled:
             stiffest = _STIFFEST_STUCK if self.analysis.friction else _STIFFEST
-            farthest, least = farthest / (stiffest * self.E_star * self.thickness), "at least "
+            farthest = farthest / (stiffest * self.E_star * self.thickness)
+            least = "at least "
         if farthest <= self.small or self.joint.is_ring:
             return []
-        moved, error = (
-            f"load.{self.load.kind} moves the pin by {least}{farthest:.2g} R",
-            self.too_low * farthest,
-        )
+        moved = f"load.{self.load.kind} moves the pin by {least}{farthest:.2g} R"
+        error = self.too_low * farthest
         fall = ", and may let it fall where it should rise" if farthest > _FAR else ""
         said = f"{moved}: small-strain theory makes P about {100 * error:.2g} % too low there{fall}"
         return [f'{said}; analysis.strain = "large" is for that']
@@ -272,11 +278,15 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
     range of numbers."""
     stiffest = max(solid.E for solid in solids.values())
     for place, solid in solids.items():
-        modulus, strength = (*place, "E"), solid.yield_stress
+        modulus = (*place, "E")
+        strength = solid.yield_stress
         require(
             1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units"
         )
-        said = f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in one unit"
+        said = (
+            f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in "
+            "one unit"
+        )
         require(stiffest <= solid.E / _SOFTEST, modulus, said)
         strong = strength is None or strength >= _WEAKEST * solid.E
         require(

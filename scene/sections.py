@@ -19,10 +19,8 @@ NotNegative = Annotated[float, Field(ge=0)]
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
-_E, _NU = (
-    "Young's modulus, unless a material brings it",
-    "Poisson's ratio, unless a material brings it",
-)
+_E = "Young's modulus, unless a material brings it"
+_NU = "Poisson's ratio, unless a material brings it"
 _STUCK = 1000.0  # coefficient of friction from which points are meant to stick
 MOST_STEPS = 10_000  # output steps
 _COERCIVE = 0.25  # gamma over the trace constant, from which on Nitsche's form is coercive
@@ -59,7 +57,8 @@ def friction_doubts(frictions: dict[str, float]) -> list[str]:
     """A question for each coefficient, by its key, that may be one in per cent."""
     doubted = {name: friction for name, friction in frictions.items() if 2 < friction < _STUCK}
     return [
-        f"{name} = {friction:g} is far above what surfaces have: is it in per cent? Then give {friction / 100:g}"
+        f"{name} = {friction:g} is far above what surfaces have: is it in per cent? Then give "
+        f"{friction / 100:g}"
         for name, friction in doubted.items()
     ]
 
@@ -204,7 +203,9 @@ class Solid(Section):
 class Pin(Solid):
     """The pin: a solid like the block, or rigid."""
 
-    E: Positive | None = key(_E, "stress", default=None, example=210000.0)  # type: ignore[assignment]
+    E: Positive | None = key(  # type: ignore[assignment]
+        _E, "stress", default=None, example=210000.0
+    )
     nu: Ratio | None = key(_NU, default=None, example=0.3)  # type: ignore[assignment]
     rigid: bool = key("a rigid pin: no mesh, no other key", default=False, other=True)
     whole: bool = key(
@@ -257,7 +258,7 @@ def steps_of(steps: int | list[int], n: int, place: str) -> list[int]:
     return each
 
 
-class Load(Loading):
+class JointLoad(Loading):
     """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to
     several in turn."""
 
@@ -283,7 +284,7 @@ class Load(Loading):
     )
 
     @model_validator(mode="after")
-    def _steps(self) -> Load:
+    def _steps(self) -> JointLoad:
         require(
             self.path is None,
             "path",
@@ -340,7 +341,8 @@ class Modelling(Section):
         if self.gamma_factor >= _COERCIVE:
             return []
         return [
-            f"analysis.gamma_factor = {self.gamma_factor:g} is below {_COERCIVE:g}, where Nitsche's form is not "
+            f"analysis.gamma_factor = {self.gamma_factor:g} is below {_COERCIVE:g}, where "
+            "Nitsche's form is not "
             "coercive: forces and pressures may be wrong by a tenth and more; the default is 0.5"
         ]
 
@@ -398,8 +400,10 @@ class Output(Section):
     """What a run writes besides its curves."""
 
     fields: Literal[False, "cells", "nodes", "points"] = key(
-        "write the fields of every step to fields.vtkhdf, fields.xdmf and fields.h5: of stress and plastic strain the "
-        "means of cells, or also values at the nodes, or also those at the integration points; true is the default",
+        "write the fields of every step to fields.vtkhdf, fields.xdmf and fields.h5: of stress "
+        "and plastic strain the "
+        "means of cells, or also values at the nodes, or also those at the integration points; "
+        "true is the default",
         default="cells",
     )
 

@@ -24,11 +24,10 @@ from archord.scene.sections import (
     Units,
 )
 
-_THINNEST, _DEEPEST, _FARTHEST = (
-    0.02 * (1 - 1e-9),
-    0.03,
-    1e3,
-)  # walls, overlaps and lengths over the pin's radius
+# walls, overlaps and lengths over the pin's radius
+_THINNEST = 0.02 * (1 - 1e-9)
+_DEEPEST = 0.03
+_FARTHEST = 1e3
 _MATERIAL = {*Solid.model_fields}
 PinPart = Literal["half", "whole", "none"]
 
@@ -63,12 +62,23 @@ class Shape(Section):
         return self.model_dump() | {"element_size": self.h}
 
 
-class Lug(Shape):
-    """A straight lug, clamped at one end, and its pin, which pulls at the other."""
+class BoredShape(Shape):
+    """A shape whose hole leaves the pin a clearance."""
 
     clearance: float = key(
         "hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1
     )
+
+    @model_validator(mode="after")
+    def _clearance(self):
+        between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
+        require(-_DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
+        return self
+
+
+class PlateOutline(Section):
+    """The outline of a straight lug, as each plate of a clevis is one."""
+
     width: Positive = key("width W", "length", example=40.0)
     edge_distance: Positive | None = key(
         "from hole's centre to the loaded end; W/2 if absent", "length", other=20.0
@@ -79,12 +89,15 @@ class Lug(Shape):
     end: Literal["round", "square"] = key(
         "the loaded end: an arc of radius W/2, or straight", default="round"
     )
+
+
+class Lug(PlateOutline, BoredShape):
+    """A straight lug, clamped at one end, and its pin, which pulls at the other."""
+
     half: bool = key("model the half y >= 0 alone", default=True)
 
     @model_validator(mode="after")
     def _lug(self) -> Lug:
-        between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
-        require(-_DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
         self.check()
         return self
 
@@ -96,7 +109,9 @@ class Lug(Shape):
     def check(self, hole: float | None = None, place: tuple[str, ...] = ()) -> None:
         """Raise `Fault` below ``place`` for a plate in which a ``hole`` of this radius, by default
         its own, leaves no ligament."""
-        a, R, half = self.arguments(), self.radius, self.width / 2
+        a = self.arguments()
+        R = self.radius
+        half = self.width / 2
         hole = hole or self.hole
         behind = a["length"] - max(hole, half - a["edge_distance"])
         ligaments = {
@@ -134,7 +149,8 @@ class LugBushing(Solid):
     def check(self, lug: Lug, place: tuple[str, ...] = ()) -> float:
         """The radius of the hole that it needs in the plate of ``lug``. Raises `Fault` below
         ``place``."""
-        R, outer = lug.radius, lug.radius + lug.clearance + self.thickness
+        R = lug.radius
+        outer = lug.radius + lug.clearance + self.thickness
         require(
             self.thickness >= _THINNEST * R,
             (*place, "thickness"),
@@ -168,19 +184,8 @@ class LugShape(Lug):
         return super().hole + (self.wall or 0.0) - self.interference
 
 
-class PlateOutline(Section):
-    """The outline of one plate of a clevis."""
-
-    width: Positive = key("width W", "length", example=40.0)
-    edge_distance: Positive | None = key(
-        "from hole's centre to the loaded end; W/2 if absent", "length", other=20.0
-    )
-    length: Positive | None = key(
-        "from the hole's centre to the clamp; 1.5 W if absent", "length", default=None
-    )
-    end: Literal["round", "square"] = key(
-        "the loaded end: an arc of radius W/2, or straight", default="round"
-    )
+class PlateOfClevis(PlateOutline):
+    """One plate of a clevis."""
 
     def lug(self, clevis: Clevis) -> Lug:
         """The plate as a lug, unchecked."""
@@ -193,13 +198,13 @@ class PlateOutline(Section):
         return {name: found[name] for name in PlateOutline.model_fields}
 
 
-class ClevisPlate(PlateOutline, Solid):
+class ClevisPlate(PlateOfClevis, Solid):
     """The inner plate of a clevis, or each of its two outer ones."""
 
     thickness: Positive = key("thickness of this plate", "length", example=10.0)
 
 
-class DrawnPlate(PlateOutline):
+class DrawnPlate(PlateOfClevis):
     """The outline of one plate of a clevis, and what a margin of safety needs beside it."""
 
     thickness: Positive | None = key(
@@ -207,18 +212,8 @@ class DrawnPlate(PlateOutline):
     )
 
 
-class Clevis(Shape):
+class Clevis(BoredShape):
     """A pin through one inner and two outer plates, and how finely they are meshed."""
-
-    clearance: float = key(
-        "hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1
-    )
-
-    @model_validator(mode="after")
-    def _clearance(self) -> Clevis:
-        between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
-        require(-_DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
-        return self
 
 
 class ClevisShape(Clevis):
@@ -250,8 +245,12 @@ class Bushing(Shape):
 
     def check(self, rings: list[list[float]], names: list[str]) -> None:
         """Raise `Fault`, of the keys ``names``, for ``rings`` that do not fit."""
-        R, edge = self.radius, self.radius
-        fits = f"must not overlap what is inside by more than {_DEEPEST:g} of its radius, nor be wider by more than 0.5"
+        R = self.radius
+        edge = self.radius
+        fits = (
+            f"must not overlap what is inside by more than {_DEEPEST:g} of its radius, nor be "
+            "wider by more than 0.5"
+        )
         for name, (inner, outer) in zip(names, rings, strict=True):
             require(
                 outer - inner >= _THINNEST * R,
@@ -348,7 +347,9 @@ class Preset(Checked):
         ``surfaces`` the first faces the second at the first of the ``gaps`` by the first of the
         ``laws``, the third the fourth, ..."""
         half, touching = (shape.get(name, True) for name in ("half", "touching"))
-        rigid, names, contacts = self.pin.rigid, ["pin", *solids], list[dict[str, Any]]()
+        rigid = self.pin.rigid
+        names = ["pin", *solids]
+        contacts = list[dict[str, Any]]()
         for k, gap in enumerate(gaps):
             facing = {
                 "name": f"{names[k]} in {names[k + 1]}",
@@ -430,7 +431,10 @@ class ClevisScene(Preset):
         self._require_whole("clevis.clearance", self.clevis.clearance)
         for name, plate in self._plates.items():
             plate.lug(self.clevis).check(place=(name,))
-        said = "is not for a clevis: its plates share a force, and the displacement is the sum of both; give force"
+        said = (
+            "is not for a clevis: its plates share a force, and the displacement is the sum of "
+            "both; give force"
+        )
         require(self.load.displacement is None, "load.displacement", said)
         require(not self.pin.rigid, "pin.rigid", "must be false in a clevis")
         said = "is not for a clevis, whose plates have a thickness each"
@@ -514,10 +518,10 @@ def _general(
 ) -> dict[str, Any]:
     """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that
     ``scene`` has, too, the keys that were given, as an accuracy chooses some others."""
-    pin, said = (
-        scene.pin,
-        {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")},
-    )
+    pin = scene.pin
+    said = {
+        name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")
+    }
     for name in ("integration", "coarse_start", "friction"):  # of presets alone
         said["analysis"].pop(name, None)
     if friction := scene.analysis.friction:
@@ -526,10 +530,11 @@ def _general(
             for part in parts["interaction"]
         ]
     bodies = solids if pin.rigid or pin in solids.values() else {"pin": pin, **solids}
+    drawn = "whole" if pin.whole else "half"
+    if pin.rigid:
+        drawn = "none"
     parts |= {
-        "mesh": {
-            "shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}
-        },
+        "mesh": {"shape": shape | {"pin": drawn}},
         "body": [
             {"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL)
             for n, s in bodies.items()
@@ -540,7 +545,9 @@ def _general(
 
 def general_joint(scene: Scene) -> dict[str, Any]:
     """The general scene that the ``scene`` of a joint stands for; its pin is pressed along -y."""
-    g, pin, load = scene.joint, scene.pin, scene.load
+    g = scene.joint
+    pin = scene.pin
+    load = scene.load
     contact: dict[str, Any] = {
         "name": "contact",
         "surfaces": ["pin", "hole"],
@@ -550,7 +557,9 @@ def general_joint(scene: Scene) -> dict[str, Any]:
         contact |= {"surfaces": ["hole"], "rigid": {"centre": [0.0, -g.dR], "radius": g.radius}}
     elif scene.analysis.integration != "both":
         contact["integrated"] = "pin" if scene.analysis.integration == "pin" else "hole"
-    on = "contact" if pin.rigid else "pin" if g.is_ring else "pin top"
+    on = "pin" if g.is_ring else "pin top"
+    if pin.rigid:
+        on = "contact"
     press: dict[str, Any] = {"name": "press", "on": on, "direction": "y"}
     press["force" if scene.force_controlled else "displacement"] = [
         -at * scene.load_unit for at in load.stages

@@ -119,11 +119,9 @@ class _Search:
     mesh_error: float | None = None
 
     def __post_init__(self) -> None:
-        self.asked, self.begun, self.levels = (
-            self.scene.analysis.accuracy or 0.0,
-            perf_counter(),
-            list[Level](),
-        )
+        self.asked = self.scene.analysis.accuracy or 0.0
+        self.begun = perf_counter()
+        self.levels = list[Level]()
         self.step_error = None if self.scene.plastic else 0.0
         self.family: MeshFamily | ProblemFamily
         if isinstance(self.scene, Scene):
@@ -166,18 +164,18 @@ class _Search:
                 self._tell(replace(finer_level, step_error=error))
                 return curve, replace(level, step_error=self.step_error)
             self._tell(replace(level, step_error=self.step_error))
-            curve, level, self.substeps, self.step_error = (
-                finer,
-                finer_level,
-                2 * self.substeps,
-                error,
-            )
+            curve = finer
+            level = finer_level
+            self.substeps = 2 * self.substeps
+            self.step_error = error
             if 2 * error <= self.asked or self.substeps >= MOST_SUBSTEPS:
                 return curve, replace(level, step_error=error)
 
     def _solve(self, mesh: int, substeps: int) -> tuple[Curve | None, Level]:
         """The curve on ``mesh``, None where that hardly notices the contact. Raises `_End`."""
-        scene, before, begun = self.family.scene_of(mesh, substeps), self.outcome, perf_counter()
+        scene = self.family.scene_of(mesh, substeps)
+        before = self.outcome
+        begun = perf_counter()
         if scene is None and before is None:
             raise InputError(
                 "analysis.accuracy: no mesh within the limits of its element sizes would do."
@@ -198,10 +196,8 @@ class _Search:
         if outcome.status != "done" and outcome.message != UNSEEN:
             raise _End
         curve = self.comm.bcast(self.family.curve(outcome.steps))
-        iterations, seconds = (
-            sum(m.iterations for m in outcome.steps),
-            round(perf_counter() - begun, 4),
-        )
+        iterations = sum(m.iterations for m in outcome.steps)
+        seconds = round(perf_counter() - begun, 4)
         sizes = self.family.sizes(scene)
         level = Level(mesh + 1, *sizes, substeps, self.family.dofs, curve[-1], seconds, iterations)
         return curve if self.family.resolved(scene, outcome.steps) else None, level
@@ -213,7 +209,8 @@ class _Search:
     def finish(self) -> Outcome:
         """Note in run.json how accurate the last run is; the outcome. Collective."""
         assert self.outcome is not None
-        done, seconds = self.outcome.status == "done", round(perf_counter() - self.begun, 4)
+        done = self.outcome.status == "done"
+        seconds = round(perf_counter() - self.begun, 4)
         mesh, steps = (self.mesh_error, self.step_error) if done else (None, None)
         estimated = None if mesh is None or steps is None else mesh + steps
         accuracy = Accuracy(
@@ -244,9 +241,18 @@ class _Search:
 
     def _shortfall(self, estimated: float | None) -> str:
         """Why the error is not ``estimated`` as small as asked, and what to do."""
-        said = "the error could not be estimated, as only one mesh within the limits resolves the contact"
+        said = (
+            "the error could not be estimated, as only one mesh within the limits resolves the "
+            "contact"
+        )
         if estimated is not None:
-            said = f"the error is estimated at {estimated:.1e}, not below analysis.accuracy = {self.asked:g}"
+            said = (
+                f"the error is estimated at {estimated:.1e}, not below analysis.accuracy = "
+                f"{self.asked:g}"
+            )
         if self.step_error is not None and 2 * self.step_error > self.asked:
-            return f"accuracy: {said}: {self.substeps} steps an output step are too few; increase the number of steps"
+            return (
+                f"accuracy: {said}: {self.substeps} steps an output step are too few; increase "
+                "the number of steps"
+            )
         return f"accuracy: {said}: a finer mesh would be too large; ask for less accuracy"

@@ -150,7 +150,8 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     data = read_toml(path)
     if "base" not in data and not {"joint", "mesh", "lug", "clevis", "bushing"}.isdisjoint(data):
         raise InputError(
-            f"{path}: is a scene, not a sweep; solve it by archord solve, or name a scene as a base."
+            f"{path}: is a scene, not a sweep; solve it by archord solve, or name a scene as a "
+            "base."
         )
     source = path
     if isinstance(data.get("base"), str):
@@ -278,7 +279,8 @@ def samples(hypercube: LatinHypercube) -> list[Overrides]:
     holds one."""
     from scipy.stats import qmc
 
-    ranges, generator = hypercube.ranges, np.random.default_rng(hypercube.seed)
+    ranges = hypercube.ranges
+    generator = np.random.default_rng(hypercube.seed)
     columns = qmc.LatinHypercube(d=len(ranges), seed=generator).random(hypercube.number).T
     for k, r in enumerate(ranges.values()):
         low, high = np.log([r.low, r.high]) if r.scale == "log" else (r.low, r.high)
@@ -337,7 +339,8 @@ _LATER = {
 def run_name(scene: AnyScene) -> str:
     """Twelve hexadecimal digits that stand for the resolved scene, its output in the words of the
     first version that solved it so, and how archord solves it."""
-    data, fields = tomllib.loads(resolved(scene)), scene.output.fields
+    data = tomllib.loads(resolved(scene))
+    fields = scene.output.fields
     data["output"] = {
         "fields": bool(fields),
         "stress": fields in ("nodes", "points"),

@@ -103,7 +103,8 @@ def solve_case(case: Case, folder: Path, force: bool = False) -> Result:
     there; after a signal begin nothing. Whatever goes wrong in a case is its result."""
     if _interrupt.received:
         return Result(case.run, "open")
-    begun, run = perf_counter(), of_case(case, folder)
+    begun = perf_counter()
+    run = of_case(case, folder)
     try:
         result = _solved(case, run, force)
     except Exception as error:

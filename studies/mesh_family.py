@@ -39,7 +39,9 @@ class MeshFamily:
     ``accuracy`` with the third, or with the second if that is coarse; each by ``ratio`` finer.
     Whoever solves them notes their ``dofs``."""
 
-    ratio, order, dofs = RATIO, 2.0, 0
+    ratio = RATIO
+    order = 2.0
+    dofs = 0
 
     def __init__(self, scene: Scene, accuracy: float) -> None:
         self.scene = scene
@@ -54,7 +56,8 @@ class MeshFamily:
     def scene_of(self, level: int, substeps: int) -> Scene | None:
         """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would
         be too fine for the limits of the keys."""
-        size, keys = self.first / RATIO**level, self.scene.joint.model_dump(exclude_none=True)
+        size = self.first / RATIO**level
+        keys = self.scene.joint.model_dump(exclude_none=True)
         keys |= {
             "relative_element_size": rounded(size * self.scale),
             "growth": rounded(min(2.0, _GROWTH * size)),
@@ -76,7 +79,8 @@ class MeshFamily:
 
     def resolved(self, scene: Any, steps: Sequence[Measures]) -> bool:
         """Whether enough facets are in contact to learn from, if any are to be."""
-        area, joint = max(m.contact_area for m in steps), scene.joint
+        area = max(m.contact_area for m in steps)
+        joint = scene.joint
         facets = area / 2 / joint.h / max(1.0, joint.size_ratio)
         return facets >= _FEWEST_FACETS or max(m.delta for m in steps) <= 0
 
@@ -87,10 +91,12 @@ class ProblemFamily:
     (Williams 1952), and where bodies yield single differences are too small for more. Whoever
     solves them notes their ``dofs``."""
 
-    order, dofs = 1.5, 0
+    order = 1.5
+    dofs = 0
 
     def __init__(self, scene: ProblemScene) -> None:
-        self.scene, self.shape = scene, scene.mesh.shape
+        self.scene = scene
+        self.shape = scene.mesh.shape
         self.ratio = _OF_FILES if self.shape is None else RATIO
 
     def scene_of(self, level: int, substeps: int) -> ProblemScene | None:

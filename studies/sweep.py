@@ -68,7 +68,8 @@ def result_of(case: Case, folder: Path) -> Result:
             case.run, "failed", (run / FAILURE).read_text(encoding="utf-8").partition("\n")[0]
         )
     report = report_of(run)
-    status, steps = report.get("status"), len(report.get("steps", []))
+    status = report.get("status")
+    steps = len(report.get("steps", []))
     between_meshes = (
         case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
     )
@@ -95,7 +96,8 @@ def claim(sweep: Sweep, folder: Path) -> None:
             held = {run.name for run in (folder / CASES).iterdir()}
             if held and held.isdisjoint(case.run for case in sweep.cases):
                 raise InputError(
-                    f"{folder}: holds another sweep, which has no case in common with {sweep.path}; choose another "
+                    f"{folder}: holds another sweep, which has no case in common with "
+                    f"{sweep.path}; choose another "
                     "folder with -o, or remove this one."
                 )
             replace_file(folder / FILE, sweep.file.resolved())
@@ -177,9 +179,11 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
     )  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
     head = ["case", "run", "status", *(heading(key, sweep.cases[0].scene) for key in sweep.keys)]
-    steps, cases = [[*head, *history]], [[*head, *_COST, *(history[i] for i in last)]]
+    steps = [[*head, *history]]
+    cases = [[*head, *_COST, *(history[i] for i in last)]]
     for case in sweep.cases:
-        result, (own, *rows) = found[case.run], histories[case.run] or [[]]
+        result = found[case.run]
+        (own, *rows) = histories[case.run] or [[]]
         named = (dict(zip(own, row, strict=False)) for row in rows)
         rows = [[values.get(name, "") for name in history] for values in named]
         first = [

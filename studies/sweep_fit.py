@@ -81,7 +81,9 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
     mesh, over ``load_range`` in clearances. Raises `InputError` where no case can be fitted."""
     distinct = read_sweep(folder / FILE).distinct
     of: dict[str, str] = {}  # the names of the cases by those of their curves
-    runs, rows, left_out = [], [], []
+    runs = []
+    rows = []
+    left_out = []
     for case in distinct:
         result = result_of(case, folder)
         try:
@@ -111,7 +113,8 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
         )
     notes = {
         "archord": VERSION,
-        "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
+        "sweep": f"{folder.name}, sha256 "
+        f"{hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
         "distinct cases": str(len(distinct)),
     }
     softer = max(LawJoint.from_scene(run.scene).softer[0] for run in runs)
@@ -121,7 +124,8 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
         )
     if poor := sum(row["rms"] > POOR for row in rows):
         notes["rms"] = (
-            f"above {POOR:.0%} in {poor} of {len(rows)} cases: P of these has another shape than the law"
+            f"above {POOR:.0%} in {poor} of {len(rows)} cases: P of these has another shape than "
+            "the law"
         )
     return SweepFit(rows, notes, left_out)
 
@@ -132,9 +136,12 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> Ro
     run = refined.run
     if run.scene.pin.whole:
         raise InputError(
-            f"{run.name}: pin.whole = true does not fit: k and c of a sweep are those of half a pin."
+            f"{run.name}: pin.whole = true does not fit: k and c of a sweep are those of half a "
+            "pin."
         )
-    fit, pin, block = fit_curve([refined], load_range), run.scene.pin, run.scene.block
+    fit = fit_curve([refined], load_range)
+    pin = run.scene.pin
+    block = run.scene.block
     row: Row = {
         "run": name,
         "plane": run.plane,

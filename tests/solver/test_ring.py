@@ -11,7 +11,7 @@ from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.presets.joint_account import core_peeq
 from archord.presets.measures import energy_balance
-from archord.scene.sections import Load
+from archord.scene.sections import JointLoad
 from tests.solver.solving import solve
 
 LIKE = LawJoint(1.0, DR, 1.0)
@@ -102,7 +102,7 @@ def pressed_core(core_radius=0.1, yield_stress=None, of="pin"):
     load = {"relative_force": 0.006, "steps": 4, "core_radius": core_radius}
     body = {of: {"yield_stress": yield_stress}} if yield_stress else {}
     return persson_joint(0.5, 0.1, joint={"clearance": 1e-3}, **body).model_copy(
-        update={"load": Load(**load)}
+        update={"load": JointLoad(**load)}
     )
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.persson import persson_joint
-from archord.scene.sections import Load
+from archord.scene.sections import JointLoad
 from tests.solver.solving import solve
 
 
@@ -26,7 +26,7 @@ def test_a_tiny_force_moves_the_pin_as_far_as_takes_it(force):
 @pytest.mark.parametrize("force", [1e-6, 1e-10])
 def test_a_ring_answers_a_tiny_force(force):
     scene = persson_joint(0.5, 0.1, joint={"clearance": 1e-3})
-    scene = scene.model_copy(update={"load": Load(relative_force=force, steps=1)})
+    scene = scene.model_copy(update={"load": JointLoad(relative_force=force, steps=1)})
     (pressed,) = solve(scene).steps
     assert pressed.cutbacks == 0
     assert pressed.force_balance < 1e-3
