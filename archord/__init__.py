@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Support
     from archord.scene.problem import ProblemScene
     from archord.scene.scene import Scene
-    from archord.solver.system import System
+    from archord.solver.path.system import System
 
 
 __all__ = [
@@ -48,7 +48,7 @@ _HOME = {
     "J2Material": "archord.materials.j2",
     "LargeStrain": "archord.materials.finite",
     "KinematicMaterial": "archord.materials.kinematic",
-    "System": "archord.solver.system",
+    "System": "archord.solver.path.system",
     **dict.fromkeys(
         ("LinearHardening", "SwiftHardening", "TabularHardening", "VoceHardening"),
         "archord.materials.hardening",

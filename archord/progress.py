@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from archord.output.restart import Start
     from archord.output.run import Outcome
-    from archord.solver.newton import Newton
+    from archord.solver.path.newton import Newton
     from archord.studies.accuracy import Level
 
 Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value of a step

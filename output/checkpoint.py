@@ -26,10 +26,10 @@ from archord.presets.measures import Work
 from archord.report.readable import require_file
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
-from archord.solver.load_path import Position
-from archord.solver.mesh_order import Arrays, MeshOrder
-from archord.solver.newton import Newton
-from archord.solver.stepping import Step
+from archord.solver.path.load_path import Position
+from archord.solver.path.mesh_order import Arrays, MeshOrder
+from archord.solver.path.newton import Newton
+from archord.solver.path.stepping import Step
 
 _HEADER = 512  # HDF5 looks for its own beginning at powers of two from here
 

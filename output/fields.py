@@ -22,7 +22,7 @@ from archord.output.files.step_file import StepFile, step_name
 from archord.output.files.vtkhdf import VtkHdf, times
 from archord.output.vtk_grid import BodyGrid
 from archord.solver.contact.pair import Pair
-from archord.solver.mesh_order import Arrays, MeshOrder
+from archord.solver.path.mesh_order import Arrays, MeshOrder
 
 # By nodes: XDMF's name of second-order cells, and VTK's order of nodes, which counts both corners
 # and edges all around

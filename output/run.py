@@ -30,12 +30,12 @@ from archord.presets.edge import EdgeProfile
 from archord.presets.measures import Work
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
-from archord.solver.coarse_start import coarse_start
-from archord.solver.load_path import Position
-from archord.solver.mesh_order import MeshOrder
-from archord.solver.newton import Newton
-from archord.solver.stepping import Step, StepFailure, StepRules, march
-from archord.solver.system import System
+from archord.solver.path.coarse_start import coarse_start
+from archord.solver.path.load_path import Position
+from archord.solver.path.mesh_order import MeshOrder
+from archord.solver.path.newton import Newton
+from archord.solver.path.stepping import Step, StepFailure, StepRules, march
+from archord.solver.path.system import System
 
 if TYPE_CHECKING:
     from archord.geometry.meshes.plane_mesh import PlaneMesh

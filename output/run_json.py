@@ -24,7 +24,7 @@ from archord.presets.measures import WORK_OFF
 from archord.report.doubts import Told, kind, tell
 from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
-from archord.solver.stepping import Step
+from archord.solver.path.stepping import Step
 
 _INSIDE_SOLVE = (
     "return mapping",

@@ -9,7 +9,7 @@ from archord.geometry.basis import Array, bulk_quadrature, cell_kind, lagrange_e
 from archord.geometry.meshes.plane_mesh import in_vtk_order
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.output.files.vtkhdf import LAGRANGE, VERTEX, Grid
-from archord.solver.mesh_order import Arrays, MeshOrder
+from archord.solver.path.mesh_order import Arrays, MeshOrder
 
 
 class BodyGrid:

@@ -15,7 +15,7 @@ import numpy as np
 from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
-    from archord.solver.system import System
+    from archord.solver.path.system import System
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
 _ON_CONE = 1e-6  # of the largest shear: what comes as close slides

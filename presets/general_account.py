@@ -34,8 +34,8 @@ from archord.report.timer import Timer
 from archord.scene.columns import part_columns, supporting
 from archord.scene.problem import LIVE, ProblemScene
 from archord.scene.sections import friction_doubts
-from archord.solver.stepping import Step
-from archord.solver.system import System
+from archord.solver.path.stepping import Step
+from archord.solver.path.system import System
 
 _FEW_FACETS = 3
 _FAR_TURN = 0.02  # angle at which linear rotations stretch radii by 0.02 %

@@ -15,8 +15,8 @@ from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.materials.material import Array
 from archord.scene.problem import ProblemScene
 from archord.solver.contact.interaction import Interaction
+from archord.solver.path.system import System
 from archord.solver.problem import Problem
-from archord.solver.system import System
 
 _FAR = 0.1  # of the size of a surface: drawn farther behind another one, it does not face that
 _APART = 0.01  # of the same: a gap between tied surfaces that is told of

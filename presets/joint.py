@@ -26,8 +26,8 @@ from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
 from archord.solver.drives import LOAD_DEGREE
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Rigid, Support
-from archord.solver.system import System
 
 _RATIO = 3.0  # element size over that of the next finer mesh
 _COARSEST = 0.2  # element size over R

@@ -29,8 +29,8 @@ from archord.presets.measures import (
 )
 from archord.report.doubts import Doubt
 from archord.scene.sections import friction_doubts
-from archord.solver.stepping import Step
-from archord.solver.system import System
+from archord.solver.path.stepping import Step
+from archord.solver.path.system import System
 
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance

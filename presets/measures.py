@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.report.doubts import Doubt
-from archord.solver.stepping import Step
+from archord.solver.path.stepping import Step
 
 if TYPE_CHECKING:  # records are read from a run folder, too, without the solver
+    from archord.solver.path.system import System
     from archord.solver.problem import Body
-    from archord.solver.system import System
 
 WORK_OFF = "the work of the loads"  # how the warning of it begins
 _OFF = 0.01  # of the largest work

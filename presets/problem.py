@@ -22,6 +22,7 @@ from archord.presets.joint import core_density, joint_mesh, require_core
 from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
+from archord.solver.path.system import displacement_space
 from archord.solver.problem import (
     Body,
     Drive,
@@ -33,7 +34,6 @@ from archord.solver.problem import (
     Rigid,
     Support,
 )
-from archord.solver.system import displacement_space
 
 _SHAPES: dict[str, Callable[..., TaggedMesh]] = {
     "lug": lug,

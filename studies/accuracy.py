@@ -30,7 +30,7 @@ from archord.presets.joint_account import UNSEEN
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
-from archord.solver.system import System
+from archord.solver.path.system import System
 from archord.studies.mesh_family import MeshFamily, ProblemFamily
 
 MOST_SUBSTEPS = 64

@@ -27,7 +27,7 @@ from archord.postprocess.run import Run
 from archord.report.table import Table
 from archord.scene.file import AnyScene, load_scene
 from archord.scene.scene import Scene
-from archord.solver.system import System
+from archord.solver.path.system import System
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits

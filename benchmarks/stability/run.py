@@ -24,7 +24,7 @@ from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
-from archord.solver.stepping import Step, StepFailure
+from archord.solver.path.stepping import Step, StepFailure
 
 _BALANCE = 1e-8  # largest difference of forces over P, unless round-off is known to be larger
 _COMPARED = ("quantity", "value", "expected", "by", "deviation")

@@ -23,8 +23,8 @@ from archord.postprocess.decks.mesh import DeckMesh, Ints, label, surface_name
 from archord.presets.account import account_of
 from archord.scene.file import AnyScene
 from archord.solver.contact.law import Coulomb, Frictionless, Tied, contact_law
+from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Problem, Rigid
-from archord.solver.system import System
 
 PENETRATION = 4e-4  # over the size of the surfaces, under a pressure of the contact modulus
 SLICE = 0.1  # thickness of a slice in plane stress, in the shortest edge

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
+from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Rigid
-from archord.solver.system import System
 
 Ints = npt.NDArray[np.int64]
 

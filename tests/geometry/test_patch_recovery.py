@@ -10,9 +10,9 @@ from archord.geometry.patch_recovery import PatchRecovery
 from archord.materials.elasticity import Elastic, principal_stresses, von_mises
 from archord.output.fields import FieldWriter, collect_fields, collect_mesh
 from archord.postprocess.fields import read_fields
-from archord.solver.mesh_order import MeshOrder
+from archord.solver.path.mesh_order import MeshOrder
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Problem, Support
-from archord.solver.system import System
 from tests.solver.parts import quarter_annulus
 
 A, B, E, NU = 1.0, 2.0, 1.0, 0.3

@@ -12,9 +12,9 @@ from archord.output import checkpoint
 from archord.presets.joint import Joint
 from archord.presets.measures import Measures, Work
 from archord.scene.errors import InputError
-from archord.solver.load_path import Position
-from archord.solver.mesh_order import MeshOrder
-from archord.solver.stepping import Step
+from archord.solver.path.load_path import Position
+from archord.solver.path.mesh_order import MeshOrder
+from archord.solver.path.stepping import Step
 from tests.solver.contact.test_ranks import CUTS
 from tests.solver.solving import scene, solve
 

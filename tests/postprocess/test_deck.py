@@ -20,8 +20,8 @@ from archord.materials.elasticity import Elastic
 from archord.postprocess.decks.deck import contact_stiffness, deck, system_of
 from archord.postprocess.decks.mesh import deck_mesh
 from archord.scene.file import resolved
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Support
-from archord.solver.system import System
 
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}

@@ -9,7 +9,7 @@ from archord.presets.general_account import GeneralAccount
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.shapes import general_joint
-from archord.solver.stepping import Step, march
+from archord.solver.path.stepping import Step, march
 from tests.solver.solving import solve
 
 STEEL = {"E": 210000.0, "nu": 0.3}

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from archord.presets.general_account import GeneralAccount
 from archord.presets.measures import Measures, distortion_doubts, told_of_facets, work_doubts
 from archord.scene.file import parse_any
-from archord.solver.stepping import Step, march
+from archord.solver.path.stepping import Step, march
 
 STEEL = {"E": 210000.0, "nu": 0.3}
 SHAPE = {

@@ -11,7 +11,7 @@ from archord.presets.problem import general_problem
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_any, resolved
 from archord.scene.problem import ProblemScene
-from archord.solver.system import System
+from archord.solver.path.system import System
 
 STEEL = {"E": 210000.0, "nu": 0.3}
 LUG = {

@@ -26,9 +26,9 @@ from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface
 from archord.solver.contact.surface import RigidSurface, Surface
+from archord.solver.path.stepping import StepRules
+from archord.solver.path.system import System
 from archord.solver.problem import Problem
-from archord.solver.stepping import StepRules
-from archord.solver.system import System
 from tests.geometry.shapes.measures import Cells
 
 E, NU = 1.82, 0.3

@@ -14,9 +14,9 @@ from archord.presets.joint import Joint
 from archord.presets.joint_account import JointAccount
 from archord.presets.measures import Measures, Work
 from archord.scene.scene import Scene
-from archord.solver.coarse_start import coarse_start
 from archord.solver.linear.substructured import schur_kernels
-from archord.solver.stepping import march
+from archord.solver.path.coarse_start import coarse_start
+from archord.solver.path.stepping import march
 
 __all__ = ["SEVERAL", "E", "Solution", "scene", "solve"]
 

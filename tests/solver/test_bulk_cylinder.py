@@ -9,8 +9,8 @@ from mpi4py import MPI
 from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Problem, Support
-from archord.solver.system import System
 from tests.solver.parts import (
     INNER,
     OUTER,

@@ -11,7 +11,7 @@ from archord.geometry.curve import ProjectionError
 from archord.output.run import solve_scene
 from archord.presets import joint as preset
 from archord.scene.sections import Stepping
-from archord.solver import coarse_start
+from archord.solver.path import coarse_start
 from tests.solver.solving import SEVERAL
 
 SOFT = {"rigid": True}
@@ -84,7 +84,7 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
     make, few = preset._coarser, {"max_iterations": 2}
     coarser = lambda s: make(s).model_copy(
         update={"analysis": make(s).analysis.model_copy(update=few)}
-    )  # noqa: E731
+    )
     monkeypatch.setattr(preset, "_coarser", coarser)
     assert [m.P for m in run(scene, tmp_path / "left")[0]] == pytest.approx(
         [m.P for m in plain], rel=1e-8

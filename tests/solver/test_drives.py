@@ -12,6 +12,8 @@ from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import Elastic
+from archord.solver.path.stepping import StepFailure, StepRules
+from archord.solver.path.system import System
 from archord.solver.problem import (
     Body,
     Drive,
@@ -23,8 +25,6 @@ from archord.solver.problem import (
     Rigid,
     Support,
 )
-from archord.solver.stepping import StepFailure, StepRules
-from archord.solver.system import System
 from tests.solver.parts import (
     ELASTIC,
     HARDENING,

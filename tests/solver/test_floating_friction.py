@@ -10,8 +10,8 @@ from archord.benchmarks.stability.cases import cases
 from archord.output.history import read_history
 from archord.presets.account import account_of
 from archord.solver.contact.law import Coulomb, FrictionState
-from archord.solver.stepping import StepRules, march
-from archord.solver.system import System
+from archord.solver.path.stepping import StepRules, march
+from archord.solver.path.system import System
 from tests.output.test_restart import go_on, run
 
 

@@ -12,8 +12,8 @@ from archord.materials.elasticity import Elastic
 from archord.presets.joint import Joint
 from archord.scene.scene import Scene
 from archord.solver.contact.law import LAWS, contact_law
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
-from archord.solver.system import System
 from tests.solver.parts import blocks, solve
 
 pytestmark = pytest.mark.mpi

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.postprocess.run import Run
-from archord.solver.newton import NewtonSolver
+from archord.solver.path.newton import NewtonSolver
 from tests.output.run_files import solved as solved_runs
 from tests.solver.parts import partition
 from tests.solver.solving import SEVERAL, E, scene, solve

@@ -18,8 +18,8 @@ from archord.materials.material import Array, Material
 from archord.presets.joint import Joint, joint_problem
 from archord.scene.scene import Scene
 from archord.solver.bulk import Bulk
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
-from archord.solver.system import System
 from tests.solver.parts import (
     ELASTIC,
     PERFECT,

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
-from archord.solver.stepping import StepFailure
+from archord.solver.path.stepping import StepFailure
 from tests.solver.solving import scene, solve
 
 H = 0.1

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.solver.path.system import System
 from archord.solver.problem import Drive, Mean, Support
-from archord.solver.system import System
 from tests.solver.parts import solve
 from tests.solver.test_drives import WALL, bar, drives, reference_point
 

@@ -10,10 +10,10 @@ from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
 from archord.materials.finite import LargeStrain
-from archord.solver.load_path import LoadPath
+from archord.solver.path.load_path import LoadPath
+from archord.solver.path.stepping import StepRules
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Support
-from archord.solver.stepping import StepRules
-from archord.solver.system import System
 from tests.solver.parts import ELASTIC, HARDENING, NU, PERFECT, E, blocks, coordinates, solve
 
 DEPTH = 0.02

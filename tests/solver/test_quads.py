@@ -25,7 +25,7 @@ from archord.geometry.meshes.second_order import SecondOrder
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.output.fields import FieldWriter, collect_fields, collect_mesh
-from archord.solver.mesh_order import MeshOrder
+from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.output.vtk_reader import VtkFile, only
 from tests.solver.parts import ELASTIC, NU, PERFECT, E, blocks, coordinates, quarter_annulus, solve

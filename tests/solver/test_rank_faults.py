@@ -46,7 +46,7 @@ PLACES = {
     "residual": ("solver.contact.contact", "Contact", "evaluate", 7),
     "tangent": ("solver.contact.tangent", "ContactTangent", "blocks", 4),
     "return map": ("materials.material", "Points", "update", 13),
-    "output": ("solver.mesh_order", "MeshOrder", "collect_history", 2),
+    "output": ("solver.path.mesh_order", "MeshOrder", "collect_history", 2),
 }
 
 

@@ -12,9 +12,9 @@ from archord.geometry.shapes.lug import lug
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
+from archord.solver.path.stepping import StepRules
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Rigid, Support
-from archord.solver.stepping import StepRules
-from archord.solver.system import System
 from tests.solver.parts import ELASTIC, E, blocks, solve
 
 STEEL = Elastic(210000.0, 0.3, "strain")

@@ -8,9 +8,9 @@ import pytest
 
 from archord.scene.errors import InputError
 from archord.scene.sections import Stepping
-from archord.solver.load_path import LoadPath
-from archord.solver.newton import Newton
-from archord.solver.stepping import StepFailure, StepRules, march
+from archord.solver.path.load_path import LoadPath
+from archord.solver.path.newton import Newton
+from archord.solver.path.stepping import StepFailure, StepRules, march
 
 
 class Spring:

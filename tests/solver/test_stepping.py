@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.presets.joint import Joint
-from archord.solver.stepping import StepFailure, StepRules, march
+from archord.solver.path.stepping import StepFailure, StepRules, march
 from tests.solver.solving import scene, solve
 
 

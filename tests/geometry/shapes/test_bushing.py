@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from archord.geometry.shapes.bushing import bushing
 from archord.materials.elasticity import Elastic
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Interaction, Problem, Support
-from archord.solver.system import System
 from tests.geometry.shapes.measures import area, facet_nodes
 
 R, BORE, OUTER, SLEEVE = 10.0, 13.98, 30.0, (10.05, 14.0)

@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.shapes.lug import lug
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Interaction, Problem, Support
-from archord.solver.system import System
 from tests.geometry.shapes.measures import area, facet_nodes, length
 from tests.solver.parts import ELASTIC
 

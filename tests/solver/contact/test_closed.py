@@ -11,8 +11,8 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.solver.path.system import System
 from archord.solver.problem import Body, Interaction, Problem, Support
-from archord.solver.system import System
 from tests.solver.parts import DR, ELASTIC, R, solve
 
 RADII = {"bore": 0.4 * R, "pin": R, "hole": R + DR, "outer": 2 * R}

@@ -11,7 +11,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.materials.material import Points
 from archord.solver.contact.interaction import GAMMA_FACTOR
-from archord.solver.newton import CIRCLING, Newton, NewtonSolver
+from archord.solver.path.newton import CIRCLING, Newton, NewtonSolver
 from archord.solver.stabilisation import RigidMotions
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails

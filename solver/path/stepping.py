@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from archord.solver.load_path import LoadPath, Position
-from archord.solver.newton import Newton
+from archord.solver.path.load_path import LoadPath, Position
+from archord.solver.path.newton import Newton
 from archord.solver.problem import Problem
 
 _SLIVER = 1e-3  # of an output step: a step that would leave less than this goes to the target

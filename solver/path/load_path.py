@@ -5,16 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.solver.newton import Newton
-from archord.solver.recovery import Recovery
-
-if TYPE_CHECKING:
-    from archord.solver.coarse_start import CoarseStart
+from archord.solver.path.newton import Newton
+from archord.solver.path.recovery import Recovery
 
 _STRAIGHT = 1e-6  # part of a step that may lie beside the line of the last one
 # residual of an extrapolated guess over that of a coarse start, below which it serves as well
@@ -39,6 +36,24 @@ class Position:
     size: float | None = None
 
 
+class Companion(Protocol):
+    """What goes ahead of a load path and finds guesses for it: the same problem on a coarser mesh.
+
+    ``iterations`` are those of its last step, on all coarser meshes.
+    """
+
+    iterations: int
+
+    def increment(self, load: float) -> Array | None:
+        """What a step to ``load`` adds to the state; None where none is found."""
+
+    def follow(self) -> bool:
+        """Accept the step that the path has accepted; returns whether it can."""
+
+    def take_back(self) -> None:
+        """Undo the last step."""
+
+
 class LoadPath:
     """The path that ``solver``'s equilibrium follows from the position ``at``, from the beginning
     if absent.
@@ -56,7 +71,7 @@ class LoadPath:
         solver: Recovery,
         first_guess: Callable[[float], Array],
         at: Position | None,
-        coarse: CoarseStart | None,
+        coarse: Companion | None,
     ) -> None:
         self.solver, self._first_guess, self.at, self.coarse = (
             solver,
@@ -135,4 +150,4 @@ class LoadPath:
         """Undo the last attempt."""
         self.solver.equilibrium.restore(self.at.load, self.state)
         if self.coarse is not None:
-            self.coarse.path.take_back()
+            self.coarse.take_back()

@@ -21,7 +21,7 @@ from archord.kernels.compat import cell_degree, cell_nodes
 from archord.materials.material import Points
 from archord.solver.bulk import PointFields
 from archord.solver.contact.pair import Pair
-from archord.solver.system import System
+from archord.solver.path.system import System
 
 Arrays = dict[str, np.ndarray]
 

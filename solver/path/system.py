@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import reduce
-from typing import TYPE_CHECKING
 
 import basix.ufl
 import numpy as np
@@ -21,14 +20,11 @@ from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium import Equilibrium
-from archord.solver.load_path import LoadPath, Position
-from archord.solver.newton import NewtonSolver
+from archord.solver.path.load_path import Companion, LoadPath, Position
+from archord.solver.path.newton import NewtonSolver
+from archord.solver.path.recovery import Recovery
+from archord.solver.path.stepping import StepRules, march
 from archord.solver.problem import Body, Problem
-from archord.solver.recovery import Recovery
-from archord.solver.stepping import StepRules, march
-
-if TYPE_CHECKING:
-    from archord.solver.coarse_start import CoarseStart
 
 _AT_REST = 10.0  # times the round-off: forces that are none
 
@@ -96,7 +92,7 @@ class System:
         self._path.at.targets_done, self._path.at.size = 0, None
         march(self._path, loads, rules=rules)
 
-    def load_path(self, at: Position | None = None, coarse: CoarseStart | None = None) -> LoadPath:
+    def load_path(self, at: Position | None = None, coarse: Companion | None = None) -> LoadPath:
         """The path of the problem's loads, from the position ``at`` or the beginning."""
         return LoadPath(self.solver, self.first_guess, at, coarse)
 

@@ -13,8 +13,8 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.geometry.meshes.interpolation import Interpolation
 from archord.solver.bulk import Bulk
-from archord.solver.mesh_order import MeshOrder
-from archord.solver.system import System
+from archord.solver.path.mesh_order import MeshOrder
+from archord.solver.path.system import System
 
 _FEWEST_DOFS = 8_000  # of a problem that is worth a coarse start
 _FEWEST_STRESS = (
@@ -88,3 +88,7 @@ class CoarseStart:
         with self.fine.timer("coarse start"):
             self.path.accept(self._reached)
         return True
+
+    def take_back(self) -> None:
+        """Undo the last attempt."""
+        self.path.take_back()

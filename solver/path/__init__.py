@@ -1,0 +1,1 @@
+"""A problem, assembled, and the path of its loads: Newton's method, load steps, guesses."""
