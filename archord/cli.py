@@ -70,7 +70,7 @@ def run(arguments: list[str], begun: float | None = None) -> int:
 
 
 def _command(arguments: list[str]) -> str:
-    """The command of a command line, with that of a group behind it."""
+    """The command of a command line, with the command of a group behind it."""
     return " ".join(arguments[: 2 if arguments[:1] == ["benchmark"] else 1])
 
 

@@ -42,7 +42,7 @@ class Group(click.Group):
 
 
 class _Argument(click.Argument):
-    """An argument that help pages explain; those of click have no help."""
+    """An argument that help pages explain; click's own have no help."""
 
     def __init__(self, names: Sequence[str], help: str, **settings: Any) -> None:
         super().__init__(names, **settings)

@@ -105,5 +105,5 @@ def report_of(folder: Path) -> dict[str, Any]:
 
 
 def is_sweep(folder: str | Path) -> bool:
-    """Whether ``folder`` is that of a sweep."""
+    """Whether ``folder`` is a sweep's."""
     return (Path(folder) / "sweep.toml").is_file()

@@ -16,7 +16,7 @@ _PAUSE = 0.01  # seconds between two looks
 
 
 def agreed(comm: MPI.Comm, function: Callable[[], Result]) -> Result:
-    """Call ``function`` on rank 0 alone; its result is that of all ranks. Collective.
+    """Call ``function`` on rank 0 alone; its result is the result of all ranks. Collective.
 
     Raises on every rank the `InputError` that it raises, and `WriteError` for an `OSError`.
     ``function`` must not call or import anything collective; importing petsc4py is.

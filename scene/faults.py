@@ -20,15 +20,7 @@ _ELSEWHERE = {
     "bushing.rings": "[[sleeve]] and [housing]",
 }
 _ELSEWHERE |= {"load.steps": "path.steps"}
-_KINDS = {
-    "number",
-    "list",
-    "law",
-    "lug",
-    "clevis",
-    "bushing",
-    "joint",
-}  # of values, in pydantic's places
+_TAGS = {"number", "list", "law"}  # kinds of values, in pydantic's places
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",
@@ -113,11 +105,11 @@ def _sentence(
         place = place[1:]
         named = value.get("name") if isinstance(value, dict) else None
         label += f" {json.dumps(named or at + 1, default=str)}"
-    keys = [
-        *place[1:2],
-        *(part for part in place[2:] if isinstance(part, str) and part not in _KINDS),
-    ]
-    for part in keys:
+    keys = list[str]()
+    for part in place[1:]:
+        if keys and (isinstance(part, int) or part in _TAGS or part == _kind_of(value)):
+            continue
+        keys.append(part)
         value = value.get(part) if isinstance(value, dict) else None
     key = ".".join((label, *map(_key_shown, keys)))
     if isinstance(fault, Fault):
@@ -135,6 +127,11 @@ def _sentence(
     )
     entry = f": entry {place[-1] + 1}" if len(place) > 2 and isinstance(place[-1], int) else ""
     return f"{where}: {key}{shown}{entry} {said}."
+
+
+def _kind_of(value: Any) -> Any:
+    """The ``kind`` that a table tells of itself, as shapes of meshes do."""
+    return value.get("kind") if isinstance(value, dict) else None
 
 
 def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:

@@ -65,7 +65,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     """
     if Path(path).is_dir():
         raise InputError(
-            f"{path}: is a folder, not a scene; that of a run is {Path(path) / 'scene.toml'}."
+            f"{path}: is a folder, not a scene; the scene of a run is {Path(path) / 'scene.toml'}."
         )
     data = read_toml(path)
     if "base" in data and "joint" not in data:
@@ -110,7 +110,8 @@ def _drops(override: str) -> bool:
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
-    """The files that `load_scene` and a solve read: the scene, that of its load.path, its mesh.
+    """The files that `load_scene` and a solve read: the scene, the file of its load.path, its
+    mesh.
     Raises `InputError`."""
     data = read_toml(path)
     for override in overrides:

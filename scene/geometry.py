@@ -106,8 +106,9 @@ class JointGeometry(Section):
 
     @property
     def expected_cells(self) -> float:
-        """About how many triangles the mesh will have: the bodies' area over that of equilateral
-        triangles of the size ``t = h + growth |r - R|`` at radius r, integrated in closed form
+        """About how many triangles the mesh will have.
+
+        It is the bodies' area over the area of equilateral triangles of the size ``t = h + growth |r - R|`` at radius r, integrated in closed form
         (lengths in R)."""
         h = self.h / self.radius
         g = self.growth
@@ -140,7 +141,7 @@ class JointGeometry(Section):
 
     @property
     def pin_depth(self) -> float:
-        """How far below the hole's centre that of the pin lies at first: they touch, in a ring they
+        """How far the pin's centre lies below the hole's centre at first: they touch. In a ring they
         are concentric."""
         return 0.0 if self.is_ring else self.dR
 

@@ -125,8 +125,7 @@ class Section(BaseModel, metaclass=_InSentences):
     """A section of a scene: no unknown keys, no conversions, no numbers that are not finite, not to
     be changed."""
 
-    # a section that no scene uses is not built: that of all takes as long as all the rest of a
-    # start
+    # a section that no scene uses is not built: to build all takes as long as the rest of a start
     model_config = ConfigDict(
         extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True
     )

@@ -109,7 +109,7 @@ def reference() -> str:
         "## General scenes\n",
         "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The "
         "sections units, stepping "
-        "and output are those of joints. Headings in double brackets may stand any number of "
+        "and output are the same as for joints. Headings in double brackets may stand any number of "
         "times.\n",
         *_tables(
             _GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}
@@ -121,9 +121,9 @@ def reference() -> str:
         "`[outer]`), or "
         "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, "
         "which "
-        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, "
+        "`archord scene --expand` prints. The section pin is the same as for joints; plates, bushing, "
         "sleeves and "
-        "housing have materials like it, and the other sections are those of general scenes.\n",
+        "housing have materials like it. The other sections are the same as for general scenes.\n",
         *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
         *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
         *_tables(_RINGS, dict.fromkeys(("sleeve", "housing"), _JOINT["block"])),

@@ -370,7 +370,10 @@ class ProblemAnalysis(Modelling):
     """How a general problem is modelled and solved."""
 
     symmetry: int = key(
-        "how many times the part makes up the whole, of which results are", default=1, ge=1, le=100
+        "how many times the part makes up the whole; results are of the whole",
+        default=1,
+        ge=1,
+        le=100,
     )
 
 

@@ -38,8 +38,8 @@ MOST_SUBSTEPS = 64
 
 @dataclass(frozen=True)
 class Level:
-    """One mesh, solved: its sizes (``element_size`` over R, of a file over that of its cells), what
-    it cost, the ``last`` value of P (under a force of delta), and the errors estimated with it, if
+    """One mesh, solved: its sizes (``element_size`` over R, of a file over the size of its
+    cells), what it cost, the ``last`` value of P (under a force of delta), and the errors estimated with it, if
     it told any."""
 
     mesh: int

@@ -304,7 +304,7 @@ def combinations(found: list[Factor]) -> list[Overrides]:
 
 def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
     """All dotted keys that vary. Raises `InputError` for one that no scene has or that cannot vary,
-    and for a quantity that two factors give. Keys of a ``joint`` have two parts; those of other
+    and for a quantity that two factors give. Keys of a ``joint`` have two parts; the keys of other
     scenes may name a part between."""
     keys: list[str] = []
     given: dict[tuple[str, str], str] = {}

@@ -30,7 +30,7 @@ _SMALLEST = 1e-4  # element size over R that a scene may ask for
 _LEVELS = 3  # meshes that should do
 _FEWEST_FACETS = 3.0  # in contact: of a contact of fewer facets nothing can be learnt
 _OF_FILES = 2.0  # ratio of the element sizes of a file
-_FIRST_OF_SHAPE = 2.0  # first element size of a shape over that of its scene
+_FIRST_OF_SHAPE = 2.0  # first element size of a shape over the size in its scene
 _MOST_DOFS = 1_500_000
 
 
@@ -74,8 +74,10 @@ class MeshFamily:
 
     def curve(self, steps: Sequence[Measures]) -> list[float]:
         """P at every step, under a force delta; P is round-off where nothing touches."""
+        if self.scene.force_controlled:
+            return [m.delta for m in steps]
         touching = any(m.contact_area for m in steps)
-        return [m.delta if self.scene.force_controlled else m.P if touching else 0.0 for m in steps]
+        return [m.P if touching else 0.0 for m in steps]
 
     def resolved(self, scene: Any, steps: Sequence[Measures]) -> bool:
         """Whether enough facets are in contact to learn from, if any are to be."""
@@ -116,7 +118,7 @@ class ProblemFamily:
         return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
 
     def sizes(self, scene: Any) -> tuple[float, float]:
-        """Element size over R and growth of ``scene``; of a file, the size over that of its own
+        """Element size over R and growth of ``scene``; of a file, the size over the size of its own
         cells."""
         shape = scene.mesh.shape
         return (

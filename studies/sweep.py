@@ -44,7 +44,7 @@ Row = list[str]
 class Result:
     """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be
     written), "failed" (an error), "interrupted", "busy" (another process solves it) or "open", also
-    where files of a finished case are ``damaged``, as ``message`` says; ``seconds`` are those of
+    where files of a finished case are ``damaged``, as ``message`` says; ``seconds`` are of
     this process."""
 
     run: str

@@ -80,7 +80,7 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
     """Fit k and c to P(delta) of every distinct case of the sweep in ``folder``, on its finest
     mesh, over ``load_range`` in clearances. Raises `InputError` where no case can be fitted."""
     distinct = read_sweep(folder / FILE).distinct
-    of: dict[str, str] = {}  # the names of the cases by those of their curves
+    of: dict[str, str] = {}  # the names of the cases by the names of their curves
     runs = []
     rows = []
     left_out = []
@@ -136,8 +136,7 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> Ro
     run = refined.run
     if run.scene.pin.whole:
         raise InputError(
-            f"{run.name}: pin.whole = true does not fit: k and c of a sweep are those of half a "
-            "pin."
+            f"{run.name}: pin.whole = true does not fit: k and c of a sweep are for half a pin."
         )
     fit = fit_curve([refined], load_range)
     pin = run.scene.pin
