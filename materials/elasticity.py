@@ -42,7 +42,7 @@ class Elastic(Material):
 
     E: float
     nu: float
-    plane: Plane
+    plane: Plane = "strain"
 
     @property
     def lame(self) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from numpy.polynomial.polynomial import polyval
 
 from archord.materials.hardening import Scaled
 from archord.materials.j2 import J2Material
+from archord.materials.kinematics import Kinematics
 from archord.materials.material import Array, Material, State
 
 _NEAR = 0.05  # relative distance of eigenvalues below which divided differences are series
@@ -66,6 +67,10 @@ class LargeStrain(Material):
     def elastic(self) -> Material:
         """The material that cannot yield (further), at large strain."""
         return LargeStrain(self.inner.elastic())
+
+    def under(self, kinematics: Kinematics) -> LargeStrain:
+        """The inner material in a problem of these ``kinematics``, at large strain."""
+        return replace(self, inner=self.inner.under(kinematics))
 
     def state(self, n: int) -> State:
         """The inner material's."""

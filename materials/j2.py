@@ -11,6 +11,8 @@ from archord.materials.hardening import Hardening, LinearHardening
 from archord.materials.material import Array, Material
 from archord.materials.return_map import PlasticState, radial_return, return_map
 
+NEVER_YIELDS = LinearHardening(np.inf)
+
 
 @dataclass(frozen=True)
 class J2Material(Elastic):
@@ -18,11 +20,11 @@ class J2Material(Elastic):
 
     yields = True
 
-    hardening: Hardening
+    hardening: Hardening = NEVER_YIELDS
 
     def elastic(self) -> Material:
         """The solid with a yield stress out of reach."""
-        return replace(self, hardening=LinearHardening(np.inf))
+        return replace(self, hardening=NEVER_YIELDS)
 
     def state(self, n: int) -> PlasticState:
         """``n`` points that never yielded."""

@@ -45,7 +45,7 @@ class KinematicMaterial(J2Material):
     recovery its tangent is not symmetric. Raises ValueError unless C is positive and gamma is not
     negative."""
 
-    back_stresses: tuple[tuple[float, float], ...]
+    back_stresses: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Check the back stresses."""

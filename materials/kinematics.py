@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -140,6 +140,7 @@ class Kinematics:
         return replace(self, thickness=thickness)
 
 
+@cache
 def kinematics(name: str, thickness: float = 1.0) -> Kinematics:
     """The kinematics "strain", "stress" (plane strain, plane stress) or "axisymmetric"; "space" has
     its place here, and is not there yet. Raises ValueError."""

@@ -9,13 +9,16 @@ store it.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal, Protocol
+from dataclasses import is_dataclass, replace
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from archord.materials.kinematics import Kinematics, Plane
+
 Array = npt.NDArray[np.floating]
-Plane = Literal["strain", "stress"]
+__all__ = ["COMPONENTS", "Array", "Material", "Plane", "Points", "State"]
 State = Any
 COMPONENTS = ("xx", "yy", "zz", "xy")  # of stresses and plastic strains
 
@@ -66,6 +69,19 @@ class Material(Protocol):
         """A material with the same states that answers from each as if it could not yield
         (further)."""
         return self
+
+    def under(self, kinematics: Kinematics) -> Self:
+        """The material in a problem of these ``kinematics``, by its field ``plane`` if it has one.
+        Raises ValueError for a material of another plane; the default, "strain", fits all."""
+        plane = getattr(self, "plane", None)
+        if plane in (None, kinematics.name) or not is_dataclass(self):
+            return self
+        if plane != "strain":
+            raise ValueError(
+                f"a material with plane = {plane!r} does not fit a problem whose kinematics are "
+                f"{kinematics.name!r}"
+            )
+        return replace(self, plane=kinematics.name)
 
     def state(self, n: int) -> State:
         """State of ``n`` points at the beginning."""

@@ -21,6 +21,7 @@ from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import refinements
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
+from archord.materials.kinematics import kinematics
 from archord.presets.arc import SYMMETRY
 from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry
@@ -96,6 +97,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         max_iterations=analysis.max_iterations,
         guess=guess,
         from_rest=g.dR > 0,
+        kinematics=kinematics(analysis.plane),
         coarser=(lambda: joint_problem(_coarser(scene), comm)) if analysis.coarse_start else None,
     )
 

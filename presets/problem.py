@@ -17,6 +17,7 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh, unknown
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.clevis import clevis
 from archord.geometry.shapes.lug import lug
+from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
 from archord.presets.joint import core_density, joint_mesh, require_core
 from archord.scene import parts
@@ -197,6 +198,7 @@ class _Builder:
             tolerance=analysis.tolerance,
             max_iterations=analysis.max_iterations,
             guess=self._guess,
+            kinematics=kinematics(analysis.plane),
         )
         displaced = [
             load

@@ -9,13 +9,14 @@ thickness), in any consistent units.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.solver.contact.interaction import Interaction, Rigid
 
 __all__ = ["Body", "Drive", "Guess", "Interaction", "Load", "Mean", "Problem", "Rigid", "Support"]
@@ -136,6 +137,9 @@ class Guess:
 class Problem:
     """What is to be solved.
 
+    The ``kinematics`` (plane strain, plane stress, axisymmetric) are given to the materials of all
+    bodies.
+
     A load on the path is the load factor, which each of the ``drives`` turns into its value. The
     drive "" is there without being given, with the load factor for its displacement. ``load_name``
     names the load in messages.
@@ -170,9 +174,13 @@ class Problem:
     guess: Callable[[float], Guess] = Guess
     from_rest: bool = True
     coarser: Callable[[], Problem] | None = None
+    kinematics: Kinematics = PLANE_STRAIN
 
     def __post_init__(self) -> None:
-        """Check names, which must be unique, and drives. Raises ValueError."""
+        """Give the materials the kinematics; check names, which must be unique, and drives. Raises
+        ValueError."""
+        bodies = [replace(b, material=b.material.under(self.kinematics)) for b in self.bodies]
+        object.__setattr__(self, "bodies", bodies)
         for kind in ("bodies", "interactions", "drives"):
             names = [part.name for part in getattr(self, kind)]
             if len(set(names)) < len(names):

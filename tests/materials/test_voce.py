@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
+from archord.materials.kinematics import kinematics
 from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.solver.parts import NU, YIELD_STRESS, E, blocks, solve
 
@@ -66,9 +67,10 @@ def test_blocks_pressed_together_follow_the_closed_form(plane):
     ]
     contact = Interaction("contact", ("upper bottom", "lower top"), kinematics="reference")
     bodies = [Body("lower", material), Body("upper", material)]
-    system = solve(
-        Problem(blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports), strain[200::200]
+    problem = Problem(
+        blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports, kinematics=kinematics(plane)
     )
+    system = solve(problem, strain[200::200])
     assert -system.reaction("lid")[1] == pytest.approx(pressure[-1], rel=1e-9)
     assert system.bulk.cell_fields(system.bulk.at_points(system.equilibrium.displacement()))[
         "peeq"

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
 from archord.materials.finite import LargeStrain
+from archord.materials.kinematics import PLANE_STRESS, kinematics
 from archord.solver.path.load_path import LoadPath
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
@@ -218,7 +219,16 @@ def test_round_off_is_no_reason_to_refuse_a_material(nu):
     """Where a stress of the check cancels, nothing but round-off is left of it."""
     for plane in ("strain", "stress"):
         materials = Elastic(E, nu, plane), Rounded(E, nu, plane)
-        forces = [
-            solve(columns(material=material), [DEPTH]).drive_force("") for material in materials
-        ]
+        problems = [columns(material=m, kinematics=kinematics(plane)) for m in materials]
+        forces = [solve(problem, [DEPTH]).drive_force("") for problem in problems]
         assert forces[0] == pytest.approx(forces[1], rel=1e-9)
+
+
+def test_a_problem_gives_its_kinematics_to_its_materials():
+    """Whose plane is "strain" by default; another one that does not fit is refused."""
+    problem = columns(material=LargeStrain(Elastic(E, NU)), kinematics=PLANE_STRESS)
+    assert {body.material.plane for body in problem.bodies} == {"stress"}
+    with pytest.raises(
+        ValueError, match="plane = 'stress' does not fit a problem whose kinematics"
+    ):
+        columns(material=Elastic(E, NU, "stress"))
