@@ -15,10 +15,9 @@ from archord.output.folder import is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene import file as scene_file
-from archord.scene.errors import InputError
+from archord.scene.errors import InputError, toml_value
 from archord.scene.faults import shortened
 from archord.scene.file import ABSENT, AnyScene
-from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.scene.scene import plain

@@ -64,8 +64,8 @@ def run_on_ranks(command: str, work: Callable[[], int]) -> int:
     code = work()
     if code == 1 and launcher_rank() == 0:
         said = (
-            "ends with exit code 1, for what is told above; the launcher may add a page about "
-            "that code"
+            "ends with exit code 1, for what is told above; the launcher may add a page about that "
+            "code"
         )
         print(f"archord {command}: {said}.", file=sys.stderr, flush=True)
     if code == 2:

@@ -18,9 +18,8 @@ from archord.output.finished import history_fault
 from archord.output.folder import CHECKPOINT
 from archord.presets.account import record_type
 from archord.report.readable import require_file
-from archord.scene.errors import InputError
+from archord.scene.errors import InputError, toml_value
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
-from archord.scene.keys import toml_value
 
 _TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
 _MAY_DIFFER = ("stepping.", "analysis.max_iterations", *_TARGETS)

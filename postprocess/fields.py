@@ -17,8 +17,7 @@ from archord.materials.elasticity import principal_stresses, von_mises
 from archord.materials.material import COMPONENTS, Array
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
-from archord.scene.errors import InputError
-from archord.scene.keys import toml_value
+from archord.scene.errors import InputError, toml_value
 from archord.scene.scene import Scene
 
 BODIES = {"pin": 1, "block": 2}

@@ -1,5 +1,26 @@
 """What is said of bad input."""
 
+from __future__ import annotations
+
+import json
+from typing import Any
+
 
 class InputError(ValueError):
     """Bad input; the message holds one sentence a line."""
+
+
+class Fault(ValueError):
+    """What is ``said`` of the key at ``place``: of its section, or below sections or the names of
+    tables."""
+
+    def __init__(self, place: tuple[str, ...], said: str) -> None:
+        super().__init__(said)
+        self.place = place
+
+
+def toml_value(value: Any) -> str:
+    """``value`` as TOML writes it."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{name} = {toml_value(part)}' for name, part in value.items())}}}"
+    return json.dumps(value, default=str, ensure_ascii=False)

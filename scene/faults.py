@@ -9,9 +9,10 @@ import re
 from types import SimpleNamespace
 from typing import Any, get_args
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from archord.scene.keys import Fault, Section, toml_value
+from archord.scene.errors import Fault, toml_value
 
 _MOST_SENTENCES = 20
 _ELSEWHERE = {
@@ -48,7 +49,7 @@ _PHRASES = {
 def in_sentences(
     errors: list[Any],
     data: dict[str, Any],
-    model: type[Section],
+    model: type[BaseModel],
     source: str,
     origin: dict[str, str],
 ) -> str:
@@ -70,7 +71,7 @@ def keys_of(models: list[Any], section: str) -> list[str]:
     return sorted({key for kind in kinds for key in kind.model_fields})
 
 
-def of_section(errors: list[Any], data: dict[str, Any], section: type[Section]) -> str:
+def of_section(errors: list[Any], data: dict[str, Any], section: type[BaseModel]) -> str:
     """`in_sentences` of a ``section`` that was made alone, from ``data``."""
     name = section.__name__.lower()
     place: tuple[str | int, ...] = (name, 0) if "name" in data else (name,)
@@ -86,7 +87,7 @@ def shortened(text: str, length: int = 80) -> str:
 
 
 def _sentence(
-    error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]
+    error: Any, data: dict[str, Any], model: type[BaseModel], source: str, origin: dict[str, str]
 ) -> str:
     place = error["loc"]
     context = dict(error.get("ctx", {}))
@@ -160,7 +161,7 @@ def _sections(kind: Any) -> dict[str, Any]:
     """The sections among the kinds of values that a key may have, by their own ``kind``."""
     if isinstance(kind, type):
         name = getattr(kind, "model_fields", {}).get("kind")
-        return {str(name and name.default): kind} if issubclass(kind, Section) else {}
+        return {str(name and name.default): kind} if issubclass(kind, BaseModel) else {}
     return {name: found for part in get_args(kind) for name, found in _sections(part).items()}
 
 

@@ -108,8 +108,9 @@ class JointGeometry(Section):
     def expected_cells(self) -> float:
         """About how many triangles the mesh will have.
 
-        It is the bodies' area over the area of equilateral triangles of the size ``t = h + growth |r - R|`` at radius r, integrated in closed form
-        (lengths in R)."""
+        It is the area of the bodies over the area of equilateral triangles of the size ``t = h +
+        growth |r - R|`` at radius r, integrated in closed form (lengths in R).
+        """
         h = self.h / self.radius
         g = self.growth
         width = self.W / self.radius
@@ -141,8 +142,10 @@ class JointGeometry(Section):
 
     @property
     def pin_depth(self) -> float:
-        """How far the pin's centre lies below the hole's centre at first: they touch. In a ring they
-        are concentric."""
+        """How far the pin's centre lies below the hole's centre at first.
+
+        The pin and the hole touch there. In a ring they are concentric.
+        """
         return 0.0 if self.is_ring else self.dR
 
     @property

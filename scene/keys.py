@@ -3,7 +3,6 @@ example."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -12,7 +11,8 @@ from pydantic._internal._model_construction import (
     ModelMetaclass,
 )  # pydantic has no public name for it
 
-from archord.scene.errors import InputError
+from archord.scene.errors import Fault, InputError
+from archord.scene.faults import of_section
 
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f]*$")]  # text on one line
 Positive = Annotated[float, Field(gt=0)]
@@ -41,15 +41,6 @@ def key(
     return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
-class Fault(ValueError):
-    """What is ``said`` of the key at ``place``: of its section, or below sections or the names of
-    tables."""
-
-    def __init__(self, place: tuple[str, ...], said: str) -> None:
-        super().__init__(said)
-        self.place = place
-
-
 def require(holds: bool, place: str | tuple[str, ...], said: str) -> None:
     """Raise `Fault` unless it ``holds`` what is ``said`` of the key at ``place``, a tuple or
     "section.key"."""
@@ -64,13 +55,6 @@ def given(section: BaseModel, names: tuple[str, ...]) -> str:
     require(len(found) > 0, names[0], f"is missing (or {', '.join(names[1:])})")
     require(len(found) == 1, found[0], f"must not be given together with {' and '.join(found[1:])}")
     return found[0]
-
-
-def toml_value(value: Any) -> str:
-    """``value`` as TOML writes it."""
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{name} = {toml_value(part)}' for name, part in value.items())}}}"
-    return json.dumps(value, default=str, ensure_ascii=False)
 
 
 def _part_name(name: str) -> str:
@@ -107,8 +91,6 @@ class _InSentences(ModelMetaclass):
         made: Any = cls
         if made.__init__ is not BaseModel.__init__:  # a whole scene, which says more
             return super().__call__(*values, **keys)
-        from archord.scene import faults
-
         if values:
             known = ", ".join(cls.model_fields)
             raise InputError(
@@ -118,7 +100,7 @@ class _InSentences(ModelMetaclass):
         try:
             return super().__call__(**given)
         except ValidationError as error:
-            raise InputError(faults.of_section(error.errors(), given, made)) from None
+            raise InputError(of_section(error.errors(), given, made)) from None
 
 
 class Section(BaseModel, metaclass=_InSentences):

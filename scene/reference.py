@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin
 
 from archord.materials.named import metals
 from archord.report.table import Table
-from archord.scene.keys import toml_value
+from archord.scene.errors import toml_value
 from archord.scene.parts import Mesh
 from archord.scene.problem import FORMAT, ProblemScene
 from archord.scene.scene import FORMAT as JOINT_FORMAT
@@ -36,24 +36,20 @@ _SHAPED = {
 _MEETING = (
     "### Sets that meet\n",
     "Supports, loads and rigid couplings may have nodes in common. The order of the sections has "
-    "no part in what "
-    "holds there:\n",
+    "no part in what holds there:\n",
     "- A support wins over a displacement: its nodes stay, and a warning names the sets and a "
     "place.\n"
-    "- A set that moves as one must not meet a support that bends it: an edge under a force, and "
-    "a rigid coupling. "
-    "The scene is refused, unless the set leaves the node at rest. Fix the same freedoms of the "
-    "coupling, or load the "
-    "set by a pressure or a distributing coupling.\n"
+    "- A set that moves as one must not meet a support that bends it: an edge under a force, and a "
+    "rigid coupling. The scene is refused, unless the set leaves the node at rest. Fix the same "
+    "freedoms of the coupling, or load the set by a pressure or a distributing coupling.\n"
     "- A displacement is refused where supports hold every node of its set.\n"
     "- All other motions of a node must be alike, in value and path. Different ones are refused.\n"
     "- Supports that fix a node together have equal parts of its reaction.\n",
     "### Press fits\n",
-    "The mesh shows a fit, or it does not. `overlap` is for surfaces that cross in the mesh: a "
-    "pin of radius 10.03 is "
-    "drawn in a hole of radius 10. `interference` is for surfaces that lie on one line in the "
-    "mesh: a pin of radius "
-    "10 is drawn in a hole of radius 10, and is made 0.03 too large.\n",
+    "The mesh shows a fit, or it does not. `overlap` is for surfaces that cross in the mesh: a pin "
+    "of radius 10.03 is drawn in a hole of radius 10. `interference` is for surfaces that lie on "
+    "one line in the mesh: a pin of radius 10 is drawn in a hole of radius 10, and is made 0.03 "
+    "too large.\n",
     "```text\n"
     "overlap = 0.03                     interference = 0.03\n"
     "\n"
@@ -99,18 +95,16 @@ def reference() -> str:
     parts = [
         "# Scene reference\n",
         "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A "
-        "scene may begin with "
-        f"the version of its format, `format = {JOINT_FORMAT}`, of a general scene `format = "
-        f"{FORMAT}`, and what is "
-        "written by archord does so. A scene of a newer version is refused.\n",
+        f"scene may begin with the version of its format, `format = {JOINT_FORMAT}`, of a general "
+        f"scene `format = {FORMAT}`, and what is written by archord does so. A scene of a newer "
+        "version is refused.\n",
         "## Joints\n",
         "A scene with the section `[joint]` is one of a pin in a hole.\n",
         *_tables(_JOINT, {}),
         "## General scenes\n",
         "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The "
-        "sections units, stepping "
-        "and output are the same as for joints. Headings in double brackets may stand any number of "
-        "times.\n",
+        "sections units, stepping and output are the same as for joints. Headings in double "
+        "brackets may stand any number of times.\n",
         *_tables(
             _GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}
         ),
@@ -118,12 +112,10 @@ def reference() -> str:
         *_MEETING,
         "## Presets\n",
         "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, "
-        "`[outer]`), or "
-        "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, "
-        "which "
-        "`archord scene --expand` prints. The section pin is the same as for joints; plates, bushing, "
-        "sleeves and "
-        "housing have materials like it. The other sections are the same as for general scenes.\n",
+        "`[outer]`), or `[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a "
+        "general one, which `archord scene --expand` prints. The section pin is the same as for "
+        "joints; plates, bushing, sleeves and housing have materials like it. The other sections "
+        "are the same as for general scenes.\n",
         *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
         *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
         *_tables(_RINGS, dict.fromkeys(("sleeve", "housing"), _JOINT["block"])),
@@ -160,10 +152,9 @@ def _shapes() -> Iterator[str]:
     yield "### [mesh.shape]\n"
     yield (
         "Instead of a file: the shape of a preset, as `archord scene --expand` prints it. Its "
-        "`kind` tells which keys "
-        "it has. `--set mesh.shape.radius=12.0` changes one. The other sections stay as they are, "
-        "also the `overlap` "
-        "of an interaction, which is the clearance below 0.\n"
+        "`kind` tells which keys it has. `--set mesh.shape.radius=12.0` changes one. The other "
+        "sections stay as they are, also the `overlap` of an interaction, which is the clearance "
+        "below 0.\n"
     )
     yield table.markdown()
 

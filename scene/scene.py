@@ -191,10 +191,8 @@ class Scene(Checked):
             return []
         return [
             f"load.{self.load.kind} lifts the pin by {lifted / self.joint.dR:.3g} dR: beyond 2 dR "
-            "it would meet the "
-            "upper half of the hole, which is not modelled, so P stays 0 there; a joint that is "
-            "loaded both ways takes "
-            "two scenes, one for each direction"
+            "it would meet the upper half of the hole, which is not modelled, so P stays 0 there; "
+            "a joint that is loaded both ways takes two scenes, one for each direction"
         ]
 
     @property
@@ -284,8 +282,8 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
             1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units"
         )
         said = (
-            f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in "
-            "one unit"
+            f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in one "
+            "unit"
         )
         require(stiffest <= solid.E / _SOFTEST, modulus, said)
         strong = strength is None or strength >= _WEAKEST * solid.E

@@ -12,7 +12,8 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
-from archord.scene.keys import Fault, Name, Positive, Section, given, key, require
+from archord.scene.errors import Fault
+from archord.scene.keys import Name, Positive, Section, given, key, require
 from archord.scene.plasticity import IN_WORDS, HardeningKey, filled, hardening_law
 
 NotNegative = Annotated[float, Field(ge=0)]
@@ -342,8 +343,8 @@ class Modelling(Section):
             return []
         return [
             f"analysis.gamma_factor = {self.gamma_factor:g} is below {_COERCIVE:g}, where "
-            "Nitsche's form is not "
-            "coercive: forces and pressures may be wrong by a tenth and more; the default is 0.5"
+            "Nitsche's form is not coercive: forces and pressures may be wrong by a tenth and "
+            "more; the default is 0.5"
         ]
 
 
@@ -403,10 +404,9 @@ class Output(Section):
     """What a run writes besides its curves."""
 
     fields: Literal[False, "cells", "nodes", "points"] = key(
-        "write the fields of every step to fields.vtkhdf, fields.xdmf and fields.h5: of stress "
-        "and plastic strain the "
-        "means of cells, or also values at the nodes, or also those at the integration points; "
-        "true is the default",
+        "write the fields of every step to fields.vtkhdf, fields.xdmf and fields.h5: of stress and "
+        "plastic strain the means of cells, or also values at the nodes, or also those at the "
+        "integration points; true is the default",
         default="cells",
     )
 

@@ -38,9 +38,12 @@ MOST_SUBSTEPS = 64
 
 @dataclass(frozen=True)
 class Level:
-    """One mesh, solved: its sizes (``element_size`` over R, of a file over the size of its
-    cells), what it cost, the ``last`` value of P (under a force of delta), and the errors estimated with it, if
-    it told any."""
+    """One mesh, solved.
+
+    ``element_size`` is over R, of a file over the size of its cells. ``last`` is the last value of
+    P, or of delta under a force. Beside them stand what it cost, and the errors that were estimated
+    with it, if any.
+    """
 
     mesh: int
     element_size: float
@@ -252,7 +255,7 @@ class _Search:
             )
         if self.step_error is not None and 2 * self.step_error > self.asked:
             return (
-                f"accuracy: {said}: {self.substeps} steps an output step are too few; increase "
-                "the number of steps"
+                f"accuracy: {said}: {self.substeps} steps an output step are too few; increase the "
+                "number of steps"
             )
         return f"accuracy: {said}: a finer mesh would be too large; ask for less accuracy"

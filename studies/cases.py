@@ -24,7 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from archord.scene.errors import InputError
+from archord.scene.errors import InputError, toml_value
 from archord.scene.faults import shortened
 from archord.scene.file import (
     ABSENT,
@@ -41,7 +41,7 @@ from archord.scene.file import (
     read_toml,
     resolved,
 )
-from archord.scene.keys import Section, toml_value
+from archord.scene.keys import Section
 from archord.scene.scene import Scene
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"

@@ -38,7 +38,7 @@ from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.law_fit import EARLY
 from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
-from archord.scene.keys import toml_value
+from archord.scene.errors import toml_value
 
 Row = dict[str, Any]
 # By plane, what yields, whether the other body is stronger, and whether by little, or the pin is

@@ -17,9 +17,8 @@ from archord.output.files.disk import replace_file
 from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
 from archord.report.readable import require_file
-from archord.scene.errors import InputError
+from archord.scene.errors import InputError, toml_value
 from archord.scene.file import AnyScene
-from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 from archord.studies.cases import Case, Sweep
 
@@ -97,8 +96,7 @@ def claim(sweep: Sweep, folder: Path) -> None:
             if held and held.isdisjoint(case.run for case in sweep.cases):
                 raise InputError(
                     f"{folder}: holds another sweep, which has no case in common with "
-                    f"{sweep.path}; choose another "
-                    "folder with -o, or remove this one."
+                    f"{sweep.path}; choose another folder with -o, or remove this one."
                 )
             replace_file(folder / FILE, sweep.file.resolved())
     except OSError as error:
