@@ -144,6 +144,18 @@ class Curve:
             start[first:] -= start[first]
         return start[:, None] + lengths[:, :-1]
 
+    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
+        """Places ``(k,)`` in ``facets`` ``(m,)``, and the facets within ``rings`` around each, some
+        perhaps twice."""
+        near = [facets]
+        for adjacent in (self.before, self.after):
+            facet = facets
+            for _ in range(rings):
+                facet = np.where(facet < 0, -1, adjacent[facet])
+                near.append(facet)
+        ring, place = np.nonzero(np.array(near) >= 0)
+        return place, np.array(near)[ring, place]
+
     def nearest_facet(self, x: Array, displacement: Array) -> Index:
         """Facet ``(m,)`` of the displaced curve whose four sample points come nearest to each of
         ``x`` ``(m, 2)``."""
@@ -268,7 +280,6 @@ class RigidCircle:
     which moves it."""
 
     n_facets = 1
-    before = after = np.full(1, -1, dtype=np.int32)
 
     def __init__(self, centre: Array, radius: float) -> None:
         self.centre = np.asarray(centre, dtype=float)
@@ -298,3 +309,7 @@ class RigidCircle:
         )
 
     continued = closest_point
+
+    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
+        """Places in ``facets``, and these facets: there is no other."""
+        return np.arange(len(facets)), facets

@@ -12,7 +12,7 @@ import shlex
 import stat
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -40,11 +40,11 @@ def library(source: Path, libraries: tuple[str, ...] = ()) -> Any:
     return _loaded(source, libraries)[1]
 
 
-def structure(source: Path, kind: str, members: Sequence[int | float | np.ndarray]) -> Any:
+def structure(source: Path, kind: str, members: Mapping[str, int | float | np.ndarray]) -> Any:
     """A pointer to a structure of the type ``kind``, declared in the header of ``source``, with
     numbers and pointers to arrays, which have to live as long as it is used. Raises
     `CompilerError`."""
-    values = [pointer(m) if isinstance(m, np.ndarray) else m for m in members]
+    values = {name: pointer(m) if isinstance(m, np.ndarray) else m for name, m in members.items()}
     return _loaded(source, ())[0].new(f"{kind} *", values)
 
 

@@ -56,6 +56,7 @@ class Equilibrium:
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
         self.drives = drives = Drives(problem, V, contact, self._stiffest)
         self.levels: Array = np.zeros(len(drives.rate))
+        self._accepted_load = 0.0
         self.fixed, self._rate_of_fixed = drives.fixed, drives.rate[:, drives.fixed]
         self._force = ghosted_vector(index_map, 2)
         self._reaction = np.zeros((self.n_owned, 2))
@@ -157,7 +158,8 @@ class Equilibrium:
             self.bulk.add_force(self.u.x.petsc_vec, self._force)
         with self.timer("contact"):
             self.contact.move(self.levels, self.problem.fitted(self.load))
-            self._pattern_grew = self.contact.evaluate(u)
+            dt = abs(self.load - self._accepted_load)
+            self._pattern_grew = self.contact.evaluate(u, dt)
             self.contact.add_force(self._force.array.reshape(-1, 2))
         applied = np.tensordot(self.levels, self.drives.applied, 1)
         self._force.array[:] -= applied.ravel()
@@ -273,6 +275,7 @@ class Equilibrium:
     def restore(self, load: float, state: Array) -> None:
         """Go back to an accepted state; the history was never touched."""
         self.load, self.levels = load, state[2 * self.n_local :].copy()
+        self._accepted_load = load
         self.u.x.array[:] = state[: 2 * self.n_local]
         if self.springs:
             self.springs.last = state[: 2 * self.n_owned].copy(), self.levels.copy()
@@ -293,6 +296,7 @@ class Equilibrium:
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""
         self.largest_reaction = max(self.largest_reaction, self.reaction_norm)
+        self._accepted_load = self.load
         if self.springs:
             self.springs.commit()
         for points in self.points():

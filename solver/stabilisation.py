@@ -24,7 +24,7 @@ from archord.geometry.curve import ProjectionError
 from archord.solver.bulk import assemble, matrix
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import RigidSurface
-from archord.solver.contact.tangent import trial_rate
+from archord.solver.contact.tangent import point_rates
 from archord.solver.drives import MOVABLE, Drives
 from archord.solver.problem import Interaction, Rigid
 
@@ -149,12 +149,12 @@ class RigidMotions:
         force, stiffness = np.zeros(r), np.zeros((r, r))
         for pair in self.contact.pairs:
             rates = [
-                trial_rate(pair, *motion) for motion in zip(self.free, self.levels, strict=True)
+                point_rates(pair, *motion)[0] for motion in zip(self.free, self.levels, strict=True)
             ]
             opening = -np.stack(rates, axis=2) / pair.gamma[..., None]
             weight = pair.share * pair.surface.weight.ravel()
             force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
-            stiff = (weight[:, None] * pair.gamma)[:, None] * pair.derivative
+            stiff = (weight[:, None] * pair.gamma)[:, None] * pair.by_trial
             stiffness += np.tensordot(opening, stiff @ opening, ((0, 1), (0, 1)))
             pressed += float(np.abs(pair.forces).sum())
             openings.append(opening)

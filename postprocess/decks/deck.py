@@ -22,7 +22,8 @@ from archord.materials.j2 import J2Material
 from archord.postprocess.decks.mesh import DeckMesh, Ints, label, surface_name
 from archord.presets.account import account_of
 from archord.scene.file import AnyScene
-from archord.solver.contact.law import Coulomb, Frictionless, Tied, contact_law
+from archord.solver.contact.coulomb import Coulomb
+from archord.solver.contact.named import Frictionless, Tied, contact_law
 from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Problem, Rigid
 

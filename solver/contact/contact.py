@@ -26,25 +26,27 @@ from archord.solver.contact.interaction import Interface, on_every_rank
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import RigidSurface, Surface
-from archord.solver.contact.tangent import ContactTangent, trial_rate
+from archord.solver.contact.tangent import ContactTangent, point_rates
 
 
 class Contact:
-    """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies,
-    ``rigid`` ones, ``pairs``, and whether any of them ``has_friction``.
+    """All ``interfaces``, if any, in the displacement space ``V``. Collective.
 
-    A surface belongs to one interface. ``active_set_changes`` counts this rank's points that
-    opened, closed or changed between stick and slide at the last evaluation; ``tangent`` is the
-    derivative of what `add_force` adds, renewed as the pattern grows. Collective.
+    A surface belongs to one interface. ``surfaces`` are those of bodies, ``rigid`` the discs, and
+    ``pairs`` those of all interfaces. ``active_set_changes`` counts this rank's points that went
+    over to another branch of their law at the last evaluation. ``tangent`` is the derivative of
+    what `add_force` adds, renewed as the pattern grows.
     """
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
-        self.interfaces, self.comm = list(interfaces), V.mesh.comm
+        self.comm = V.mesh.comm
+        self.interfaces = list(interfaces)
         self._all = [surface for i in interfaces for surface in i.surfaces]
         self.surfaces = [surface for surface in self._all if isinstance(surface, Surface)]
         self.rigid = [surface for surface in self._all if isinstance(surface, RigidSurface)]
         self.pairs = [pair for i in interfaces for pair in i.pairs]
         self.has_friction = any(pair.law.has_friction for pair in self.pairs)
+        self._slipping = [pair for pair in self.pairs if pair.counts_slip]
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
@@ -64,7 +66,7 @@ class Contact:
 
     def begin(self, u: Array) -> None:
         """Begin a step at this rank's accepted displacements ``u`` ``(n, 2)``. Collective."""
-        for pair in self.pairs if self.has_friction else []:
+        for pair in self._slipping:
             pair.begin(u, pair.opposite.curve_displacement(u))
 
     def touch_down(self, u: Array, levels: Array) -> None:
@@ -72,7 +74,7 @@ class Contact:
         ``(d,)`` on, at points that did not touch in the accepted state: bodies came there without
         load. Collective."""
         self.move(levels)
-        for pair in self.pairs if self.has_friction else []:
+        for pair in self._slipping:
             pair.touch_down(u, pair.opposite.curve_displacement(u))
 
     def search(self) -> None:
@@ -86,30 +88,38 @@ class Contact:
             for pair in interface.pairs:
                 pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
-    def evaluate(self, u: Array, *, reach: bool = True) -> bool:
-        """Gaps, tractions and trial history at this rank's displacements ``u`` ``(n, 2)``; whether
-        the pattern had to grow, which without ``reach`` it does not. Collective; raises
-        `ProjectionError` on every rank."""
+    def evaluate(self, u: Array, dt: float = 0.0, *, reach: bool = True) -> bool:
+        """Openings, tractions and trial history at this rank's displacements ``u`` ``(n, 2)``, in a
+        step of the length ``dt``.
+
+        Returns whether the pattern had to grow; without ``reach`` it does not. Collective; raises
+        `ProjectionError` on every rank.
+        """
         motions = [pair.opposite.curve_displacement(u) for pair in self.pairs]
         try:
             with on_every_rank(self.comm):
                 for pair, motion in zip(self.pairs, motions, strict=True):
-                    pair.evaluate(u, motion)
+                    pair.evaluate(u, motion, dt)
         except ProjectionError:
             self.search()
             raise
         self.active_set_changes = sum(pair.changes for pair in self.pairs)
-        grew = reach and any([each.extend() for each in self._reaches if each.pair.moves])
-        if grew:
+        if not reach:
+            return False
+        grew = [each.extend() for each in self._reaches if each.pair.moves]
+        if any(grew):
             self.tangent = ContactTangent(self._reaches)
-        return grew
+        return any(grew)
 
     def anticipate(self, u: Array, levels: Array) -> bool:
-        """Open and close points as increments ``u`` ``(n, 2)``, and those of the drives' ``levels``
-        ``(d,)``, would, to first order, with the partners they have; returns whether any does.
-        Closed points carry their trial pressure, even a tension. Collective."""
+        """Let points go over to the branches to which increments ``u`` ``(n, 2)``, and increments
+        of the drives' ``levels`` ``(d,)``, would bring them, to first order, with the partners they
+        have; returns whether any does.
+
+        Points carry the continued traction of their branch, closed ones even a tension. Collective.
+        """
         for pair in self.pairs:
-            pair.expect(trial_rate(pair, u, levels))
+            pair.expect(*point_rates(pair, u, levels))
         return self.comm.allreduce(sum(pair.changes for pair in self.pairs)) > 0
 
     def round_off(self) -> float:
@@ -117,8 +127,9 @@ class Contact:
         gamma."""
         squares = 0.0
         for pair in self.pairs:
-            spring = (pair.share * pair.gamma[:, 0] * pair.surface.weight.ravel())[pair.active]
-            squares += (spring**2).sum() * np.abs(pair.surface.point).max(initial=0.0) ** 2
+            stiffness = (pair.share * pair.gamma[:, 0] * pair.surface.weight.ravel())[pair.active]
+            farthest = np.abs(pair.surface.point).max(initial=0.0)
+            squares += (stiffness**2).sum() * farthest**2
         return float(2 * np.finfo(float).eps * np.sqrt(squares))
 
     def add_force(self, force: Array) -> None:
@@ -134,20 +145,24 @@ class Contact:
         """Block ``(rows, columns)`` that the contacts of all ranks may fill, each once, in global
         dofs. Collective."""
         size = self._n_dofs
-        rows, columns = self.tangent.rows, self.tangent.columns
-        slots = (rows * size + columns)[(rows < size) & (columns < size)]
+        rows = self.tangent.rows
+        columns = self.tangent.columns
+        of_bodies = (rows < size) & (columns < size)
+        slots = (rows * size + columns)[of_bodies]
         return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)
+
+    def interface(self, name: str = "") -> Interface:
+        """The interface of the interaction ``name``, the first without."""
+        return next(i for i in self.interfaces if name in ("", i.interaction.name))
 
     def resultant(self, name: str = "") -> Array:
         """Force ``(2,)`` on the second surface of the interaction ``name``, the first without, over
         all ranks."""
-        return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
+        return self.interface(name).resultant()
 
     def moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of that force about ``point``, anticlockwise, over all ranks."""
-        return next(i for i in self.interfaces if name in ("", i.interaction.name)).moment(
-            np.asarray(point)
-        )
+        """Moment of this force about ``point``, anticlockwise, over all ranks."""
+        return self.interface(name).moment(np.asarray(point))
 
     def largest_pressed(self) -> float:
         """Sum of the sizes of the points' forces of the interaction where it is largest, over all
@@ -157,10 +172,12 @@ class Contact:
     def force_on_drives(self) -> Array:
         """Contact force ``(d,)`` along the rates of rigid surfaces, over all ranks; a single zero
         without any."""
-        first = [(i.surfaces[0], i) for i in self.interfaces]
-        return sum(
-            (d.rate @ i.resultant() for d, i in first if isinstance(d, RigidSurface)), np.zeros(1)
-        )
+        total: Array = np.zeros(1)
+        for interface in self.interfaces:
+            first = interface.surfaces[0]
+            if isinstance(first, RigidSurface):
+                total = total + first.rate @ interface.resultant()
+        return total
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
         """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of
@@ -173,7 +190,7 @@ class Contact:
 
     def dissipated(self) -> float:
         """Energy that the laws dissipated so far, this rank's part."""
-        return sum((pair.dissipated() for pair in self.pairs), 0.0)
+        return sum(pair.integral(pair.law.dissipation(pair.points.trial)) for pair in self.pairs)
 
     def n_active(self) -> int:
         """Number of points under pressure, over all ranks."""

@@ -3,59 +3,91 @@
  *
  * With jump = v(x) - v(y), the variation of the closest point is d xi = (jump . tau + d . v'(y)) / (|tau|^2 - g b),
  * where tau and b are the opposite curve's tangent and n . y'' and d = x - y; the normal turns by
- * -(v'(y) . n + b d xi) / |tau| about the unit tangent. At a vertex of the curve xi stands still. The law's derivative
- * takes the trial traction's variation to that of pressure and shear; that of the
- * step's slip (u(x) - u(y)) . tau is jump . tau + (u(x) - u(y)) . n d turn - u'(y) . tau d xi. */
+ * -(v'(y) . n + b d xi) / |tau| about the unit tangent. At a vertex of the curve xi stands still. The variation of the
+ * gap d . n is jump . n less, at a vertex, d . tau times the turn; that of the step's slip (u(x) - u(y)) . tau is
+ * jump . tau + (u(x) - u(y)) . n d turn - u'(y) . tau d xi. The trial traction is the own stress's in the turning frame,
+ * less gamma times gap and slip. The law's derivatives take both variations to that of pressure and shear. */
 
 #include <math.h>
 
 #include "contact_tangent.h"
 
-enum { MOST = 24 }; /* nodes of a cell (degree 4: 15) and of the opposite facet (5) */
+enum { MOST = 24 };             /* nodes of a cell (degree 4: 15) and of the opposite facet (5) */
+enum { X, Y, D };               /* components of a displacement; so many */
+enum { N, T };                  /* components in the frame: normal and tangent */
+enum { XX, YY, XY, YX, HOOP };  /* components of the displacement gradient */
 
-/* Derivatives at one point by the displacements of the own cell's nodes, then of the opposite facet's. */
+/* A derivative at one point by the displacements of the own cell's nodes, then of the opposite facet's. */
+typedef double Row[MOST][D];
+
 typedef struct {
-    double pressure[MOST][2], shear[MOST][2]; /* of the trial traction */
-    double turn[MOST][2], xi[MOST][2];
+    Row trial[D];   /* of the trial traction, in the frame */
+    Row opening[D]; /* of gap and slip */
+    Row turn, xi;   /* of the frame and of the partner */
 } Rates;
 
-static void linearise(const Side *s, int32_t i, Rates *d)
+/* The derivative of the own stress vector by the own nodes, in x and y. */
+static void stress_rates(const Side *s, int32_t i, Row stress[D])
+{
+    const double *shape_gradient = s->gradient + D * s->a * i;
+    for (int r = X; r <= Y; r++) {
+        const double *C = s->moduli + s->g * (D * i + r);
+        for (int c = 0; c < s->a; c++) {
+            const double *slope = shape_gradient + D * c;
+            stress[r][c][X] = C[XX] * slope[X] + C[XY] * slope[Y];
+            stress[r][c][Y] = C[YY] * slope[Y] + C[YX] * slope[X];
+            if (s->g > HOOP) stress[r][c][X] += C[HOOP] * s->hoop[s->a * i + c];
+        }
+        for (int c = s->a; c < s->a + s->o; c++) stress[r][c][X] = stress[r][c][Y] = 0;
+    }
+}
+
+/* All rates at the point i; those of the opening only if they are wanted. */
+static void linearise(const Side *s, int32_t i, int with_opening, Rates *d)
 {
     const int32_t a = s->a, o = s->o, columns = a + o;
-    const double *C = s->moduli + 8 * i, *n = s->normal + 2 * i, g = s->gamma[2 * i], h = s->gamma[2 * i + 1];
-    double jump[MOST], slope[MOST], stress[MOST][2][2]; /* of the stress vector: component, then displacement */
-    for (int c = 0; c < a; c++) {
-        jump[c] = s->own_shape[i * a + c], slope[c] = 0;
-        const double gx = s->gradient[2 * (i * a + c)], gy = s->gradient[2 * (i * a + c) + 1];
-        for (int r = 0; r < 2; r++) {
-            stress[c][r][0] = C[4 * r] * gx + C[4 * r + 2] * gy;
-            stress[c][r][1] = C[4 * r + 1] * gy + C[4 * r + 3] * gx;
-        }
-    }
+    const double *n = s->normal + D * i, of_gap = s->gamma[2 * i], of_slip = s->gamma[2 * i + 1];
+    const double unit[D] = {-n[Y], n[X]}; /* tangent */
+    double jump[MOST], slope[MOST];
+    Row stress[D];
+    stress_rates(s, i, stress);
+    for (int c = 0; c < a; c++) jump[c] = s->shape[i * a + c], slope[c] = 0;
     for (int c = 0; c < o; c++) {
-        jump[a + c] = -s->shape[i * o + c], slope[a + c] = s->slope[i * o + c];
-        for (int j = 0; j < 4; j++) stress[a + c][j / 2][j % 2] = 0;
+        jump[a + c] = -s->partner_shape[i * o + c];
+        slope[a + c] = s->partner_slope[i * o + c];
     }
     for (int c = 0; c < columns; c++)
-        for (int j = 0; j < 2; j++) {
-            const double *t[2] = {stress[c][0], stress[c][1]}, across = j ? n[0] : -n[1];
-            d->pressure[c][j] = n[0] * t[0][j] + n[1] * t[1][j] - g * jump[c] * n[j];
-            d->shear[c][j] = n[0] * t[1][j] - n[1] * t[0][j] - h * jump[c] * across;
+        for (int j = X; j <= Y; j++) {
+            d->trial[N][c][j] = n[X] * stress[X][c][j] + n[Y] * stress[Y][c][j] - of_gap * jump[c] * n[j];
+            d->trial[T][c][j] = n[X] * stress[Y][c][j] - n[Y] * stress[X][c][j] - of_slip * jump[c] * unit[j];
             d->turn[c][j] = d->xi[c][j] = 0;
         }
+    if (with_opening)
+        for (int c = 0; c < columns; c++)
+            for (int j = X; j <= Y; j++) {
+                d->opening[N][c][j] = jump[c] * n[j];
+                d->opening[T][c][j] = jump[c] * unit[j];
+            }
     if (!s->moves) return;
-    const double *tau = s->tangent + 2 * i, *x_y = s->separation + 2 * i, *t = s->stress_vector + 2 * i, b = s->bend[i];
-    const double speed = sqrt(tau[0] * tau[0] + tau[1] * tau[1]);
-    const double slide = s->slides[i] ? 1 / (speed * speed - (x_y[0] * n[0] + x_y[1] * n[1]) * b) : 0;
-    /* the trial pressure follows the turning normal through t . n and, where y is a vertex, through the gap */
-    const double lever = (g * (x_y[0] * tau[0] + x_y[1] * tau[1]) - (t[0] * tau[0] + t[1] * tau[1])) / speed;
-    const double *strayed = s->strayed + 2 * i, across = t[0] * n[0] + t[1] * n[1] - s->gamma[2 * i + 1] * strayed[0];
+    const double *tau = s->tangent + D * i, *apart = s->separation + D * i, *t = s->stress_vector + D * i;
+    const double bend = s->bend[i], speed = sqrt(tau[X] * tau[X] + tau[Y] * tau[Y]);
+    const double gap = apart[X] * n[X] + apart[Y] * n[Y], aside = apart[X] * tau[X] + apart[Y] * tau[Y];
+    const double along = s->slides[i] ? 1 / (speed * speed - gap * bend) : 0;
+    const double rise = s->strayed[2 * i], drift = s->strayed[2 * i + 1];
+    const double lever = (of_gap * aside - (t[X] * tau[X] + t[Y] * tau[Y])) / speed;
+    const double across = t[X] * n[X] + t[Y] * n[Y] - of_slip * rise;
     for (int c = 0; c < columns; c++)
-        for (int j = 0; j < 2; j++) {
-            d->xi[c][j] = slide * (jump[c] * tau[j] + slope[c] * x_y[j]);
-            d->turn[c][j] = (slope[c] * n[j] + b * d->xi[c][j]) / speed;
-            d->pressure[c][j] += lever * d->turn[c][j];
-            d->shear[c][j] += s->gamma[2 * i + 1] * strayed[1] * d->xi[c][j] + across * d->turn[c][j];
+        for (int j = X; j <= Y; j++) {
+            const double xi = along * (jump[c] * tau[j] + slope[c] * apart[j]);
+            const double turn = (slope[c] * n[j] + bend * xi) / speed;
+            d->xi[c][j] = xi;
+            d->turn[c][j] = turn;
+            d->trial[N][c][j] += lever * turn;
+            d->trial[T][c][j] += of_slip * drift * xi + across * turn;
+            if (with_opening) {
+                d->opening[N][c][j] -= aside / speed * turn;
+                d->opening[T][c][j] += rise * turn - drift * xi;
+            }
         }
 }
 
@@ -65,41 +97,51 @@ void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, 
     for (int32_t i = 0; i < s->n * s->q; i++) {
         if (!s->active[i]) continue;
         Rates d;
-        linearise(s, i, &d);
-        const int32_t f = i / s->q, *slot = slots + (int64_t)place[i] * rows * columns;
-        const double w = -s->share * s->weight[i], *n = s->normal + 2 * i, tau[2] = {-n[1], n[0]};
-        const double *D = s->derivative + 4 * i, p = s->traction[2 * i], q = s->traction[2 * i + 1];
-        double force[MOST][4]; /* derivative of p n + q tau: component, then displacement */
+        linearise(s, i, s->has_by_opening, &d);
+        const int32_t facet = i / s->q, *slot = slots + (int64_t)place[i] * rows * columns;
+        const double w = -s->share * s->weight[i], *n = s->normal + D * i, unit[D] = {-n[Y], n[X]};
+        const double pressure = s->traction[D * i + N], shear = s->traction[D * i + T];
+        const double *A = s->by_trial + D * D * i, *B = s->has_by_opening ? s->by_opening + D * D * i : 0;
+        double force[MOST][D][D]; /* derivative of pressure n + shear unit: component, then displacement */
         for (int c = 0; c < columns; c++)
-            for (int ij = 0; ij < 4; ij++) {
-                const int l = ij / 2, j = ij % 2;
-                const double dp = D[0] * d.pressure[c][j] + D[1] * d.shear[c][j] + q * d.turn[c][j];
-                const double dq = D[2] * d.pressure[c][j] + D[3] * d.shear[c][j] - p * d.turn[c][j];
-                force[c][ij] = n[l] * dp + tau[l] * dq;
+            for (int j = X; j <= Y; j++) {
+                double dp = A[0] * d.trial[N][c][j] + A[1] * d.trial[T][c][j] + shear * d.turn[c][j];
+                double dq = A[2] * d.trial[N][c][j] + A[3] * d.trial[T][c][j] - pressure * d.turn[c][j];
+                if (B) {
+                    dp += B[0] * d.opening[N][c][j] + B[1] * d.opening[T][c][j];
+                    dq += B[2] * d.opening[N][c][j] + B[3] * d.opening[T][c][j];
+                }
+                for (int l = X; l <= Y; l++) force[c][l][j] = n[l] * dp + unit[l] * dq;
             }
         for (int r = 0; r < rows; r++) {
             const int own = r < k;
-            const double v = w * (own ? s->own_shape[i * a + s->trace[f * k + r]] : -s->shape[i * o + r - k]);
-            const double slope = own ? 0 : w * s->slope[i * o + r - k];
-            const double slid[2] = {slope * (p * n[0] + q * tau[0]), slope * (p * n[1] + q * tau[1])};
+            const double v = w * (own ? s->shape[i * a + s->trace[facet * k + r]] : -s->partner_shape[i * o + r - k]);
+            const double slope = own ? 0 : w * s->partner_slope[i * o + r - k];
+            double slid[D]; /* what the force on the row changes as its partner moves along the facet */
+            for (int l = X; l <= Y; l++) slid[l] = slope * (pressure * n[l] + shear * unit[l]);
             for (int c = 0; c < columns; c++) {
-                double *block = values + 4 * (int64_t)slot[r * columns + c];
-                for (int ij = 0; ij < 4; ij++) block[ij] += v * force[c][ij] - slid[ij / 2] * d.xi[c][ij % 2];
+                double *block = values + D * D * (int64_t)slot[r * columns + c];
+                for (int l = X; l <= Y; l++)
+                    for (int j = X; j <= Y; j++) block[D * l + j] += v * force[c][l][j] - slid[l] * d.xi[c][j];
             }
         }
     }
 }
 
-void trial_rate(const Side *s, const double *own, const double *opposite, double *rate)
+void point_rates(const Side *s, const double *own, const double *opposite, double *trial, double *opening)
 {
-    for (int32_t i = 0; i < s->n * s->q; i++) {
+    for (int32_t i = 0; i < s->n * s->q; i++, trial += D, opening += D) {
         Rates d;
-        linearise(s, i, &d);
-        double *r = rate + 2 * i;
-        r[0] = r[1] = 0;
-        for (int c = 0; c < s->a + s->o; c++) {
-            const double *u = c < s->a ? own + 2 * (s->a * (i / s->q) + c) : opposite + 2 * (s->o * i + c - s->a);
-            for (int j = 0; j < 2; j++) r[0] += d.pressure[c][j] * u[j], r[1] += d.shear[c][j] * u[j];
+        linearise(s, i, 1, &d);
+        for (int r = N; r <= T; r++) {
+            trial[r] = opening[r] = 0;
+            for (int c = 0; c < s->a + s->o; c++) {
+                const double *u = c < s->a ? own + D * (s->a * (i / s->q) + c) : opposite + D * (s->o * i + c - s->a);
+                for (int j = X; j <= Y; j++) {
+                    trial[r] += d.trial[r][c][j] * u[j];
+                    opening[r] += d.opening[r][c][j] * u[j];
+                }
+            }
         }
     }
 }

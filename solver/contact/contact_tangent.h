@@ -1,18 +1,32 @@
 #include <stdint.h>
 
-/* One side of a contact: n facets of q points; a nodes a cell, k of them on the facet (trace), o nodes of the opposite.
- * gamma (of gap and slip), traction (pressure, shear) and its derivative are in the frame of the normal. */
+/* One side of a contact: n facets of q points, with the arrays of the points in contiguous memory.
+ * a nodes a cell, of which k lie on the facet (trace), o nodes of the opposite facet, g components of
+ * the displacement gradient: xx, yy, xy, yx and, of an axisymmetric problem, the hoop strain u_r / r. */
 typedef struct {
-    int32_t moves, n, q, a, k, o;
-    const double *own_shape, *gradient;
-    const int32_t *trace;
-    const double *weight;
+    int32_t moves, n, q, a, k, o, g;
+    const double *shape;    /* (n, q, a) basis functions of the own cell */
+    const double *gradient; /* (n, q, a, 2) their gradients */
+    const double *hoop;     /* (n, q, a) basis functions over the radius, where g is 5 */
+    const int32_t *trace;   /* (n, k) nodes of the facet within the cell */
+    const double *weight;   /* (n, q) */
     double share;
-    const double *gamma;
-    const uint8_t *active;
-    const double *traction, *derivative, *stress_vector, *separation, *moduli;
-    const double *shape, *slope, *normal, *tangent, *bend, *strayed;
-    const uint8_t *slides;
+    const double *gamma;         /* (n q, 2) of gap and slip */
+    const uint8_t *active;       /* (n q) the point carries something */
+    const double *traction;      /* (n q, 2) pressure and shear */
+    const double *by_trial;      /* (n q, 2, 2) derivative of the traction by the trial traction */
+    int32_t has_by_opening;
+    const double *by_opening;    /* (n q, 2, 2) derivative by gap and slip, if there is one */
+    const double *stress_vector; /* (n q, 2) of the own body's stress */
+    const double *moduli;        /* (n q, 2, g) its derivative by the displacement gradient */
+    const double *separation;    /* (n q, 2) from the partner to the point */
+    const double *strayed;       /* (n q, 2) see Pair */
+    const double *partner_shape; /* (n q, o) basis functions of the opposite facet at the partner */
+    const double *partner_slope; /* (n q, o) their derivatives along the facet */
+    const double *normal;        /* (n q, 2) of the opposite facet */
+    const double *tangent;       /* (n q, 2) */
+    const double *bend;          /* (n q) */
+    const uint8_t *slides;       /* (n q) the partner is no vertex */
 } Side;
 
 /* Add the derivative of the residual to values. Nodes are counted: own cell's (columns) or own facet's (rows) first, then
@@ -21,5 +35,5 @@ typedef struct {
 void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, double *values);
 
 /* What displacements of the own cells' nodes (n, a, 2) and of the opposite's nodes at each point (n q, o, 2) add to the
- * trial tractions (n q, 2). */
-void trial_rate(const Side *s, const double *own, const double *opposite, double *rate);
+ * trial tractions and to gap and slip, (n q, 2) each. */
+void point_rates(const Side *s, const double *own, const double *opposite, double *trial, double *opening);

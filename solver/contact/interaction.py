@@ -22,7 +22,8 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError, RigidCircle
-from archord.solver.contact.law import ContactLaw, contact_law
+from archord.solver.contact.law import ContactLaw
+from archord.solver.contact.named import contact_law
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -52,7 +53,8 @@ class Interaction:
     """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid
     disc.
 
-    ``law`` is "frictionless", "tied" or a `ContactLaw`; ``friction`` is Coulomb's coefficient.
+    ``law`` is "frictionless", "coulomb", "tied" or a `ContactLaw`; ``friction`` is Coulomb's
+    coefficient, and makes a law without friction Coulomb's.
     Under ``kinematics`` "current" the closest points are those of the deformed curves, under
     "reference" those of the undeformed ones, with the normal of the first surface for both, and the
     gap is linear in the displacement; a law whose points do not slide has no other.
@@ -78,75 +80,102 @@ class Interaction:
 
 
 class Interface:
-    """The ``interaction`` of two ``surfaces`` as pairs of them. Collective; raises ValueError if
-    none is integrated, or an interference is tied, and `ProjectionError` on every rank if a point
-    on any finds no partner."""
+    """The ``interaction`` of two ``surfaces`` as ``pairs`` of them, one for each surface that is
+    integrated.
+
+    ``slide`` is how far its points are expected to slide. Collective; raises ValueError if no
+    surface is integrated, or an interference is tied, and `ProjectionError` on every rank if a
+    point on any finds no partner.
+    """
 
     def __init__(
         self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]
     ) -> None:
-        self.interaction, self.surfaces = interaction, list(surfaces)
+        self.interaction = interaction
+        self.surfaces = list(surfaces)
         law = contact_law(interaction.law, interaction.friction)
         moves = law.slides and interaction.kinematics == "current"
         self.slide = interaction.slide if moves else 0.0
-        given = zip(surfaces, interaction.surfaces, strict=True)
-        chosen = [
-            own
-            for own, name in given
-            if isinstance(own, Surface) and interaction.integrated in ("", name)
-        ]
         if not law.slides and (interaction.interference or interaction.overlap):
             raise ValueError(
                 f"{interaction.name!r} is tied: it keeps its gaps, and knows no interference or overlap"
             )
-        if not chosen:
-            raise ValueError(
-                f"{interaction.name!r} does not have the surface {interaction.integrated!r}"
-            )
-        compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in chosen])
         self.pairs: list[Pair] = []
-        with on_every_rank(chosen[0].comm):
-            for own, share in zip(chosen, compliance / compliance.sum(), strict=True):
+        integrated = self._integrated()
+        with on_every_rank(integrated[0].comm):
+            for own, share in zip(integrated, _shares(integrated), strict=True):
                 opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
                 if isinstance(opposite, Surface):
                     own.place_points(*segment_rule(own.curve, opposite.curve))
-                self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
-        if not moves and isinstance(surfaces[1], Surface) and chosen[0] is surfaces[0]:
+                self.pairs.append(Pair(own, opposite, law, share, moves=moves))
+        if not moves and isinstance(surfaces[1], Surface) and integrated[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
         self.fit(1.0)
 
+    def _integrated(self) -> list[Surface]:
+        """The surfaces whose points carry the contact."""
+        interaction = self.interaction
+        found = []
+        for surface, given in zip(self.surfaces, interaction.surfaces, strict=True):
+            is_chosen = interaction.integrated in ("", given)
+            if isinstance(surface, Surface) and is_chosen:
+                found.append(surface)
+        if not found:
+            raise ValueError(
+                f"{interaction.name!r} does not have the surface {interaction.integrated!r}"
+            )
+        return found
+
     def fit(self, part: float) -> None:
         """Let interferences be there by this ``part``."""
+        overlap_left = self.interaction.overlap * (1 - part)
         for pair in self.pairs:
-            pair.offset = (
-                self.interaction.overlap * (1 - part) - self.interaction.interference * part
-            )
+            pair.offset = overlap_left - self.interaction.interference * part
 
     def resultant(self) -> Array:
         """Contact force ``(2,)`` on the second surface, over all ranks."""
         return self._summed([pair.forces for pair in self.pairs])
 
     def moment(self, point: Array) -> float:
-        """Moment of that force about ``point`` ``(2,)``, anticlockwise, over all ranks."""
-        arms = [pair.place - point for pair in self.pairs]
-        forces = [pair.forces for pair in self.pairs]
-        crossed = [
-            a[:, :1] * f[:, 1:] - a[:, 1:] * f[:, :1] for a, f in zip(arms, forces, strict=True)
-        ]
-        return float(self._summed(crossed)[0])
+        """Moment of this force about ``point`` ``(2,)``, anticlockwise, over all ranks."""
+        moments = []
+        for pair in self.pairs:
+            arm = pair.place - point
+            force = pair.forces
+            moments.append(arm[:, :1] * force[:, 1:] - arm[:, 1:] * force[:, :1])
+        return float(self._summed(moments)[0])
 
     def pressed(self) -> float:
         """Sum of the sizes of the contact forces of all points, over all ranks: what a fit presses
-        with, too, of which the resultant is zero."""
+        with, too, whose resultant is zero."""
         sizes = [np.linalg.norm(pair.forces, axis=1).sum() for pair in self.pairs]
         return self.pairs[0].surface.comm.allreduce(float(sum(sizes)))
 
+    def quantities(self) -> dict[str, tuple[float, str]]:
+        """Integrals of the law's quantities over the surface, over all ranks, with their units, by
+        name: at the last evaluation. Collective."""
+        found: dict[str, tuple[float, str]] = {}
+        for pair in self.pairs:
+            for name, quantity in pair.law.quantities(pair.points.trial).items():
+                before, _ = found.get(name, (0.0, ""))
+                found[name] = before + pair.integral(quantity.density), quantity.unit
+        comm = self.pairs[0].surface.comm
+        return {name: (comm.allreduce(value), unit) for name, (value, unit) in found.items()}
+
     def _summed(self, on_own: Sequence[Array]) -> Array:
-        """What the points of each pair get from the other surface ``(m, k)``, summed over those of
-        the second."""
-        signs = [1 if pair.surface is self.surfaces[1] else -1 for pair in self.pairs]
-        total = sum(sign * values.sum(0) for sign, values in zip(signs, on_own, strict=True))
+        """What the points of each pair get from the other surface ``(m, k)``, summed over the
+        points of the second."""
+        total = 0.0
+        for pair, values in zip(self.pairs, on_own, strict=True):
+            sign = 1 if pair.surface is self.surfaces[1] else -1
+            total = total + sign * values.sum(0)
         return self.pairs[0].surface.sum_over_ranks(np.asarray(total))
+
+
+def _shares(integrated: Sequence[Surface]) -> list[float]:
+    """Shares of the virtual work, in proportion to the compliances of the bodies."""
+    compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in integrated])
+    return [float(share) for share in compliance / compliance.sum()]
 
 
 @contextmanager
@@ -158,5 +187,6 @@ def on_every_rank(comm: MPI.Comm) -> Iterator[None]:
         yield
     except ProjectionError as error:
         failure = str(error)
-    if said := next((f for f in comm.allgather(failure) if f), None):
-        raise ProjectionError(said)
+    failures = [said for said in comm.allgather(failure) if said]
+    if failures:
+        raise ProjectionError(failures[0])

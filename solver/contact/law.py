@@ -1,55 +1,102 @@
-"""Contact laws: the traction at points of a surface, from how they lie to their partners.
+"""The protocol of contact laws: the traction at points of a surface, from how they lie to their
+partners.
 
-All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` and,
-turned from it by a quarter anticlockwise, its tangent. A traction ``(m, 2)`` is a pressure,
-positive in compression, and a shear.
-
-The slip is that since the last accepted state, along the tangent, of the points that are partners
-now: in contact both sides agree on it, whatever the angle at which they met, and what turns with
-the surfaces slips by nothing.
+All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` first,
+then its tangent, which in a plane is ``n`` turned by a quarter anticlockwise. There are as many
+components ``d`` as displacements have. A traction ``(m, d)`` is a pressure, positive in
+compression, and a shear. An opening ``(m, d)`` is a gap, positive when open, and a slip.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from archord.geometry.basis import Array
 
 State = Any
+Branches = npt.NDArray[np.integer]
+
+OPEN = 0  # the point carries nothing: its traction and all derivatives are zero
+STICK = 1
+SLIDE = 2
+SLIDE_BACK = 3  # against the tangent of the frame
+
+
+class Response(NamedTuple):
+    """What a law answers at ``m`` points."""
+
+    traction: Array  # (m, d)
+    by_trial: Array  # (m, d, d) derivative of the traction by the trial traction
+    by_opening: Array | None  # (m, d, d) its derivative by the opening; None if it has none
+    branch: Branches  # (m,) OPEN, STICK, SLIDE or another number of the law's own
+    state: State  # the new history
+
+
+class Quantity(NamedTuple):
+    """What a law tells of its points besides the traction."""
+
+    density: Array  # (m,) per area of the surface
+    unit: str = ""  # unit of the integral over the surface
 
 
 class ContactLaw(Protocol):
-    """A law by its `update`, a pure function; without a history and without friction as it stands.
+    """A law by its `respond`, a pure function. What a law does not define is inherited: a law
+    without history and without friction.
 
-    Points of a law that ``slides`` move along the opposite surface; others keep partners, and
-    undeformed gaps as zero. One that ``has_friction`` has shear; of one that is ``unilateral``
-    points which do not touch carry nothing.
+    Points of a law that ``slides`` move along the opposite surface. Otherwise they keep the
+    partners of the undeformed surfaces, and their undeformed gaps count as zero.
+
+    A law that ``counts_slip`` gets the slip since the last accepted state, of the points that are
+    partners now. In contact both sides agree on this slip, whatever the angle at which they met.
+    A law that ``has_friction`` carries shear: it counts slip, and the shear is reported. The slip
+    and the trial shear of other laws that slide mean nothing.
+
+    A law that is ``unilateral`` has open points: strategies that look ahead at which points close
+    are for such laws alone.
     """
 
     slides: ClassVar[bool] = True
+    counts_slip: ClassVar[bool] = False
     has_friction: ClassVar[bool] = False
     unilateral: ClassVar[bool] = False
 
-    def state(self, n: int) -> State:
-        """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a
-        material."""
-        return None
+    def respond(
+        self, opening: Array, trial: Array, gamma: Array, state: State, dt: float
+    ) -> Response:
+        """The traction of points from their ``state`` at the beginning of the step.
 
-    def update(
-        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
-    ) -> tuple[Array, Array, State]:
-        """Traction ``(m, 2)``, its derivative ``(m, 2, 2)`` with respect to ``trial``, and the new
-        state.
+        Parameters
+        ----------
+        opening : (m, d) array
+            Gap and slip.
+        trial : (m, d) array
+            Nitsche's traction of points that touch and stick: the traction of the own body's
+            stress, less ``gamma`` times the opening.
+        gamma : (m, 2) array
+            Nitsche's stiffness of the gap and of the slip, in stress per length.
+        state
+            What `state` or an accepted answer returned.
+        dt : float
+            The length of the step in the load factor, the time of the path. It is 0 where an
+            accepted state is evaluated once more, and where loose bodies come to rest first.
 
-        ``trial`` ``(m, 2)`` is Nitsche's traction of points that touch and stick: that of the own
-        body's stress minus ``gamma`` ``(m, 2)`` times ``gap`` and ``slip``, ``(m,)`` each. Traction
-        and derivative are zero at points that do not touch; where they touch, the pressure follows
-        its trial value. What is not a number stays that.
+        Returns
+        -------
+        Response
+            Derivatives are partial: by the trial traction at a fixed opening, and by the opening
+            at a fixed trial traction. Equal numbers of ``branch`` mean the same smooth piece of
+            the law; the solver counts the points that change their branch. What is not a number
+            stays that.
         """
         ...
+
+    def state(self, n: int) -> State:
+        """History of ``n`` points at the beginning: None, or a dataclass of arrays whose first
+        axis are the points, as of a material."""
+        return None
 
     def elastic(self) -> ContactLaw:
         """A law with the same states that answers from each as if points could not slide (any
@@ -69,125 +116,7 @@ class ContactLaw(Protocol):
         """Energy dissipated so far per area ``(m,)``."""
         return 0.0
 
-
-class Frictionless(ContactLaw):
-    """``p = [trial]_+`` and no shear."""
-
-    unilateral = True
-
-    def update(
-        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
-    ) -> tuple[Array, Array, State]:
-        """Pressure where the trial pressure is positive."""
-        touches, derivative = ~(trial[:, 0] <= 0), np.zeros((len(trial), 2, 2))
-        derivative[:, 0, 0] = touches
-        return np.where(touches[:, None], trial * [1.0, 0.0], 0.0), derivative, state
-
-
-@dataclass(frozen=True)
-class FrictionState:
-    """History of ``m`` points: ``elastic_slip``, gamma times which is what the shear is below that
-    of the own body's stress, ``pressure``, and the energy ``dissipated`` per area."""
-
-    elastic_slip: Array
-    pressure: Array
-    dissipated: Array
-
-
-@dataclass(frozen=True)
-class Coulomb(ContactLaw):
-    """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward
-    Euler).
-
-    A point that sticks has its trial shear, and the slip of the step is added to its elastic slip:
-    what sticks for many steps does not creep. Where that leaves the cone the shear comes back to it
-    at the same pressure, and the elastic slip becomes what gives this shear: a return map with
-    gamma for its stiffness. It is zero at points that do not touch.
-
-    If ``held``, points that touched stick, whatever their shear, and others slide without friction:
-    an elastic predictor. With ``secant`` the derivative by the trial shear is shear over trial
-    shear at points that slide, and the shear does not follow the pressure there. Newton's method
-    then is the fixed-point iteration of Kacanov (1959): slower, but bodies that only friction keeps
-    from turning keep a stiffness.
-    """
-
-    friction: float
-    held: bool = False
-    secant: bool = False
-    has_friction = True
-    unilateral = True
-
-    def state(self, n: int) -> FrictionState:
-        """Points at rest."""
-        return FrictionState(*np.zeros((3, n)))
-
-    def update(
-        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
-    ) -> tuple[Array, Array, State]:
-        """Pressure as without friction, and the shear returned to the cone."""
-        touches = ~(trial[:, 0] <= 0)
-        pressure = np.where(touches, trial[:, 0], 0.0)
-        sticking = np.where(touches, trial[:, 1] - gamma[:, 1] * state.elastic_slip, 0.0)
-        touched = state.pressure > 0
-        friction = np.where(touched, self.friction, 0.0) if self.held else self.friction
-        most = friction * pressure
-        sign, size = np.sign(sticking), np.abs(sticking)
-        slides = size > most
-        if self.held:
-            slides &= ~touched
-        shear = np.where(slides, sign * most, sticking)
-        moved = np.where(slides, sign * (size - most) / gamma[:, 1], 0.0)
-        derivative = np.zeros((len(trial), 2, 2))
-        derivative[:, 0, 0], derivative[:, 1, 1] = touches, touches & ~slides
-        if self.secant:
-            derivative[slides, 1, 1] = most[slides] / size[slides]
-        else:
-            derivative[:, 1, 0] = np.where(slides, sign * friction, 0.0)
-        lost = 0.5 * friction * (state.pressure + pressure) * np.abs(moved)
-        new = FrictionState(
-            np.where(touches, state.elastic_slip + slip + moved, 0.0),
-            pressure,
-            state.dissipated + lost,
-        )
-        return np.stack([pressure, shear], axis=1), derivative, new
-
-    def elastic(self) -> Coulomb:
-        """The law in which points that touched are ``held``."""
-        return replace(self, held=True)
-
-    def frictionless(self) -> Coulomb:
-        """The law without friction."""
-        return replace(self, friction=0.0)
-
-    def by_secants(self) -> Coulomb:
-        """The law with ``secant`` derivatives."""
-        return replace(self, secant=True)
-
-    def dissipation(self, state: State) -> Array:
-        """Work done against friction so far per area ``(m,)``."""
-        return state.dissipated
-
-
-class Tied(ContactLaw):
-    """The whole trial traction, whatever its sign: the surfaces stay as they are to each other."""
-
-    slides = False
-
-    def update(
-        self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State
-    ) -> tuple[Array, Array, State]:
-        """The trial traction."""
-        return trial, np.tile(np.eye(2), (len(trial), 1, 1)), state
-
-
-def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
-    """The law of a name, with Coulomb's ``friction`` if there is any. Raises ValueError for
-    friction that is negative, or of another law than that without friction."""
-    if friction and (law != "frictionless" or not friction > 0):
-        raise ValueError(
-            f"friction must be positive, of a law that is frictionless without it: {friction:g} of {law!r}"
-        )
-    return Coulomb(friction) if friction else LAWS[law] if isinstance(law, str) else law
-
-
-LAWS: dict[str, ContactLaw] = {"frictionless": Frictionless(), "tied": Tied()}
+    def quantities(self, state: State) -> dict[str, Quantity]:
+        """Quantities per area by name, such as a depth of wear: their integrals over the surface
+        are reported for each step."""
+        return {}

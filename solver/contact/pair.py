@@ -1,4 +1,4 @@
-"""One integrated surface against its opposite: pairs, gaps and tractions at its points."""
+"""One integrated surface against its opposite: pairs, openings and tractions at its points."""
 
 from __future__ import annotations
 
@@ -9,28 +9,38 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.materials.material import Points
-from archord.solver.contact.law import ContactLaw
+from archord.solver.contact.law import OPEN, STICK, Branches, ContactLaw
+from archord.solver.contact.slip import SlipOrigin
 from archord.solver.contact.surface import RigidSurface, Surface
 
 Start = Literal["anywhere", "near", "held"]
 
 
 class Pair:
-    """The points of ``surface`` (``m`` on this rank) against ``opposite``; arrays are those of the
-    last evaluation.
+    """The ``m`` points of ``surface`` on this rank against ``opposite``, with a contact ``law``.
 
     ``share`` of the contact's virtual work is integrated here. Unless the pair ``moves``, points
-    keep the partners of the undeformed surfaces. Tractions are in the frame of the ``law``. Raises
-    `ProjectionError`.
+    keep the partners of the undeformed surfaces. ``offset`` is added to the gap. The next
+    evaluation searches partners from ``start`` on: anywhere, near the last ones, or, until it is
+    set again, on their facets. Raises `ProjectionError`.
 
-    ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)``
-    normal and tangent and ``opening`` ``(m, 2)`` gap and slip; ``strayed`` ``(m, 2)`` is how far
-    points that rub moved along the normal in the step, and how much the opposite's part in the slip
-    grows along its facet; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 2, 4)`` are those of
-    the own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of
-    the law; ``active`` ``(m,)`` points touch, ``sticks`` those that also stick, and ``changes``
-    went over. ``offset`` is added to the gap. The next evaluation searches partners from ``start``
-    on: anywhere, near the last ones, or, until it is set again, on their facets.
+    Arrays, of the last evaluation, in the order in which they come to be; ``d`` is the number of
+    components of a displacement, of which the frame's normal is first:
+
+    gamma : (m, 2) Nitsche's stiffness of gap and slip
+    stress_vector : (m, d) force of the own body's stress per area
+    moduli : (m, d, g) its derivative by the displacement gradient
+    projection : the partners
+    separation : (m, d) from the partner to the point
+    frame : (m, d, d) normal and tangent of the opposite surface
+    opening : (m, d) gap and slip
+    strayed : (m, 2) motion of the step along the normal, and growth of the opposite's part of the
+        slip along its facet; zero unless slip is counted
+    trial : (m, d) Nitsche's traction of points that touch and stick
+    traction : (m, d) answer of the law
+    by_trial, by_opening : (m, d, d) derivatives of the traction; the second is None without
+    branch : (m,) branch of the law
+    active : (m,) whether points carry anything
     """
 
     def __init__(
@@ -42,192 +52,220 @@ class Pair:
         *,
         moves: bool,
     ) -> None:
-        self.surface, self.opposite, self.law, self.share, self.moves = (
-            surface,
-            opposite,
-            law,
-            share,
-            moves,
-        )
-        x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
-        self.projection = opposite.curve.closest_point(
-            x, self._outward, np.zeros_like(opposite.curve.X)
-        )
-        self.separation = x - self.projection.point
-        self.points = Points(law, len(x))
-        self.traction: Array = np.zeros((len(x), 2))
-        self._branch: Array = np.zeros(len(x))
-        self.active, self.sticks = np.zeros((2, len(x)), dtype=bool)
+        self.surface = surface
+        self.opposite = opposite
+        self.law = law
+        self.share = share
+        self.moves = moves
+        self.counts_slip = law.counts_slip or law.has_friction
         self.start: Start = "anywhere"
         self.offset = 0.0
-        self._begun: tuple[Array, Array] = np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)
-        self._touched_down: tuple[Array, Array] = self._begun
-        self._touched = self.active
+        self.dt = 0.0
+
+        x = _flat(surface.point)
+        at_rest = np.zeros_like(opposite.curve.X)
+        self._outward = _flat(surface.outward)
+        self.projection = opposite.curve.closest_point(x, self._outward, at_rest)
+        self.separation = x - self.projection.point
+        self.points = Points(law, len(x))
         self.strayed: Array = np.zeros((len(x), 2))
+        self.traction: Array = np.zeros_like(x)
+        self.branch: Branches = np.full(len(x), OPEN)
+        self.active: np.ndarray = np.zeros(len(x), dtype=bool)
+        self.changes = 0  # points on another branch than in the evaluation before
+        self._origin = SlipOrigin(np.zeros_like(x), at_rest, self.active)
 
     def use_gamma(self, factor: float) -> None:
-        """Nitsche's gamma ``(m, 2)``, of gap and slip, is ``factor`` times the share and the trace
-        constants of the point's cell."""
-        each = np.stack([self.surface.gamma, self.surface.gamma_shear], axis=1)
-        self.gamma = factor * self.share * np.repeat(each, self.surface.weight.shape[1], axis=0)
+        """Let Nitsche's gamma be ``factor`` times the share and the trace constants of the point's
+        cell."""
+        surface = self.surface
+        of_facets = np.stack([surface.gamma, surface.gamma_shear], axis=1)
+        points_per_facet = surface.weight.shape[1]
+        self.gamma = factor * self.share * np.repeat(of_facets, points_per_facet, axis=0)
 
     def use_own_normals(self) -> None:
         """Measure the gap along this surface's normals, reversed, for good."""
         self.projection = replace(self.projection, normal=-self._outward)
 
-    def evaluate(self, u: Array, motion: Array) -> None:
-        """Evaluate at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``; raises
-        `ProjectionError`."""
-        displacement, stress_vector, moduli = self.surface.deform(u)
-        self._moved = displacement, motion
-        self.stress_vector, self.moduli = (
-            np.ascontiguousarray(stress_vector),
-            np.ascontiguousarray(moduli),
-        )
-        if self.moves:
-            x, curve, facet = (
-                self.surface.point.reshape(-1, 2) + displacement,
-                self.opposite.curve,
-                self.projection.facet,
-            )
-            if self.start == "held":
-                self.projection = curve.continued(x, self._outward, motion, facet)
-            else:
-                known = None if self.start == "anywhere" else facet
-                self.projection, self.start = (
-                    curve.closest_point(x, self._outward, motion, known),
-                    "near",
-                )
-            self.separation = x - self.projection.point
-        n = self.projection.normal
-        self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
-        self.opening = self._in_frame(
-            self.separation if self.moves else self._relative(displacement, motion)
-        )
-        self.opening[:, 0] += self.offset
-        if self.law.slides and not self.moves:
-            self.opening[:, 0] += (self.separation * n).sum(1)
-        if self.law.has_friction:
-            own, nodes = self._moved_in_step(displacement, motion)
-            P = self.projection
-            rise, slip = self._in_frame(own - np.einsum("ma,mai->mi", P.shape, nodes)).T
-            self.opening[:, 1] = slip
-            drift = self._in_frame(np.einsum("ma,mai->mi", P.slope, nodes))[:, 1]
-            self.strayed = np.stack([rise, drift], axis=1)
-        self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
-        if self.law.has_friction:  # what has no partner has no history
-            self.trial[~self.projection.found, 0] = -1.0
-        self.traction = self._answer(self.trial)
-
     def begin(self, u: Array, motion: Array) -> None:
-        """Count the slip of laws that rub from ``u`` and ``motion`` on, as `evaluate` takes
-        them."""
-        self._begun = self.surface.displacement(u), motion
-        self._touched_down = self._begun
-        self._touched = self.active.copy()
+        """Count slip from ``u`` and ``motion`` on, as `evaluate` takes them."""
+        self._origin = SlipOrigin(self.surface.displacement(u), motion, self.active)
 
     def touch_down(self, u: Array, motion: Array) -> None:
         """Count the slip of points that did not touch when the step began from ``u`` and ``motion``
         on instead."""
-        self._touched_down = self.surface.displacement(u), motion
+        self._origin.touch_down(self.surface.displacement(u), motion)
 
-    def _moved_in_step(self, displacement: Array, motion: Array) -> tuple[Array, Array]:
-        """How far points ``(m, 2)`` and the nodes of their partners ``(m, k, 2)`` have moved since
-        slip counts."""
-        nodes, new = self.projection.nodes, ~self._touched
-        own, before = self._begun
-        own_down, down = self._touched_down
-        return (
-            displacement - np.where(new[:, None], own_down, own),
-            motion[nodes] - np.where(new[:, None, None], down[nodes], before[nodes]),
-        )
+    def evaluate(self, u: Array, motion: Array, dt: float) -> None:
+        """Evaluate at ``u`` ``(n, d)``, with the opposite's nodes moved by ``motion``, in a step of
+        the length ``dt``; raises `ProjectionError`."""
+        displacement, stress_vector, moduli = self.surface.deform(u)
+        self.dt = dt
+        self._moved = displacement, motion
+        self.stress_vector = np.ascontiguousarray(stress_vector)
+        self.moduli = np.ascontiguousarray(moduli)
+        if self.moves:
+            self._find_partners(displacement, motion)
+        normal = self.projection.normal
+        self.frame = np.stack([normal, _turned(normal)], axis=1)
+        self.opening = self._opening()
+        self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
+        if self.counts_slip:  # what has no partner has no history
+            self.trial[~self.projection.found, 0] = -1.0
+        self._answer(self.opening, self.trial)
+
+    def _find_partners(self, displacement: Array, motion: Array) -> None:
+        """The closest points of the deformed surfaces."""
+        x = _flat(self.surface.point) + displacement
+        curve = self.opposite.curve
+        last = self.projection.facet
+        if self.start == "held":
+            self.projection = curve.continued(x, self._outward, motion, last)
+        else:
+            near = None if self.start == "anywhere" else last
+            self.projection = curve.closest_point(x, self._outward, motion, near)
+            self.start = "near"
+        self.separation = x - self.projection.point
+
+    def _opening(self) -> Array:
+        """Gap and slip ``(m, d)``; how far points `strayed` is kept."""
+        apart = self.separation if self.moves else self._moved_apart()
+        opening = self._in_frame(apart)
+        opening[:, 0] += self.offset
+        if self.law.slides and not self.moves:
+            opening[:, 0] += self._undeformed_gap()
+        if self.counts_slip:
+            partners = self.projection
+            own, nodes = self._origin.moved(*self._moved, partners)
+            of_step = own - np.einsum("ma,mai->mi", partners.shape, nodes)
+            rise, slip = self._in_frame(of_step).T
+            opening[:, 1] = slip
+            drift = self._in_frame(np.einsum("ma,mai->mi", partners.slope, nodes))[:, 1]
+            self.strayed = np.stack([rise, drift], axis=1)
+        return opening
 
     def _in_frame(self, vectors: Array) -> Array:
-        """Components ``(m, 2)`` along normal and tangent."""
+        """Components ``(m, d)`` along normal and tangent."""
         return np.einsum("mij,mj->mi", self.frame, vectors)
 
-    def _relative(self, own: Array, motion: Array) -> Array:
-        """What the points ``own`` ``(m, 2)`` and their partners have moved apart ``(m, 2)``."""
-        P = self.projection
-        return own - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
+    def _moved_apart(self) -> Array:
+        """Displacement ``(m, d)`` of the points relative to their partners."""
+        own, motion = self._moved
+        partners = self.projection
+        return own - np.einsum("ma,mai->mi", partners.shape, motion[partners.nodes])
 
-    def _answer(self, trial: Array) -> Array:
-        """Traction of the law, none at points without a partner; its derivative and the active
-        points are kept."""
-        traction, self.derivative = self.points.update(*self.opening.T, trial, self.gamma)
-        lone = ~self.projection.found
-        if lone.any():
-            traction = np.where(lone[:, None], 0.0, traction)
-            self.derivative = np.where(lone[:, None, None], 0.0, self.derivative)
-        before, D = self._branch, self.derivative
-        self._branch = D[:, 0, 0] + 2 * D[:, 1, 1] + 4 * np.sign(D[:, 1, 0])
-        self.active, self.sticks = D[:, 0, 0] != 0, D[:, 1, 1] != 0
-        self.changes = int((before != self._branch).sum())
-        return traction
+    def _undeformed_gap(self) -> Array:
+        """Gap ``(m,)`` of the undeformed surfaces, of a pair that does not move."""
+        return (self.separation * self.projection.normal).sum(1)
 
-    def expect(self, rate: Array) -> None:
-        """Go over to the law's branch with ``rate`` ``(m, 2)`` added to the trial, continued to the
-        present one."""
-        self.traction = self._answer(self.trial + rate) - np.einsum(
-            "mij,mj->mi", self.derivative, rate
-        )
+    def _answer(self, opening: Array, trial: Array) -> None:
+        """Let the law answer; points without a partner carry nothing."""
+        points = self.points
+        response = points.acting.respond(opening, trial, self.gamma, points.state, self.dt)
+        points.trial = response.state
+        with_partner = self.projection.found
+        self.traction = _where(with_partner, response.traction)
+        self.by_trial = _where(with_partner, response.by_trial)
+        self.by_opening = None
+        if response.by_opening is not None:
+            self.by_opening = _where(with_partner, response.by_opening)
+        branch = np.where(with_partner, response.branch, OPEN)
+        self.changes = int((branch != self.branch).sum())
+        self.branch = branch
+        self.active = branch != OPEN
+
+    def expect(self, trial_rate: Array, opening_rate: Array) -> None:
+        """Go over to the law's branch with these rates ``(m, d)`` added to trial and opening; the
+        traction is continued to the present ones."""
+        self._answer(self.opening + opening_rate, self.trial + trial_rate)
+        change = np.einsum("mij,mj->mi", self.by_trial, trial_rate)
+        if self.by_opening is not None:
+            change += np.einsum("mij,mj->mi", self.by_opening, opening_rate)
+        self.traction = self.traction - change
+
+    @property
+    def sticks(self) -> np.ndarray:
+        """Whether points ``(m,)`` stick."""
+        return self.branch == STICK
 
     @property
     def distance(self) -> Array:
         """Distance ``(n, q)`` of the points of this rank's facets from their partners, positive
         when open."""
-        closed = 0.0 if self.law.slides else (self.separation * self.projection.normal).sum(1)
-        return (self.opening[:, 0] + closed).reshape(self.surface.weight.shape)
+        closed = 0.0 if self.law.slides else self._undeformed_gap()
+        return self._by_facets(self.opening[:, 0] + closed)
 
     @property
     def slip(self) -> Array:
         """Displacement ``(n, q)`` of the points relative to the opposite surface, along the tangent
         of the frame."""
-        return (
-            (self.frame[:, 1] * self._relative(*self._moved))
-            .sum(axis=1)
-            .reshape(self.surface.weight.shape)
-        )
-
-    @property
-    def place(self) -> Array:
-        """Where the points' forces act ``(m, 2)``: on the deformed surface, if they move."""
-        return self.surface.point.reshape(-1, 2) + self._moved[0] * self.moves
+        return self._by_facets((self.frame[:, 1] * self._moved_apart()).sum(axis=1))
 
     @property
     def pressure(self) -> Array:
         """Pressure ``(n, q)`` at the points of this rank's facets."""
-        return self.traction[:, 0].reshape(self.surface.weight.shape)
+        return self._by_facets(self.traction[:, 0])
 
     @property
     def shear(self) -> Array:
         """Shear ``(n, q)`` on the own surface, positive along the tangent of the frame."""
-        return self.traction[:, 1].reshape(self.surface.weight.shape)
+        return self._by_facets(self.traction[:, 1])
 
-    def dissipated(self) -> float:
-        """Energy that the law dissipated on this rank so far."""
-        return float(
-            (
-                self.share
-                * self.surface.weight.ravel()
-                * self.points.material.dissipation(self.points.trial)
-            ).sum()
-        )
+    def _by_facets(self, values: Array) -> Array:
+        """Values ``(m,)`` of the points as those ``(n, q)`` of facets."""
+        return values.reshape(self.surface.weight.shape)
+
+    @property
+    def place(self) -> Array:
+        """Where the points' forces act ``(m, d)``: on the deformed surface, if they move."""
+        return _flat(self.surface.point) + self._moved[0] * self.moves
+
+    @property
+    def weight(self) -> Array:
+        """Weights ``(m,)`` of the points, of which the pair integrates its share."""
+        return self.share * self.surface.weight.ravel()
+
+    def integral(self, density: Array | float) -> float:
+        """This rank's part of the integral of a ``density`` ``(m,)`` over the surface, times the
+        share."""
+        return float((self.weight * density).sum())
 
     @property
     def forces(self) -> Array:
-        """Weighted contact force ``(m, 2)`` of each point on its own body."""
-        weighted = self.share * self.surface.weight.reshape(-1, 1) * self.traction
+        """Weighted contact force ``(m, d)`` of each point on its own body."""
+        weighted = self.weight[:, None] * self.traction
         return np.einsum("mij,mi->mj", self.frame, weighted)
 
     def add_forces(self, own: Array, opposite: Array) -> None:
-        """Add the forces on the nodes of the own surface to ``own`` ``(nodes, 2)``, their reactions
+        """Add the forces on the nodes of the own surface to ``own`` ``(nodes, d)``, their reactions
         to ``opposite``."""
-        surface, P, forces = self.surface, self.projection, self.forces
-        on_facets = surface.trace_shape.swapaxes(1, 2) @ forces.reshape(*surface.weight.shape, 2)
-        nodes = surface.curve.connectivity[surface.facet]
-        for i in range(2):
-            own[:, i] += np.bincount(nodes.ravel(), on_facets[..., i].ravel(), len(own))
-            opposite[:, i] -= np.bincount(
-                P.nodes.ravel(), (P.shape * forces[:, i, None]).ravel(), len(opposite)
-            )
+        surface = self.surface
+        partners = self.projection
+        forces = self.forces
+        on_facets = surface.trace_shape.swapaxes(1, 2) @ forces.reshape(surface.point.shape)
+        own_nodes = surface.curve.connectivity[surface.facet].ravel()
+        opposite_nodes = partners.nodes.ravel()
+        for i in range(forces.shape[1]):
+            action = on_facets[..., i].ravel()
+            reaction = (partners.shape * forces[:, i, None]).ravel()
+            own[:, i] += np.bincount(own_nodes, action, len(own))
+            opposite[:, i] -= np.bincount(opposite_nodes, reaction, len(opposite))
+
+
+def _where(chosen: np.ndarray, values: Array) -> Array:
+    """The ``values`` ``(m, ...)`` of ``chosen`` points ``(m,)``, zero at the others, in contiguous
+    memory."""
+    if not chosen.all():
+        shape = len(chosen), *(1 for _ in values.shape[1:])
+        values = np.where(chosen.reshape(shape), values, 0.0)
+    return np.ascontiguousarray(values)
+
+
+def _flat(at_facets: Array) -> Array:
+    """Vectors ``(n, q, d)`` at points of facets as those ``(m, d)`` of points."""
+    return at_facets.reshape(-1, at_facets.shape[-1])
+
+
+def _turned(normal: Array) -> Array:
+    """The tangents ``(m, 2)``: normals turned by a quarter anticlockwise."""
+    return np.stack([-normal[:, 1], normal[:, 0]], axis=1)

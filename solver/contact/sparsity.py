@@ -3,27 +3,42 @@ pairs."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from mpi4py import MPI
 
 from archord.solver.contact.pair import Pair
-from archord.solver.contact.surface import neighbours
 
 _MARGIN = 2  # rings of opposite facets kept in the pattern around those that are paired
 _WIDEST = 16  # the same where pairs are expected to slide further
+
+
+class Meetings(NamedTuple):
+    """The facets of this rank with the opposite facets that each may meet, ``p`` of them."""
+
+    keys: np.ndarray  # (p,) see Reach
+    rows: np.ndarray  # (p, k + o) block dofs that get forces
+    columns: np.ndarray  # (p, a + o) block dofs on which the forces depend
+
+    def largest_dof(self) -> int:
+        """The largest block dof; 0 without any."""
+        return max(int(dofs.max(initial=0)) for dofs in (self.rows, self.columns))
 
 
 class Reach:
     """Which opposite facets each facet of a ``pair`` may meet, where points slide by about
     ``slide``. Collective.
 
-    ``keys`` ``(n,)``, sorted and alike on all ranks, are own facets times the number of opposite
-    ones, plus opposite.
+    keys : (p,) own facet times the number of opposite facets, plus opposite facet; sorted and alike
+        on all ranks
     """
 
     def __init__(self, pair: Pair, slide: float) -> None:
-        self.pair, self._comm, self._n = pair, pair.surface.comm, pair.opposite.n_facets
-        length = self._comm.allreduce(float(pair.surface.weight.sum())) / self._n
+        self.pair = pair
+        self._comm = pair.surface.comm
+        self._n_opposite = pair.opposite.n_facets
+        length = pair.surface.facet_lengths().sum() / self._n_opposite
         self._rings = min(_MARGIN + int(slide / length), _WIDEST)
         self.keys = np.zeros(0, dtype=np.int64)
         self.extend()
@@ -34,29 +49,28 @@ class Reach:
         new = np.setdiff1d(self.point_keys(), self.keys)
         if not self._comm.allreduce(len(new) > 0, op=MPI.LOR):
             return False
-        facet, met = np.divmod(new, self._n)
-        which, near = neighbours(self.pair.opposite.curve, met, self._rings)
-        parts = self._comm.allgather(facet[which] * self._n + near)
-        self.keys = np.unique(np.concatenate([self.keys, *parts]))
+        own, met = np.divmod(new, self._n_opposite)
+        place, near = self.pair.opposite.curve.neighbours(met, self._rings)
+        keys_of_ranks = self._comm.allgather(own[place] * self._n_opposite + near)
+        self.keys = np.unique(np.concatenate([self.keys, *keys_of_ranks]))
         return True
 
     def point_keys(self) -> np.ndarray:
         """The keys ``(m,)`` of this rank's points at the last evaluation."""
-        facet, shape = self.pair.surface.facet, self.pair.surface.weight.shape
-        return (facet[:, None] * self._n + self.pair.projection.facet.reshape(shape)).ravel()
+        surface = self.pair.surface
+        met = self.pair.projection.facet.reshape(surface.weight.shape)
+        return (surface.facet[:, None] * self._n_opposite + met).ravel()
 
-    def dofs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The keys ``(p,)`` of this rank's facets, their dofs of rows ``(p, k + o)`` and of columns
-        ``(p, a + o)``."""
-        surface, opposite = self.pair.surface, self.pair.opposite
-        facet, met = np.divmod(self.keys, self._n)
+    def meetings(self) -> Meetings:
+        """The meetings of this rank's facets."""
+        surface = self.pair.surface
+        opposite = self.pair.opposite
+        facet, met = np.divmod(self.keys, self._n_opposite)
         here = np.isin(facet, surface.facet)
         own = np.searchsorted(surface.facet, facet[here])
-        there = opposite.curve_dofs[opposite.curve.connectivity[met[here]]]
-        rows = np.take_along_axis(surface.cell_global, surface.trace, axis=1)[own]
-        columns = surface.cell_global[own]
-        return (
-            self.keys[here],
-            np.concatenate([rows, there], axis=1),
-            np.concatenate([columns, there], axis=1),
-        )
+        of_opposite = opposite.curve_dofs[opposite.curve.connectivity[met[here]]]
+        of_cell = surface.cell_global[own]
+        on_facet = np.take_along_axis(surface.cell_global, surface.trace, axis=1)[own]
+        rows = np.concatenate([on_facet, of_opposite], axis=1)
+        columns = np.concatenate([of_cell, of_opposite], axis=1)
+        return Meetings(self.keys[here], rows, columns)

@@ -115,6 +115,7 @@ class Surface:
             basis.gradient,
             np.ascontiguousarray(basis.shape),
         )
+        self.hoop = np.zeros(0)
         if cell_degree(self.V.mesh) > self.degree:
             self.point = self.shape @ self._nodes  # on the curve
         on_facet = np.broadcast_to(
@@ -217,21 +218,6 @@ class RigidSurface:
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""
         return self.motion
-
-
-def neighbours(
-    curve: Curve | RigidCircle, facets: np.ndarray, rings: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Places ``(k,)`` in ``facets`` ``(m,)`` of ``curve`` and facets within ``rings`` around, some
-    perhaps twice."""
-    near = [facets]
-    for adjacent in (curve.before, curve.after):
-        facet = facets
-        for _ in range(rings):
-            facet = np.where(facet < 0, -1, adjacent[facet])
-            near.append(facet)
-    ring, place = np.nonzero(np.array(near) >= 0)
-    return place, np.array(near)[ring, place]
 
 
 def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -21,56 +21,89 @@ _SOURCE = Path(__file__).with_name("contact_tangent.c")
 
 
 class ContactTangent:
-    """The blocks that this rank's points fill, at ``rows`` and ``columns`` ``(n,)`` in global block
-    dofs, sorted.
+    """The blocks that this rank's points fill.
 
-    A rigid opposite has a block dof behind those of the displacement.
+    A rigid opposite has a block dof behind the block dofs of the displacement. Arrays:
+
+    rows, columns : (n,) places of the blocks in global block dofs, sorted
     """
 
     def __init__(self, reaches: list[Reach]) -> None:
-        self._reaches, self._kernels = reaches, library(_SOURCE)
-        parts = [reach.dofs() for reach in reaches]
-        size = 1 + max((part[i].max(initial=0) for part in parts for i in (1, 2)), default=0)
-        keys = [rows[:, :, None] * size + columns[:, None, :] for _, rows, columns in parts]
-        unique = np.unique(
-            np.concatenate([np.zeros(0, dtype=np.int64), *(k.ravel() for k in keys)])
-        )
+        self._reaches = reaches
+        self._kernels = library(_SOURCE)
+        meetings = [reach.meetings() for reach in reaches]
+        size = 1 + max((m.largest_dof() for m in meetings), default=0)
+        places = [m.rows[:, :, None] * size + m.columns[:, None, :] for m in meetings]
+        nothing = np.zeros(0, dtype=np.int64)
+        unique = np.unique(np.concatenate([nothing, *(place.ravel() for place in places)]))
         self.rows, self.columns = np.divmod(unique, size)
-        self._keys = [part[0] for part in parts]  # of the facets that may meet
-        self._slots = [np.searchsorted(unique, key).astype(np.int32) for key in keys]
+        self._keys = [m.keys for m in meetings]
+        self._slots = [np.searchsorted(unique, place).astype(np.int32) for place in places]
 
     def blocks(self) -> Array:
-        """Derivative ``(n, 2, 2)`` of the residual at the last evaluation."""
+        """Derivative ``(n, d, d)`` of the residual at the last evaluation."""
         values = np.zeros((len(self.rows), 2, 2))
         for reach, keys, slots in zip(self._reaches, self._keys, self._slots, strict=True):
             place = np.searchsorted(keys, reach.point_keys()).astype(np.int32)
-            self._kernels.contact_tangent(
-                _points(reach.pair), *map(pointer, (place, slots, values))
-            )
+            side = _side(reach.pair)
+            self._kernels.contact_tangent(side, *map(pointer, (place, slots, values)))
         return values
 
 
-def trial_rate(pair: Pair, u: Array, levels: Array) -> Array:
-    """What displacements ``u`` ``(n, 2)``, and a rigid opposite moved by ``levels`` ``(d,)`` of the
-    drives, add to the trial tractions ``(m, 2)``, linearised at the last evaluation: points keep
-    their partners. Collective."""
+def point_rates(pair: Pair, u: Array, levels: Array) -> tuple[Array, Array]:
+    """What displacements ``u`` ``(n, d)``, and a rigid opposite moved by ``levels`` of the drives,
+    add to the trial tractions and to the openings, ``(m, d)`` each.
+
+    They are linearised at the last evaluation: points keep their partners. Collective.
+    """
     opposite = pair.opposite
-    motion = (
-        opposite.curve_displacement(u)
-        if isinstance(opposite, Surface)
-        else levels[None] @ opposite.rate
-    )
-    own, partner = u[pair.surface.cell_dofs], motion[pair.projection.nodes]
-    rate = np.empty_like(pair.trial)
-    library(_SOURCE).trial_rate(_points(pair), *map(pointer, (own, partner, rate)))
-    return rate
+    if isinstance(opposite, Surface):
+        motion = opposite.curve_displacement(u)
+    else:
+        motion = levels[None] @ opposite.rate
+    own = u[pair.surface.cell_dofs]
+    partner = motion[pair.projection.nodes]
+    trial = np.empty_like(pair.trial)
+    opening = np.empty_like(pair.trial)
+    arrays = own, partner, trial, opening
+    library(_SOURCE).point_rates(_side(pair), *map(pointer, arrays))
+    return trial, opening
 
 
-def _points(pair: Pair) -> Any:
-    """What the kernels know of a pair, of arrays that it and its surface hold."""
-    own, P = pair.surface, pair.projection
-    sizes = *own.shape.shape, own.trace.shape[1], P.shape.shape[1]
-    at_points = own.shape, own.gradient, own.trace, own.weight, pair.share, pair.gamma, pair.active
-    state = pair.traction, pair.derivative, pair.stress_vector, pair.separation, pair.moduli
-    opposite = P.shape, P.slope, P.normal, P.tangent, P.bend, pair.strayed, P.slides
-    return structure(_SOURCE, "Side", (int(pair.moves), *sizes, *at_points, *state, *opposite))
+def _side(pair: Pair) -> Any:
+    """The structure ``Side`` for the kernels, of arrays that the pair and its surface hold."""
+    surface = pair.surface
+    partners = pair.projection
+    n, q, a = surface.shape.shape
+    members = {
+        "moves": int(pair.moves),
+        "n": n,
+        "q": q,
+        "a": a,
+        "k": surface.trace.shape[1],
+        "o": partners.shape.shape[1],
+        "g": pair.moduli.shape[2],
+        "shape": surface.shape,
+        "gradient": surface.gradient,
+        "hoop": surface.hoop,
+        "trace": surface.trace,
+        "weight": surface.weight,
+        "share": pair.share,
+        "gamma": pair.gamma,
+        "active": pair.active,
+        "traction": pair.traction,
+        "by_trial": pair.by_trial,
+        "has_by_opening": int(pair.by_opening is not None),
+        "by_opening": pair.by_trial if pair.by_opening is None else pair.by_opening,
+        "stress_vector": pair.stress_vector,
+        "moduli": pair.moduli,
+        "separation": pair.separation,
+        "strayed": pair.strayed,
+        "partner_shape": partners.shape,
+        "partner_slope": partners.slope,
+        "normal": partners.normal,
+        "tangent": partners.tangent,
+        "bend": partners.bend,
+        "slides": partners.slides,
+    }
+    return structure(_SOURCE, "Side", members)

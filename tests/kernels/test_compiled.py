@@ -97,7 +97,7 @@ def test_the_own_cache_is_closed_to_others(source):
 
 
 def test_a_structure_has_numbers_and_pointers(source):
-    """In the order of its declaration."""
+    """By the names of its declaration."""
     declared = (
         "typedef struct { int32_t n; const double *x; double by; } Sum; double last(const Sum *s);"
     )
@@ -106,7 +106,7 @@ def test_a_structure_has_numbers_and_pointers(source):
         '#include "doubling.h"\ndouble last(const Sum *s) { return s->by * s->x[s->n - 1]; }\n'
     )
     x = np.array([1.0, 2.0, 4.0])
-    assert library(source).last(structure(source, "Sum", [3, x, 0.5])) == 2.0
+    assert library(source).last(structure(source, "Sum", {"n": 3, "x": x, "by": 0.5})) == 2.0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from archord.benchmarks.stability.cases import cases
 from archord.output.history import read_history
 from archord.presets.account import account_of
-from archord.solver.contact.law import Coulomb, FrictionState
+from archord.solver.contact.coulomb import Coulomb, FrictionState
 from archord.solver.path.stepping import StepRules, march
 from archord.solver.path.system import System
 from tests.output.test_restart import go_on, run
@@ -75,29 +75,27 @@ def test_a_run_goes_on_from_where_it_was_halted(tmp_path):
 
 
 def points(n: int = 200) -> tuple[np.ndarray, ...]:
-    """Gaps, slips, trial tractions, gammas ``(n, 2)`` and states of points that touch, or do
-    not."""
+    """Openings, trial tractions and gammas ``(n, 2)`` and states of points that touch, or do not,
+    in a step of length 1."""
     draw = np.random.default_rng(1)
     state = FrictionState(draw.normal(0, 0.01, n), np.maximum(draw.normal(0, 1, n), 0), np.zeros(n))
-    return (
-        np.zeros(n),
-        draw.normal(0, 0.01, n),
-        draw.normal(0, 1, (n, 2)),
-        np.full((n, 2), 100.0),
-        state,
-    )
+    opening = np.stack([np.zeros(n), draw.normal(0, 0.01, n)], axis=1)
+    return opening, draw.normal(0, 1, (n, 2)), np.full((n, 2), 100.0), state, 1.0
 
 
 def test_secants_change_the_derivative_alone():
     """They leave every point that touches a stiffness along the surface."""
     law = Coulomb(0.3)
-    traction, derivative, state = law.update(*points())
-    same, secant, also = law.by_secants().update(*points())
-    np.testing.assert_array_equal(same, traction)
+    given = law.respond(*points())
+    other = law.by_secants().respond(*points())
+    traction, state = given.traction, given.state
+    secant, also = other.by_trial, other.state
+    np.testing.assert_array_equal(other.traction, traction)
+    np.testing.assert_array_equal(other.branch, given.branch)
     for name in ("elastic_slip", "pressure", "dissipated"):
         np.testing.assert_array_equal(getattr(also, name), getattr(state, name))
     touches = traction[:, 0] > 0
-    slides = touches & (derivative[:, 1, 1] == 0)
+    slides = touches & (given.by_trial[:, 1, 1] == 0)
     assert slides.any()
     assert (secant[touches, 1, 1] > 0).all()
     assert (secant[slides, 1, 1] < 1).all()
@@ -106,8 +104,9 @@ def test_secants_change_the_derivative_alone():
 def test_the_elastic_law_holds_what_touched():
     """Points that touched stick with whatever shear; others slide without friction and lose no
     work."""
-    gap, slip, trial, gamma, before = points()
-    traction, _, after = Coulomb(0.3).elastic().update(gap, slip, trial, gamma, before)
+    opening, trial, gamma, before, dt = points()
+    response = Coulomb(0.3).elastic().respond(opening, trial, gamma, before, dt)
+    traction, after = response.traction, response.state
     touches, touched = trial[:, 0] > 0, before.pressure > 0
     sticks = trial[:, 1] - gamma[:, 1] * before.elastic_slip
     np.testing.assert_allclose(traction[:, 1], np.where(touches & touched, sticks, 0.0))

@@ -11,7 +11,7 @@ from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
 from archord.presets.joint import Joint
 from archord.scene.scene import Scene
-from archord.solver.contact.law import LAWS, contact_law
+from archord.solver.contact.named import LAWS, contact_law
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
 from tests.solver.parts import blocks, solve

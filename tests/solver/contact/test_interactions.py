@@ -11,7 +11,7 @@ from archord.geometry.curve import RigidCircle
 from archord.materials.elasticity import contact_modulus
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface
-from archord.solver.contact.law import ContactLaw
+from archord.solver.contact.law import STICK, ContactLaw, Response
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.geometry.shapes.measures import Facets
@@ -106,10 +106,11 @@ def test_a_limit_of_gamma_holds_for_the_interactions_above_it():
 class Bilateral(ContactLaw):
     """Surfaces that slide on each other and never part."""
 
-    def update(self, gap, slip, trial, gamma, state):
-        derivative = np.zeros((len(trial), 2, 2))
-        derivative[:, 0, 0] = 1.0
-        return trial * [1.0, 0.0], derivative, state
+    def respond(self, opening, trial, gamma, state, dt):
+        by_trial = np.zeros((len(trial), 2, 2))
+        by_trial[:, 0, 0] = 1.0
+        branch = np.full(len(trial), STICK)
+        return Response(trial * [1.0, 0.0], by_trial, None, branch, state)
 
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])

@@ -19,7 +19,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
 from archord.geometry.curve import in_pieces
-from archord.solver.contact.surface import Surface, neighbours
+from archord.solver.contact.surface import Surface
 from tests.geometry.shapes.measures import Facets
 from tests.solver.parts import (
     DR,
@@ -208,7 +208,7 @@ def test_a_gap_leaves_twoin_pieces():
     assert len(vertices) == torn.n_facets + 2
     assert np.all((normal * vertices).sum(axis=1) < 0)
     first = int(np.flatnonzero(torn.curve.after < 0)[0])
-    place, near = neighbours(torn.curve, np.array([first, first + 1]), 1)
+    place, near = torn.curve.neighbours(np.array([first, first + 1]), 1)
     assert sorted(zip(place, near, strict=True)) == [
         (0, first - 1),
         (0, first),

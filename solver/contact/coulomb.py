@@ -1,0 +1,102 @@
+"""Coulomb's friction: a return map of the shear to the cone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.solver.contact.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLaw, Response
+
+
+@dataclass(frozen=True)
+class FrictionState:
+    """History of ``m`` points."""
+
+    elastic_slip: Array  # (m,) gamma times it is what the shear is below that of the own stress
+    pressure: Array  # (m,)
+    dissipated: Array  # (m,) energy per area
+
+
+@dataclass(frozen=True)
+class Coulomb(ContactLaw):
+    """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward
+    Euler).
+
+    A point that sticks has its trial shear, and the slip of the step is added to its elastic slip:
+    what sticks for many steps does not creep. Where that leaves the cone the shear comes back to it
+    at the same pressure, and the elastic slip becomes what gives this shear: a return map with
+    gamma for its stiffness. It is zero at points that do not touch.
+
+    If ``held``, points that touched stick, whatever their shear, and others slide without friction:
+    an elastic predictor. With ``secant`` the derivative by the trial shear is shear over trial
+    shear at points that slide, and the shear does not follow the pressure there. Newton's method
+    then is the fixed-point iteration of Kacanov (1959): slower, but bodies that only friction keeps
+    from turning keep a stiffness.
+    """
+
+    friction: float
+    held: bool = False
+    secant: bool = False
+    has_friction = True
+    unilateral = True
+
+    def state(self, n: int) -> FrictionState:
+        """Points at rest."""
+        return FrictionState(*np.zeros((3, n)))
+
+    def respond(
+        self, opening: Array, trial: Array, gamma: Array, state: FrictionState, dt: float
+    ) -> Response:
+        """Pressure as without friction, and the shear returned to the cone."""
+        slip = opening[:, 1]
+        shear_stiffness = gamma[:, 1]
+        touches = ~(trial[:, 0] <= 0)
+        touched = state.pressure > 0
+        friction = np.where(touched, self.friction, 0.0) if self.held else self.friction
+
+        pressure = np.where(touches, trial[:, 0], 0.0)
+        limit = friction * pressure
+        sticking = np.where(touches, trial[:, 1] - shear_stiffness * state.elastic_slip, 0.0)
+        direction = np.sign(sticking)
+        size = np.abs(sticking)
+        slides = size > limit
+        if self.held:
+            slides &= ~touched
+        sticks = touches & ~slides
+        shear = np.where(slides, direction * limit, sticking)
+        slid = np.where(slides, direction * (size - limit) / shear_stiffness, 0.0)
+
+        by_trial = np.zeros((len(trial), 2, 2))
+        by_trial[:, 0, 0] = touches
+        by_trial[:, 1, 1] = sticks
+        if self.secant:
+            by_trial[slides, 1, 1] = limit[slides] / size[slides]
+        else:
+            by_trial[:, 1, 0] = np.where(slides, direction * friction, 0.0)
+
+        backwards = (direction < 0) & (friction > 0)
+        sliding = np.where(backwards, SLIDE_BACK, SLIDE)
+        branch = np.where(touches, np.where(sticks, STICK, sliding), OPEN)
+
+        lost = 0.5 * friction * (state.pressure + pressure) * np.abs(slid)
+        elastic_slip = np.where(touches, state.elastic_slip + slip + slid, 0.0)
+        new = FrictionState(elastic_slip, pressure, state.dissipated + lost)
+        return Response(np.stack([pressure, shear], axis=1), by_trial, None, branch, new)
+
+    def elastic(self) -> Coulomb:
+        """The law in which points that touched are ``held``."""
+        return replace(self, held=True)
+
+    def frictionless(self) -> Coulomb:
+        """The law without friction."""
+        return replace(self, friction=0.0)
+
+    def by_secants(self) -> Coulomb:
+        """The law with ``secant`` derivatives."""
+        return replace(self, secant=True)
+
+    def dissipation(self, state: FrictionState) -> Array:
+        """Work done against friction so far per area ``(m,)``."""
+        return state.dissipated
