@@ -21,6 +21,7 @@ Array = npt.NDArray[np.floating]
 
 CONTACT_POINTS = 4  # Gauss points a contact facet
 TRIANGLE, QUADRILATERAL = basix.CellType.triangle, basix.CellType.quadrilateral
+_NODES = {TRIANGLE: (3, 6, 10), QUADRILATERAL: (4, 9, 16)}  # of cells of order 1, 2 and 3
 
 
 def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.FiniteElement:
@@ -31,18 +32,14 @@ def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.
     )
 
 
-def cell_kind(nodes: int) -> tuple[basix.CellType, int]:
-    """Kind and order of a cell of Lagrange's with so many ``nodes``. Raises ValueError."""
-    for order in (1, 2, 3):
-        for cell, needs in (
-            (TRIANGLE, (order + 1) * (order + 2) // 2),
-            (QUADRILATERAL, (order + 1) ** 2),
-        ):
-            if nodes == needs:
-                return cell, order
-    raise ValueError(
-        f"cells of {nodes} nodes are not known: triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16"
-    )
+def order_of(cell: basix.CellType, nodes: int) -> int:
+    """Order of a Lagrange ``cell`` that has so many ``nodes``. Raises ValueError."""
+    if nodes not in _NODES[cell]:
+        raise ValueError(
+            f"{cell.name}s of {nodes} nodes are not known: "
+            "triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16"
+        )
+    return 1 + _NODES[cell].index(nodes)
 
 
 @dataclass(frozen=True)

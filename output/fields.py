@@ -107,7 +107,7 @@ class FieldWriter:
         points: bool = False,
     ) -> None:
         self.path, self._points = folder / "fields.xdmf", points
-        nodes, self._recovery = SecondOrder(order.nodes_of_cell), None
+        nodes, self._recovery = SecondOrder(order.kind, order.nodes_of_cell), None
         self._nodes, x = nodes, nodes(order.coordinates)
         self._topology, vtk = _IN_FILES[nodes.cells.shape[1]]
         cells = nodes.cells[:, vtk]

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.geometry.basis import Array, bulk_quadrature, cell_kind, lagrange_element, tabulate
-from archord.geometry.meshes.plane_mesh import in_vtk_order
+from archord.geometry.basis import Array, bulk_quadrature, lagrange_element, order_of, tabulate
+from archord.geometry.meshes.cells import in_vtk_order
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.output.files.vtkhdf import LAGRANGE, VERTEX, Grid
 from archord.solver.path.mesh_order import Arrays, MeshOrder
@@ -20,7 +20,8 @@ class BodyGrid:
     def __init__(self, order: MeshOrder, mesh: Arrays, second: np.ndarray, points: bool) -> None:
         self._nodes, self._second, self._points = order.nodes_of_cell, second, points
         m, n = self._nodes.shape
-        kind, degree = cell_kind(n)
+        kind = order.kind
+        degree = order_of(kind, n)
         self._cell_of_facet, *trace = (
             mesh["facets/nodes"].reshape(-1, degree + 2).astype(np.int64).T
         )
@@ -32,7 +33,7 @@ class BodyGrid:
         inner = np.arange(1, degree)
         x, corners = order.coordinates, len(lagrange_element(kind, 1).points)
         cells = [
-            (LAGRANGE[corners], in_vtk_order(self._nodes)),
+            (LAGRANGE[corners], in_vtk_order(kind, self._nodes)),
             (LAGRANGE[2], self._facets[:, [0, -1, *inner]]),
         ]
         owner = [np.arange(m), self._cell_of_facet]

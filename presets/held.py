@@ -9,8 +9,9 @@ from itertools import chain, combinations, product
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.meshes.check import check_mesh, facets_within, free_motions, gaps
+from archord.geometry.meshes.check import check_mesh, facets_within, gaps
 from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.motions import free_motions
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.materials.material import Array
 from archord.scene.problem import ProblemScene

@@ -18,9 +18,10 @@ from dolfinx.io import distribute_entity_data
 from dolfinx.mesh import create_mesh, entities_to_geometry, meshtags, meshtags_from_entities
 from mpi4py import MPI
 
-from archord.geometry.basis import Array, cell_kind
+from archord.geometry.basis import Array
+from archord.geometry.meshes.cells import n_corners, sides_between, sides_of
 from archord.geometry.meshes.mesh_cache import kept_mesh
-from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
+from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle, on_circles
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.kernels.compat import cell_nodes
@@ -29,6 +30,16 @@ Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 
 # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
 _ALL_QUADS = 3
+# of gmsh's mesh: sizes come from the background field alone
+_OPTIONS = {
+    "MeshSizeFromPoints": 0,
+    "MeshSizeFromCurvature": 0,
+    "MeshSizeExtendFromBoundary": 0,
+    "Algorithm": 6,
+    "HighOrderOptimize": 0,
+}
+_ARRAYS = ("x", "cells", "bodies", "edges", "tags")
+_UNTAGGED = np.iinfo(np.int32).min  # the tag of a cell that has none
 
 
 def gmsh_to_mesh(
@@ -69,14 +80,11 @@ def gmsh_to_mesh(
 def _made(
     build: Callable, circles: Sequence[Circle], order: int, refinements: int, quads: bool
 ) -> PlaneMesh:
-    options = {
-        f"MeshSize{name}": 0 for name in ("FromPoints", "FromCurvature", "ExtendFromBoundary")
-    }
-    options |= {"Algorithm": 6, "HighOrderOptimize": 0, "RecombineAll": quads}
+    options = _OPTIONS | {"RecombineAll": quads}
+    if quads:
+        options["RecombinationAlgorithm"] = _ALL_QUADS
     with own_gmsh() as gmsh:
-        for name, value in (
-            options | ({"RecombinationAlgorithm": _ALL_QUADS} if quads else {})
-        ).items():
+        for name, value in options.items():
             gmsh.option.setNumber(f"Mesh.{name}", value)
         build(gmsh)
         gmsh.model.mesh.generate(2)
@@ -101,7 +109,8 @@ def own_gmsh() -> Iterator[Any]:
         raise ModuleNotFoundError(f"gmsh cannot be loaded, {error}", name="gmsh") from None
 
     with TemporaryDirectory() as folder:
-        in_use, options = gmsh.isInitialized(), f"{folder}/gmsh.opt"
+        in_use = gmsh.isInitialized()
+        options = f"{folder}/gmsh.opt"
         if in_use:
             current = gmsh.model.getCurrent()
             gmsh.write(options)
@@ -127,28 +136,28 @@ def distribute(
 ) -> TaggedMesh:
     """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None; cut in
     `sectors`, if not as ``cut`` or ``partitioner`` say. Collective."""
-    arrays = ("x", "cells", "bodies", "edges", "tags")
-    empty = comm.bcast(made and replace(made, **{name: getattr(made, name)[:0] for name in arrays}))
-    made, (cell, order) = made or empty, cell_kind(empty.cells.shape[1])
+    nothing = made and replace(made, **{name: getattr(made, name)[:0] for name in _ARRAYS})
+    empty = comm.bcast(nothing)
+    made = made or empty
 
-    def in_sectors(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
-        vertices = cells[0].reshape(-1, len(basix.topology(cell)[0]))
+    def in_parts(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
+        vertices = cells[0].reshape(-1, n_corners(made.kind))
         return AdjacencyList_int32((cut or sectors)(made.x, vertices, n_parts).reshape(-1, 1))
 
-    partitioner = partitioner or (in_sectors if comm.size > 1 else None)
+    if partitioner is None and comm.size > 1:
+        partitioner = in_parts
     equispaced = basix.LagrangeVariant.equispaced
-    element = basix.ufl.element("P", cell, order, lagrange_variant=equispaced, shape=(2,))
+    element = basix.ufl.element("P", made.kind, made.order, equispaced, shape=(2,))
     mesh = create_mesh(comm, cells=made.cells, x=made.x, e=element, partitioner=partitioner)
+    dim = mesh.topology.dim
     number = np.asarray(mesh.topology.original_cell_index)
-    cells = meshtags(
-        mesh, 2, np.arange(len(number), dtype=np.int32), comm.bcast(made.bodies)[number]
-    )
-    edges, tags = distribute_entity_data(mesh, 1, made.edges, made.tags)
-    mesh.topology.create_connectivity(1, 2)
-    facets = meshtags_from_entities(mesh, 1, adjacencylist(edges), tags)
-    points = comm.bcast(
-        {name: made.x[nodes] for name, nodes in made.point_sets.items()} if comm.rank == 0 else None
-    )
+    bodies = comm.bcast(made.bodies)[number]
+    cells = meshtags(mesh, dim, np.arange(len(number), dtype=np.int32), bodies)
+    edges, tags = distribute_entity_data(mesh, dim - 1, made.edges, made.tags)
+    mesh.topology.create_connectivity(dim - 1, dim)
+    facets = meshtags_from_entities(mesh, dim - 1, adjacencylist(edges), tags)
+    places = {name: made.x[nodes] for name, nodes in made.point_sets.items() if comm.rank == 0}
+    points = comm.bcast(places)
     return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points, made.notes)
 
 
@@ -156,42 +165,49 @@ def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
     """The inverse of `distribute`: the whole mesh on rank 0, None elsewhere. Collective."""
     from scipy.spatial import cKDTree  # a solve without a mesh from Python does not pay for it
 
-    mesh, topology = tagged.mesh, tagged.mesh.topology
-    node, n = np.asarray(mesh.geometry.input_global_indices), topology.index_map(2).size_local
-    body = np.full(
-        n + topology.index_map(2).num_ghosts, np.iinfo(np.int32).min, dtype=np.int32
-    )  # without a tag
+    mesh = tagged.mesh
+    topology = mesh.topology
+    dim = topology.dim
+    kind = mesh.basix_cell()
+    node = np.asarray(mesh.geometry.input_global_indices)
+    index_map = topology.index_map(dim)
+    n = index_map.size_local
+    body = np.full(n + index_map.num_ghosts, _UNTAGGED, dtype=np.int32)
     body[tagged.cells.indices] = tagged.cells.values
-    owned = tagged.facets.indices < topology.index_map(1).size_local
-    facets, tags = tagged.facets.indices[owned], tagged.facets.values[owned]
-    ends = (
-        entities_to_geometry(mesh, 1, facets)[:, :2]
-        if len(facets)
-        else np.zeros((0, 2), dtype=np.int32)
-    )
+    owned = tagged.facets.indices < topology.index_map(dim - 1).size_local
+    facets = tagged.facets.indices[owned]
+    none = np.zeros((0, 2), dtype=np.int32)
+    ends = entities_to_geometry(mesh, dim - 1, facets)[:, :2] if len(facets) else none
     try:
         number = np.asarray(topology.original_cell_index)[:n]
     except RuntimeError:  # of a submesh
-        number = topology.index_map(2).local_range[0] + np.arange(n)
+        number = index_map.local_range[0] + np.arange(n)
     cells = node[cell_nodes(mesh)[:n]]
-    parts = mesh.comm.gather(
-        (number, cells, body[:n], node[ends], tags, node, mesh.geometry.x[:, :2])
-    )
+    tags = tagged.facets.values[owned]
+    x = mesh.geometry.x[:, :2]
+    parts = mesh.comm.gather((number, cells, body[:n], node[ends], tags, node, x))
     if parts is None:
         return None
     number, cells, body, ends, tags, node, x = map(np.concatenate, zip(*parts, strict=True))
     nodes, first = np.unique(node, return_index=True)
-    cells, ends, order = (
-        np.searchsorted(nodes, cells),
-        np.searchsorted(nodes, ends),
-        np.argsort(number),
+    x = x[first]
+    cells = np.searchsorted(nodes, cells)
+    facets = sides_between(kind, cells, np.searchsorted(nodes, ends))
+    edges = sides_of(kind, cells)[facets]
+    order = np.argsort(number)
+    points = {name: cKDTree(x).query(places)[1] for name, places in tagged.point_sets.items()}
+    return PlaneMesh(
+        x,
+        kind,
+        cells[order],
+        body[order],
+        edges,
+        tags,
+        dict(tagged.cell_sets),
+        dict(tagged.facet_sets),
+        points,
+        tagged.notes,
     )
-    edges = sides_of(cells)[sides_between(cells, ends)]
-    points = {
-        name: cKDTree(x[first]).query(places)[1] for name, places in tagged.point_sets.items()
-    }
-    sets = dict(tagged.cell_sets), dict(tagged.facet_sets)
-    return PlaneMesh(x[first], cells[order], body[order], edges, tags, *sets, points, tagged.notes)
 
 
 def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
@@ -202,18 +218,20 @@ def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     cut is the same in every run, unlike that of a graph partitioner whose input arrives in any
     order.
     """
-    return _in_turn(np.arctan2(*x[cells].mean(axis=1).T[::-1]), n_parts)
+    middle_x, middle_y = x[cells].mean(axis=1).T
+    return _in_turn(np.arctan2(middle_y, middle_x), n_parts)
 
 
 def strips(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
-    """As `sectors`, but in strips across the mesh's longest extent: in contact wherever, points
-    stay together."""
-    return _in_turn(
-        x[cells].mean(axis=1)[:, np.argmax(np.ptp(x, axis=0)) if len(x) else 0], n_parts
-    )
+    """As `sectors`, but in strips across the mesh's longest extent, for contact in any place."""
+    longest = np.argmax(np.ptp(x, axis=0)) if len(x) else 0
+    return _in_turn(x[cells].mean(axis=1)[:, longest], n_parts)
 
 
-def _in_turn(along: Array, n_parts: int) -> np.ndarray:
-    part = np.empty(len(along), dtype=np.int32)
-    part[np.argsort(along, kind="stable")] = np.arange(len(along)) * n_parts // max(len(along), 1)
+def _in_turn(place: Array, n_parts: int) -> np.ndarray:
+    """The part ``(n,)`` of each cell, cut along its ``place`` ``(n,)`` into parts of as many cells
+    each."""
+    n = len(place)
+    part = np.empty(n, dtype=np.int32)
+    part[np.argsort(place, kind="stable")] = np.arange(n) * n_parts // max(n, 1)
     return part

@@ -14,38 +14,47 @@ from dolfinx.geometry import (
 from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
-from archord.geometry.basis import TRIANGLE, Array, cell_kind, tabulate
+from archord.geometry.basis import QUADRILATERAL, TRIANGLE, Array, order_of, tabulate
 
 _NEWTON = 8  # iterations for the reference point: the cells are nearly straight
 _STRAIGHT = 1e-9  # last step in a reference cell
+# corners of the straight triangles that make up a cell, in basix' order
+_TRIANGLES = {TRIANGLE: np.array([[0, 1, 2]]), QUADRILATERAL: np.array([[0, 1, 2], [3, 2, 1]])}
 
 
 class Interpolation:
     """From the nodes ``x`` ``(n, 2)`` of ``cells`` ``(m, a)`` to points ``to`` ``(k, 2)``.
 
     A point outside of all cells, as between a curved edge and its coarser image, gets the
-    continuation of a cell next to it.
+    continuation of a cell next to it. Per point it keeps
+
+    - ``_nodes`` ``(k, a)``: the nodes of its cell
+    - ``_weights`` ``(k, a)``: their shape functions
     """
 
-    def __init__(self, x: Array, cells: np.ndarray, to: Array) -> None:
-        kind, degree = cell_kind(cells.shape[1])
-        halves = np.array(
-            [[0, 1, 2]] if kind == TRIANGLE else [[0, 1, 2], [3, 2, 1]]
-        )  # in basix' order of corners
-        triangle, X = _located(x, cells[:, halves].reshape(-1, 3), to)
+    def __init__(self, kind: basix.CellType, x: Array, cells: np.ndarray, to: Array) -> None:
+        order = order_of(kind, cells.shape[1])
+        halves = _TRIANGLES[kind]
+        triangle, within = _located(x, cells[:, halves].reshape(-1, 3), to)
         cell, half = np.divmod(triangle, len(halves))
-        weights = np.column_stack([1 - X.sum(axis=1), X])
-        X = np.einsum("ki,kij->kj", weights, basix.geometry(kind)[halves[half]])
-        self._nodes, moving = cells[cell], np.arange(len(to))
-        for _ in range(0 if cells.shape[1] == 3 else _NEWTON):
-            table, nodes = tabulate(kind, degree, X[moving]), x[self._nodes[moving]]
-            misfit = to[moving] - np.einsum("na,nai->ni", table[0], nodes)
-            step = np.linalg.solve(np.einsum("jna,nai->nij", table[1:], nodes), misfit[..., None])[
-                ..., 0
-            ]
+        self._nodes = cells[cell]
+        barycentric = np.column_stack([1 - within.sum(axis=1), within])
+        X = np.einsum("ki,kij->kj", barycentric, basix.geometry(kind)[halves[half]])
+        if kind == QUADRILATERAL or order > 1:
+            self._improve(kind, order, X, x, to)
+        self._weights = tabulate(kind, order, X)[0]
+
+    def _improve(self, kind: basix.CellType, order: int, X: Array, x: Array, to: Array) -> None:
+        """Move the reference points ``X`` ``(k, 2)`` to where the curved cells have ``to``."""
+        moving = np.arange(len(to))
+        for _ in range(_NEWTON):
+            shape, *slopes = tabulate(kind, order, X[moving])
+            nodes = x[self._nodes[moving]]
+            misfit = to[moving] - np.einsum("na,nai->ni", shape, nodes)
+            jacobian = np.einsum("jna,nai->nij", slopes, nodes)
+            step = np.linalg.solve(jacobian, misfit[..., None])[..., 0]
             X[moving] += step
             moving = moving[np.abs(step).max(axis=1) > _STRAIGHT]
-        self._weights = tabulate(kind, degree, X)[0]
 
     def __call__(self, values: Array) -> Array:
         """Values ``(k, c)`` at the points from those ``(n, c)`` at the nodes."""
@@ -56,21 +65,24 @@ def _located(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, Ar
     """The number of a straight triangle ``(m, 3)`` with vertices ``x`` ``(n, 2)`` around each point
     of ``to`` ``(k, 2)``, or next to it, and the point's reference coordinates ``(k, 2)`` there."""
     straight = basix.ufl.element("P", "triangle", 1, shape=(2,))
-    vertices, places = np.ascontiguousarray(x), np.pad(to, ((0, 0), (0, 1)))
-    mesh = create_mesh(
-        MPI.COMM_SELF, cells=triangles.astype(np.int64, order="C"), x=vertices, e=straight
-    )
-    tree = bb_tree(mesh, 2)
+    cells = triangles.astype(np.int64, order="C")
+    mesh = create_mesh(MPI.COMM_SELF, cells=cells, x=np.ascontiguousarray(x), e=straight)
+    places = np.pad(to, ((0, 0), (0, 1)))
+    tree = bb_tree(mesh, mesh.topology.dim)
     found = compute_collisions_points(tree, places)
-    point, cell = np.repeat(np.arange(len(to)), np.diff(found.offsets)), found.array
+    point = np.repeat(np.arange(len(to)), np.diff(found.offsets))
+    cell = found.array
     lost = np.setdiff1d(np.arange(len(to)), point)  # in no triangle's bounding box
     if len(lost):
-        everything = create_midpoint_tree(mesh, 2, np.arange(len(triangles), dtype=np.int32))
-        nearest = compute_closest_entity(tree, everything, mesh, places[lost])
-        point, cell = np.append(point, lost), np.append(cell, nearest)
+        every = np.arange(len(triangles), dtype=np.int32)
+        middles = create_midpoint_tree(mesh, mesh.topology.dim, every)
+        nearest = compute_closest_entity(tree, middles, mesh, places[lost])
+        point = np.append(point, lost)
+        cell = np.append(cell, nearest)
     cell = np.asarray(mesh.topology.original_cell_index)[cell]
     corners = x[triangles[cell]]
-    edges, ray = corners[:, 1:] - corners[:, :1], to[point] - corners[:, 0]
+    edges = corners[:, 1:] - corners[:, :1]
+    ray = to[point] - corners[:, 0]
     X = np.linalg.solve(np.swapaxes(edges, 1, 2), ray[..., None])[..., 0]
     smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
     order = np.lexsort((-smallest, point))

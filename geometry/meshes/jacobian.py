@@ -14,7 +14,8 @@ from math import factorial
 import basix
 import numpy as np
 
-from archord.geometry.basis import TRIANGLE, Array, cell_kind, lagrange_element, tabulate
+from archord.geometry.basis import TRIANGLE, Array, lagrange_element, tabulate
+from archord.geometry.meshes.cells import quarters
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 
 _DEEPEST = 6  # cuts in four; a part that is open then is 1/64 of its cell long
@@ -28,13 +29,12 @@ def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
     The smallest is a value of the determinant, at most a thousandth of the largest one above the
     true minimum.
     """
-    kind, order = cell_kind(mesh.cells.shape[1])
-    degree = 2 * (order - 1) if kind == TRIANGLE else 2 * order - 1
-    value = _determinants(mesh, kind, order, degree)
+    kind = mesh.kind
+    degree = 2 * (mesh.order - 1) if kind == TRIANGLE else 2 * mesh.order - 1
+    value = _determinants(mesh, degree)
     to_bernstein = _bernstein_of_values(kind, degree)
-    signed_area = (value @ to_bernstein.T).mean(
-        axis=1
-    )  # all Bernstein polynomials have one integral
+    # all Bernstein polynomials have the same integral
+    signed_area = (value @ to_bernstein.T).mean(axis=1)
     value[signed_area < 0] *= -1
     smallest = value.min(axis=1)
     largest = value.max(axis=1)
@@ -53,12 +53,12 @@ def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
     return smallest, largest
 
 
-def _determinants(mesh: PlaneMesh, kind: basix.CellType, order: int, degree: int) -> Array:
-    """Determinants ``(n, q)`` at the Lagrange nodes of the ``degree``, which say all about the
+def _determinants(mesh: PlaneMesh, degree: int) -> Array:
+    """Determinants ``(n, q)`` at the Lagrange nodes of the ``degree``, which determine the
     polynomial."""
-    along = tabulate(kind, order, _points(kind, degree))[1:]
-    J = np.tensordot(along, mesh.x[mesh.cells], axes=(2, 1))  # (2, q, n, 2)
-    return (J[0, ..., 0] * J[1, ..., 1] - J[0, ..., 1] * J[1, ..., 0]).T
+    slopes = tabulate(mesh.kind, mesh.order, _points(mesh.kind, degree))[1:]
+    by_X, by_Y = np.tensordot(slopes, mesh.x[mesh.cells], axes=(2, 1))  # (q, n, 2) each
+    return (by_X[..., 0] * by_Y[..., 1] - by_X[..., 1] * by_Y[..., 0]).T
 
 
 def _points(kind: basix.CellType, degree: int) -> Array:
@@ -72,30 +72,28 @@ def _points(kind: basix.CellType, degree: int) -> Array:
 def _bernstein_of_values(kind: basix.CellType, degree: int) -> Array:
     """The matrix ``(q, q)`` from values at the nodes to Bernstein coefficients."""
     X, Y = _points(kind, degree).T[:, :, None]
-    i, j = (power.ravel() for power in np.indices((degree + 1, degree + 1)))
+    i, j = np.indices((degree + 1, degree + 1)).reshape(2, -1)
     if kind == TRIANGLE:
-        i, j = i[i + j <= degree], j[i + j <= degree]
+        inside = i + j <= degree
+        i = i[inside]
+        j = j[inside]
         rest = degree - i - j
         values = _choose(degree, i, j, rest) * X**i * Y**j * (1 - X - Y) ** rest
     else:
         of_x = _choose(degree, i, degree - i) * X**i * (1 - X) ** (degree - i)
-        values = of_x * _choose(degree, j, degree - j) * Y**j * (1 - Y) ** (degree - j)
+        of_y = _choose(degree, j, degree - j) * Y**j * (1 - Y) ** (degree - j)
+        values = of_x * of_y
     return np.linalg.inv(values)
 
 
 def _choose(degree: int, *parts: np.ndarray) -> Array:
     """Multinomial coefficients of ``degree`` over ``parts`` ``(k,)``."""
     factorials = np.array([factorial(n) for n in range(degree + 1)], dtype=float)
-    return factorials[degree] / np.prod([factorials[part] for part in parts], axis=0)
+    return factorials[degree] / np.prod(factorials[np.array(parts)], axis=0)
 
 
 @cache
 def _values_on_parts(kind: basix.CellType, degree: int) -> Array:
     """Matrices ``(4, q, q)`` from values at the nodes of a cell to those at the nodes of its four
     parts."""
-    corner = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]])
-    size = np.full(4, 0.5)
-    if kind == TRIANGLE:
-        size[3] = -0.5  # the part in the middle is turned
-    X = corner[:, None] + size[:, None, None] * _points(kind, degree)
-    return tabulate(kind, degree, X)[0]
+    return tabulate(kind, degree, quarters(kind, _points(kind, degree)))[0]

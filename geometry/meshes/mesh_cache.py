@@ -19,20 +19,21 @@ _LARGEST = 200_000  # triangles: larger ones take long to solve, and space
 
 
 def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
-    """The mesh that ``key`` says all about: the kept one, or what ``make`` returns.
+    """The mesh that ``key`` determines: the kept one, or what ``make`` returns.
 
-    Other versions of gmsh or of the code that meshes make meshes of their own. A mesh that cannot
-    be read or written, or that another user may have written, is made, and so are all where the
-    environment says ``ARCHORD_KEEP_MESHES=0``.
+    A mesh is made where another version of gmsh or of this code made the kept one, where the kept
+    one cannot be read, where another user may have written it, and where the environment says
+    ``ARCHORD_KEEP_MESHES=0``.
     """
     if os.environ.get("ARCHORD_KEEP_MESHES") == "0":
         return make()
     gmsh = importlib.util.find_spec("gmsh")
     library = Path(gmsh.origin).stat().st_mtime_ns if gmsh and gmsh.origin else 0
-    sources = [source.read_bytes() for source in sorted(Path(__file__).parents[1].rglob("*.py"))]
-    digest = hashlib.sha256(b"".join([repr((key, library)).encode(), *sources])).hexdigest()
+    digest = hashlib.sha256(repr((key, library)).encode())
+    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(source.read_bytes())
     folder = cache_folder() / "meshes"
-    path = folder / f"{digest[:32]}.mesh"
+    path = folder / f"{digest.hexdigest()[:32]}.mesh"
     with suppress(Exception):  # whatever a damaged file makes of it
         if is_private(folder) and is_private(path):
             mesh = stored_mesh(path)
@@ -46,7 +47,7 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
 
 
 def _keep(mesh: PlaneMesh, path: Path) -> None:
-    """Write ``mesh`` to ``path``, and remove those that were not used for longest. Raises
+    """Write ``mesh`` to ``path``, and remove the meshes that were not used for longest. Raises
     `OSError`."""
     folder = path.parent
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -1,44 +1,47 @@
-"""Curved second-order cells, the highest that XDMF and its readers know, in the place of cells of
-any degree."""
+"""Curved second-order cells, the highest order that XDMF and its readers know, in the place of
+cells of any order."""
 
 from __future__ import annotations
 
 import basix
 import numpy as np
 
-from archord.geometry.basis import TRIANGLE, Array, cell_kind, tabulate
+from archord.geometry.basis import QUADRILATERAL, Array, order_of, tabulate
 from archord.geometry.curve import lagrange
-from archord.geometry.meshes.plane_mesh import distinct_edges
+from archord.geometry.meshes.cells import distinct_edges, n_corners, sides_of
 
 
 class SecondOrder:
-    """Second-order cells in the place of cells with nodes ``nodes_of_cell`` ``(n, a)``.
+    """Second-order cells in the place of cells with ``nodes`` ``(m, a)``.
 
-    ``cells`` ``(n, 6)`` or ``(n, 9)`` are their nodes: ``corners`` vertices, then the middles of
-    the edges, and of quadrilaterals, in basix' order. The nodes behind the vertices lie between
-    those of ``between``.
+    Their nodes are vertices, then the middles of edges, then the middles of quadrilaterals.
+
+    - ``corners``: how many of a cell's nodes are vertices
+    - ``cells`` ``(m, 6)`` or ``(m, 9)``: their nodes, in basix' order
+    - ``between``: the vertices ``(e, 2)`` of edges and ``(m, 4)`` of quadrilaterals, between which
+      the nodes behind the vertices lie
     """
 
-    def __init__(self, nodes_of_cell: np.ndarray) -> None:
-        kind, degree = cell_kind(nodes_of_cell.shape[1])
-        n, k = len(nodes_of_cell), len(basix.topology(kind)[0])  # as many vertices as edges
-        self._vertices, index = np.unique(nodes_of_cell[:, :k], return_inverse=True)
-        inner = np.split(nodes_of_cell[:, k : k * degree], k, axis=1)  # nodes within the edges
-        ends = [nodes_of_cell[:, edge] for edge in basix.topology(kind)[1]]
-        edges = np.concatenate([np.hstack(pair) for pair in zip(ends, inner, strict=True)])
-        first, of_edge = distinct_edges(edges[:, :2])
-        self._edges, before = edges[first], len(self._vertices)
-        self.cells = np.hstack([index.reshape(-1, k), before + of_edge.reshape(k, -1).T])
-        self._whole = nodes_of_cell[: 0 if kind == TRIANGLE else n]  # of cells with a middle
+    def __init__(self, kind: basix.CellType, nodes: np.ndarray) -> None:
+        order = order_of(kind, nodes.shape[1])
+        m = len(nodes)
+        self.corners = n_corners(kind)
+        self._vertices, vertex = np.unique(nodes[:, : self.corners], return_inverse=True)
+        sides = sides_of(kind, nodes)
+        first, edge = distinct_edges(sides[:, :2])
+        self._edges = sides[first]
+        n_vertices = len(self._vertices)
+        parts = [vertex.reshape(m, -1), n_vertices + edge.reshape(m, -1)]
+        self._whole = nodes[: m if kind == QUADRILATERAL else 0]  # cells with a node in the middle
         if len(self._whole):
-            self.cells = np.column_stack([self.cells, before + len(first) + np.arange(n)])
-        self._at_middle = tabulate(kind, degree, np.array([[0.5, 0.5]]))[0, 0]
-        self.corners, within = k, np.searchsorted(self._vertices, self._whole[:, :k])
-        self.between = [np.searchsorted(self._vertices, self._edges[:, :2]), within]
-        weights = lagrange(degree) @ 0.5 ** np.arange(
-            degree + 1
-        )  # of equispaced nodes, at the middle
-        self._weights = weights[[0, degree, *range(1, degree)]]
+            parts.append(n_vertices + len(first) + np.arange(m)[:, None])
+        self.cells = np.hstack(parts)
+        ends = self._edges[:, :2]
+        around = self._whole[:, : self.corners]
+        self.between = [np.searchsorted(self._vertices, of) for of in (ends, around)]
+        self._at_middle = tabulate(kind, order, np.array([[0.5, 0.5]]))[0, 0]
+        at_half = lagrange(order) @ 0.5 ** np.arange(order + 1)  # of equispaced nodes
+        self._weights = at_half[[0, order, *range(1, order)]]
 
     def __call__(self, values: Array) -> Array:
         """Values ``(m, k)`` at the nodes of the second-order cells, from those at the nodes of the
@@ -50,8 +53,8 @@ class SecondOrder:
     def along(self, ends: np.ndarray) -> np.ndarray:
         """Nodes ``(k, 3)`` of edges with the vertices ``ends`` ``(k, 2)``: the first one, the
         middle, the last one."""
-        n, vertices = len(self._vertices), np.searchsorted(self._vertices, ends)
-        numbers, wanted = (np.sort(pair, axis=1) @ [n, 1] for pair in (self.between[0], vertices))
-        order = np.argsort(numbers)
-        middle = n + order[np.searchsorted(numbers, wanted, sorter=order)]
-        return np.column_stack([vertices[:, 0], middle, vertices[:, 1]])
+        edges = self.between[0]
+        wanted = np.searchsorted(self._vertices, ends)
+        first, which = distinct_edges(np.concatenate([edges, wanted]))
+        middle = len(self._vertices) + first[which[len(edges) :]]
+        return np.column_stack([wanted[:, 0], middle, wanted[:, 1]])

@@ -21,12 +21,12 @@ Sets = Mapping[str, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class TaggedMesh:
-    """A mesh of one kind of cells, its ``cells`` and ``facets`` with tags, and named sets; all
-    bodies live in one mesh.
+    """A mesh of one kind of cells with named sets. All bodies live in one mesh.
 
-    A set has several tags where sets overlap: cells (facets) of the same sets share a tag.
-    ``point_sets`` are the coordinates ``(k, 2)`` of single nodes. ``notes`` are what to warn of, by
-    how the mesh was made.
+    - ``cells``, ``facets``: a tag for each cell, and for each facet in a set
+    - ``cell_sets``, ``facet_sets``: the tags of each set, several where sets overlap
+    - ``point_sets``: coordinates ``(k, 2)`` of the nodes of each set
+    - ``notes``: what to warn of, by how the mesh was made
     """
 
     mesh: Mesh
@@ -37,6 +37,11 @@ class TaggedMesh:
     point_sets: Mapping[str, Array] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+    @property
+    def dimension(self) -> int:
+        """Topological dimension of the cells."""
+        return self.mesh.topology.dim
+
     def cell_tags(self, name: str) -> tuple[int, ...]:
         """Tags of the cell set ``name``. Raises ValueError, also for a set without cells."""
         return tags_of("cell", self.cell_sets, name)
@@ -44,61 +49,71 @@ class TaggedMesh:
     def cells_in(self, name: str) -> np.ndarray:
         """Cells ``(n,)`` of the cell set ``name`` on this rank, ghosts included. Raises
         ValueError."""
-        return self.cells.indices[np.isin(self.cells.values, self.cell_tags(name))]
+        return _tagged(self.cells, self.cell_tags(name))
 
     def facets_in(self, name: str) -> np.ndarray:
         """Facets ``(n,)`` of the facet set ``name`` on this rank, ghosts included. Raises
         ValueError."""
-        return self.facets.indices[
-            np.isin(self.facets.values, tags_of("facet", self.facet_sets, name))
-        ]
+        return _tagged(self.facets, tags_of("facet", self.facet_sets, name))
 
     def dofs_in(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
         """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet and point set
         ``name``, or in the cell set where it is neither. Collective; raises ValueError."""
         found = []
         if name in self.facet_sets:
-            found.append(fem.locate_dofs_topological(V, 1, self.facets_in(name)))
+            facets = self.facets_in(name)
+            found.append(fem.locate_dofs_topological(V, self.dimension - 1, facets))
         if name in self.point_sets and (len(self.point_sets[name]) or not found):
             found.append(self._nodes_at(V, name))
         if found:
             return np.unique(np.concatenate(found))
         if name in self.cell_sets:
-            self.mesh.topology.create_connectivity(2, 2)
-            return fem.locate_dofs_topological(V, 2, self.cells_in(name))
+            self.mesh.topology.create_connectivity(self.dimension, self.dimension)
+            return fem.locate_dofs_topological(V, self.dimension, self.cells_in(name))
         known = [*self.facet_sets, *self.point_sets, *self.cell_sets]
         raise ValueError(unknown("facet, point or cell set", name, known))
 
     def _nodes_at(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
         from scipy.spatial import cKDTree  # a solve without point sets does not pay for it
 
-        points, x = self.point_sets[name], V.tabulate_dof_coordinates()[:, :2]
+        points = self.point_sets[name]
         if not len(points):
             raise ValueError(f"the point set {name!r} is empty: no cell has a node of it")
-        comm, n_owned = self.mesh.comm, V.dofmap.index_map.size_local
-        near = _SAME_PLACE * comm.allreduce(
-            np.abs(self.mesh.geometry.x).max(initial=0.0), op=MPI.MAX
-        )
+        comm = self.mesh.comm
+        size = np.abs(self.mesh.geometry.x).max(initial=0.0)
+        near = _SAME_PLACE * comm.allreduce(size, op=MPI.MAX)
         alike = cKDTree(points).query_ball_point(points, near, return_length=True)
+        x = V.tabulate_dof_coordinates()[:, : points.shape[1]]
         here = cKDTree(x).query_ball_point(points, near)
+        n_owned = V.dofmap.index_map.size_local
         found = comm.allreduce(np.array([sum(dof < n_owned for dof in dofs) for dofs in here]))
         for at in points[found != alike]:
             raise ValueError(
-                f"the point set {name!r} does not tell which node at ({at[0]:g}, {at[1]:g}) it means"
+                f"the point set {name!r} does not tell which node at ({at[0]:g}, {at[1]:g}) it "
+                "means"
             )
         return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
 
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
-        self.mesh.topology.create_connectivity(1, 2)
-        cells = compute_incident_entities(self.mesh.topology, self.facets_in(name), 1, 2)
-        here = np.unique(self.cells.values[np.isin(self.cells.indices, cells)]).tolist()
+        topology = self.mesh.topology
+        facet_dim = self.dimension - 1
+        topology.create_connectivity(facet_dim, self.dimension)
+        behind = compute_incident_entities(
+            topology, self.facets_in(name), facet_dim, self.dimension
+        )
+        here = np.unique(self.cells.values[np.isin(self.cells.indices, behind)]).tolist()
         parts: list[list[int]] = self.mesh.comm.allgather(here)
         return set().union(*parts)
 
 
+def _tagged(entities: MeshTags, tags: tuple[int, ...]) -> np.ndarray:
+    """The ``entities`` ``(n,)`` of this rank that have one of the ``tags``."""
+    return entities.indices[np.isin(entities.values, tags)]
+
+
 def unknown(kind: str, name: str, known: list[str]) -> str:
-    """What is said of the ``name`` of a ``kind`` that is not among those ``known``."""
+    """The sentence on the ``name`` of a ``kind`` that is not among the names ``known``."""
     near = difflib.get_close_matches(name, known, 1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     return f"there is no {kind} {name!r}{hint}; there are {', '.join(map(repr, known)) or 'none'}"

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.geometry.basis import cell_kind
+from archord.geometry.basis import TRIANGLE
 from archord.geometry.curve import Curve, circle_through
-from archord.geometry.meshes.check import areas, cracks, distorted, parts
-from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
+from archord.geometry.meshes.cells import along, n_corners, sides_between, sides_of
+from archord.geometry.meshes.check import cracks, parts
+from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.quality import areas, distorted
 from archord.postprocess.pictures.pictures import save_figure
 from archord.report.figure import new_figure
 from archord.report.table import Table
@@ -18,10 +20,10 @@ from archord.report.table import Table
 
 def mesh_text(name: str, mesh: PlaneMesh) -> str:
     """What is in ``mesh``, in tables with a row a set; warnings come last."""
-    (kind, order), area = cell_kind(mesh.cells.shape[1]), areas(mesh)
+    area = areas(mesh)
     size, low = np.ptp(mesh.x, axis=0), mesh.x.min(axis=0)
     extent = f"{size[0]:g} by {size[1]:g} from ({low[0]:g}, {low[1]:g})"
-    head = f"{name}: {len(mesh.cells)} {kind.name}s of order {order}, {len(mesh.x)} nodes, {extent}"
+    head = f"{name}: {len(mesh.cells)} {mesh.kind.name}s of order {mesh.order}, {len(mesh.x)} nodes, {extent}"
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
     bodies = Table("cell set", "cells", "area", "parts", left=1)
     for name, inside in cells.items():
@@ -29,7 +31,7 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
             name,
             inside.sum(),
             f"{area[inside].sum():.6g}",
-            parts(mesh.cells[inside]).max(initial=-1) + 1,
+            parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1,
         )
     facets = Table("facet set", "of", "circle", "facets", "length", "shortest", "longest", left=3)
     for name, tags in mesh.facet_sets.items():
@@ -49,9 +51,9 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
 
 def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarray]) -> list[object]:
     nodes, count = np.unique(edges[:, :2], return_counts=True)
-    behind = sides_between(mesh.cells, edges[:, :2]) * len(mesh.cells) // len(sides_of(mesh.cells))
+    behind = sides_between(mesh.kind, mesh.cells, edges[:, :2]) // n_corners(mesh.kind)
     owners = ", ".join(name for name, inside in cells.items() if inside[behind].any())
-    ends = Curve(mesh.x, edges.shape[1] - 1, _along(edges)).arc_length(np.array([0.0, 1.0]))
+    ends = Curve(mesh.x, edges.shape[1] - 1, along(edges)).arc_length(np.array([0.0, 1.0]))
     length, circle = np.diff(ends)[:, 0], circle_through(mesh.x[nodes]) if len(nodes) else None
     said = ["closed"] if len(nodes) and (count == 2).all() else []
     if circle:
@@ -64,10 +66,6 @@ def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarra
     return [owners, ", ".join(said), len(edges), *(f"{value:.5g}" for value in sizes)]
 
 
-def _along(edges: np.ndarray) -> np.ndarray:
-    return edges[:, [0, *range(2, edges.shape[1]), 1]]
-
-
 def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
     """The cells, facets and points of named sets, each set in a colour, small ones over large;
     returns ``target``. Raises `InputError`."""
@@ -77,8 +75,8 @@ def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
     size = np.ptp(mesh.x, axis=0)
     figure = new_figure(9.0, float(np.clip(9.0 * size[1] / size[0], 3.0, 12.0)))
     axes, colours, faint = figure.add_subplot(), colormaps["tab10"], colormaps["Pastel2"]
-    sides = mesh.x[_along(sides_of(mesh.cells))]
-    around = [[0, 1, 2], [0, 1, 3, 2]][len(sides) // len(mesh.cells) - 3]
+    sides = mesh.x[along(sides_of(mesh.kind, mesh.cells))]
+    around = [0, 1, 2] if mesh.kind == TRIANGLE else [0, 1, 3, 2]
     for k, (name, tags) in enumerate(mesh.cell_sets.items()):
         inside = mesh.x[mesh.cells[np.isin(mesh.bodies, tags)]][:, around]
         axes.add_collection(
@@ -86,7 +84,7 @@ def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
         )
     axes.add_collection(LineCollection(sides, colors="0.5", linewidths=0.3, zorder=1))
     for k, (name, tags) in enumerate(mesh.facet_sets.items()):
-        edges = mesh.x[_along(mesh.edges[np.isin(mesh.tags, tags)])]
+        edges = mesh.x[along(mesh.edges[np.isin(mesh.tags, tags)])]
         above = 3 - len(edges) / len(mesh.edges)
         axes.add_collection(
             LineCollection(

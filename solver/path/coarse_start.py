@@ -60,7 +60,9 @@ class CoarseStart:
         ] = []  # nodes of a body on this rank, and their values
         for body in fine.problem.bodies:
             nodes, on = fine.nodes_of(body), of_cells == coarse.problem.tag(body)
-            self._maps.append((nodes, Interpolation(x[:, :2], cells[on], places[nodes])))
+            self._maps.append(
+                (nodes, Interpolation(order.kind, x[:, :2], cells[on], places[nodes]))
+            )
         self._reached: float | None = None
 
     def increment(self, load: float) -> Array | None:

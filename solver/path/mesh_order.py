@@ -50,13 +50,14 @@ class MeshOrder:
     """The generator's order of the nodes and cells of ``system``. Collective.
 
     ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank
-    0. Nodes are the displacement's: where the geometry is of another order, they come as the cells
+    0; cells are of one ``kind``. Nodes are the displacement's: where the geometry is of another order, they come as the cells
     first name them.
     """
 
     def __init__(self, system: System) -> None:
         self.system, V = system, system.V
         mesh, geometry, dofs = V.mesh, V.mesh.geometry, V.dofmap.list
+        self.kind = mesh.basix_cell()
         self.n_cells = mesh.topology.index_map(2).size_local
         self._n_local, self._n_owned = system.equilibrium.n_local, V.dofmap.index_map.size_local
         self._cell_index = np.asarray(mesh.topology.original_cell_index)[: self.n_cells]

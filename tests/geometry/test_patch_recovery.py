@@ -31,7 +31,7 @@ def ring(size, comm=MPI.COMM_SELF, **options):
 def test_polynomials_of_the_degree_are_reproduced_at_every_node(degree, size, quads):
     """Also where walls are one cell thick and vertices have no neighbour inside."""
     order = MeshOrder(ring(size, quads=quads))
-    nodes = SecondOrder(order.nodes_of_cell)
+    nodes = SecondOrder(order.kind, order.nodes_of_cell)
     x, places = nodes(order.coordinates)[:, :2], collect_mesh(order)["points/coordinates"]
     corners = [0, 1, 3, 2] if quads else [0, 1, 2]
     recovery = PatchRecovery(x, nodes.cells[:, corners], nodes.between, places, degree)

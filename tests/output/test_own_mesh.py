@@ -11,6 +11,7 @@ from dolfinx.mesh import create_mesh, create_unit_square, locate_entities_bounda
 from mpi4py import MPI
 
 import archord
+from archord.geometry.basis import TRIANGLE
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.formats.read import read_mesh, tagged
 from archord.geometry.meshes.plane_mesh import PlaneMesh
@@ -120,6 +121,7 @@ def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):
     cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
     sets = {"b": np.array([1]), "a": np.array([0]), "both": np.array([0, 1])}
     made = PlaneMesh.of_sets(
+        TRIANGLE,
         CURVED,
         cells,
         sets,
@@ -154,12 +156,30 @@ def test_curved_meshes_of_dolfinx_stay_curved(comm, tmp_path):
         assert sorted(map(tuple, stored_mesh(folder / "mesh.npz").x)) == sorted(map(tuple, CURVED))
 
 
+def test_a_mesh_of_archord_0_2_is_read(tmp_path):
+    """Its file does not name the kind of its cells."""
+    cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
+    path = tmp_path / "mesh.npz"
+    made = PlaneMesh.of_sets(TRIANGLE, CURVED, cells, {}, {"z": np.array([[0, 1]])}, {})
+    with path.open("wb") as file:
+        store_mesh(made, file)
+    arrays = dict(np.load(path))
+    words = json.loads(arrays["sets"].tobytes())
+    assert words.pop("kind") == "triangle"
+    sets = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+    np.savez(path, **(arrays | {"sets": sets}))
+    assert stored_mesh(path).kind == TRIANGLE
+    assert stored_mesh(path).edges.tolist() == made.edges.tolist()
+
+
 @pytest.mark.parametrize("name", ["x", "cells", "edges", "tags", "bodies", "sets"])
 def test_a_damaged_mesh_is_refused(tmp_path, name):
     cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
     path = tmp_path / "mesh.npz"
     with path.open("wb") as file:
-        store_mesh(PlaneMesh.of_sets(CURVED, cells, {}, {"z": np.array([[0, 1]])}, {}), file)
+        store_mesh(
+            PlaneMesh.of_sets(TRIANGLE, CURVED, cells, {}, {"z": np.array([[0, 1]])}, {}), file
+        )
     arrays = dict(np.load(path))
     lowered = [] if name in ("tags", "bodies") else [arrays[name] * 0 - 1]
     for wrong in (arrays[name][:-1], arrays[name].astype(complex), *lowered):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from archord.geometry.curve import lagrange
+from archord.geometry.basis import TRIANGLE
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.output.files.step_file import step_name
 from archord.output.run import solve_scene
@@ -67,7 +68,7 @@ def test_middles_of_polynomials_are_exact():
         x[3 + 2 * k : 5 + 2 * k] = x[i] + t[1:3, None] * (x[j] - x[i])
     x[9] = 1 / 3
     f = lambda p: p[:, :1] ** 3 - 2 * p[:, 1:] ** 2 * p[:, :1] + p[:, 1:]  # noqa: E731
-    second = SecondOrder(cell)
+    second = SecondOrder(TRIANGLE, cell)
     middles = np.array([(x[i] + x[j]) / 2 for i, j in ends])
     at = second(f(x))
     np.testing.assert_allclose(at[second.cells[0, :3]], f(x[:3]), rtol=0, atol=0)

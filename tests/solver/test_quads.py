@@ -14,8 +14,8 @@ from archord.geometry.basis import (
     QUADRILATERAL,
     Array,
     bulk_quadrature,
-    cell_kind,
     lagrange_element,
+    order_of,
     strain_matrix,
     tabulate,
 )
@@ -183,7 +183,7 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
         place, at = np.array([0.2, 0.3, 0.0]), np.zeros(3)
         cell.EvaluateLocation(reference(0), place, at, np.zeros(cell.GetNumberOfPoints()))
         nodes = whole.nodes_of_cell[1]
-        shape = tabulate(*cell_kind(len(nodes)), place[:2])[0]
+        shape = tabulate(whole.kind, order_of(whole.kind, len(nodes)), place[:2])[0]
         np.testing.assert_allclose(at, shape @ whole.coordinates[nodes], atol=1e-12)
         assert np.ptp(displacement[:, 1]) == pytest.approx(
             np.ptp(fields["displacement"][:, 1]), rel=1e-9
@@ -205,9 +205,9 @@ def test_guesses_from_quads(degree):
     )
     x, to = coarse.geometry.x[:, :2], fine.geometry.x[:, :2]
     linear = lambda z: np.stack([1 + 2 * z[:, 0] - z[:, 1], z[:, 1]], axis=1)  # noqa: E731
-    onto = Interpolation(x, coarse.geometry.dofmap, to)
+    onto = Interpolation(QUADRILATERAL, x, coarse.geometry.dofmap, to)
     assert onto(linear(x)) == pytest.approx(linear(to), abs=1e-11)
-    onto = Interpolation(x[:, :2], coarse.geometry.dofmap, to[:0])
+    onto = Interpolation(QUADRILATERAL, x[:, :2], coarse.geometry.dofmap, to[:0])
     assert onto(linear(x)).shape == (0, 2)
 
 
@@ -219,7 +219,7 @@ def test_middles_of_third_order_quads_are_exact():
     def f(p: Array) -> Array:
         return p[:, :1] ** 3 * (1 + p[:, 1:] ** 3) - 2 * p[:, 1:] ** 2 * p[:, :1]
 
-    second = SecondOrder(np.arange(16)[None])
+    second = SecondOrder(QUADRILATERAL, np.arange(16)[None])
     at = second(x)[second.cells[0]]
     np.testing.assert_allclose(at, lagrange_element(QUADRILATERAL, 2).points, atol=1e-15)
     np.testing.assert_allclose(second(f(x))[second.cells[0]], f(at), rtol=0, atol=1e-14)

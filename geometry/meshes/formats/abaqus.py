@@ -1,9 +1,9 @@
-"""Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file; all else
-of it is skipped.
+"""Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file.
 
-meshio's reader of such files knows neither surfaces nor plane elements of second order, and forgets
-all but the last block of nodes. Lines (trusses) only name edges, as gmsh writes them; springs,
-masses and the like name nothing.
+Plane elements are those of plane stress, plane strain and axisymmetric problems; which of these is
+solved is for the scene to say. Trusses only name edges, as gmsh writes them. Springs, masses and
+the like name nothing. All else is skipped. meshio's reader of such files knows neither surfaces
+nor plane elements of second order, and forgets all but the last block of nodes.
 """
 
 from __future__ import annotations
@@ -14,9 +14,12 @@ from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
+import basix
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
+from archord.geometry.basis import QUADRILATERAL, TRIANGLE
+from archord.geometry.meshes.cells import in_basix_order, n_corners, outer_sides
 from archord.geometry.meshes.formats.abaqus_blocks import (
     Options,
     Rows,
@@ -24,17 +27,19 @@ from archord.geometry.meshes.formats.abaqus_blocks import (
     number_of,
     scoped_blocks,
 )
-from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
+from archord.geometry.meshes.plane_mesh import PlaneMesh, one_kind
 
-_KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
+# plane stress, plane strain, axisymmetric, trusses; the fourth character is the number of nodes
+_KINDS = re.compile(r"(CP[ES][3468]|CAX[3468]|T[23]D[23])[A-Z]*")
+_SHAPES = {"3": TRIANGLE, "6": TRIANGLE, "4": QUADRILATERAL, "8": QUADRILATERAL}
 _WITHOUT_AREA = re.compile(r"(SPRING|DASHPOT|MASS|ROTARYI|CONN|GAP|DCOUP|R2D2|RB2D2).*")
 _OTHERS = {
     "C3D": "solid elements",
     "SC": "shell elements",
     "S": "shell elements",
     "M3D": "membrane elements",
-    "CAX": "axisymmetric elements",
-    "CGAX": "axisymmetric elements",
+    "CAXA": "axisymmetric elements with asymmetric deformation",
+    "CGAX": "axisymmetric elements with twist",
     "B": "beam elements",
     "COH": "cohesive elements",
 }
@@ -44,29 +49,35 @@ _UNREAD = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # the
 class _Model:
     """What a file has, by keys (`Scope.key`).
 
-    The places of ``nodes``; the nodes of plane elements (``cells``) and of ``lines``; the elements
-    ``without_area``; the keys of ``sets`` by kind and name, as it is first written; ``surfaces`` as
-    elements and a face. Sets for the file's ``internal`` use have no name for others.
+    - ``nodes``: places
+    - ``cells``, ``lines``: the nodes of plane elements, and of trusses
+    - ``shapes``: triangles or quadrilaterals, as the plane elements are
+    - ``without_area``: elements that are neither
+    - ``sets``: the keys of sets by kind and by name, as it is first written
+    - ``surfaces``: elements and the name of a face, by the surface's name
+    - ``internal``: names of sets for the file's own use
     """
 
     def __init__(self, path: Path) -> None:
         self.nodes: dict[int, list[float]] = {}
         self.cells: dict[int, list[int]] = {}
         self.lines: dict[int, list[int]] = {}
+        self.shapes: set[basix.CellType] = set()
         self.without_area: set[int] = set()
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[tuple[list[int], str]]] = defaultdict(list)
         self.internal: set[str] = set()
         self._names: dict[str, str] = {}
         self._owners: dict[tuple[str, str], int] = {}
-        take = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
+        readers = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
         for scope, (keyword, options, rows) in scoped_blocks(path):
             if keyword in _UNREAD or options.get("SYSTEM", "R").upper() != "R":
                 raise ValueError(
-                    f"*{keyword} is not read as it stands; write all nodes and elements out, in rectangular coordinates"
+                    f"*{keyword} is not read as it stands; write all nodes and elements out, in "
+                    "rectangular coordinates"
                 )
-            if keyword in take:
-                take[keyword](scope, options, rows)
+            if keyword in readers:
+                readers[keyword](scope, options, rows)
             elif keyword in self.sets:
                 self._set(scope, keyword, options, rows)
 
@@ -84,24 +95,28 @@ class _Model:
         self._add(scope, "NSET", options.get("NSET"), keys)
 
     def _element(self, scope: Scope, options: Options, rows: Rows) -> None:
-        kind = options.get("TYPE", "").upper()
-        if _WITHOUT_AREA.fullmatch(kind):
+        name = options.get("TYPE", "").upper()
+        if _WITHOUT_AREA.fullmatch(name):
             self.without_area.update(scope.key(row[0]) for row in rows)
             return
-        if not _KINDS.fullmatch(kind):
-            what = next(
-                (said for start, said in _OTHERS.items() if kind.startswith(start)), "elements"
-            )
+        if not _KINDS.fullmatch(name):
+            starts = (said for start, said in _OTHERS.items() if name.startswith(start))
+            what = next(starts, "elements")
             raise ValueError(
-                f"{what} of type {kind} are not read, only plane ones: CPS and CPE of 3, 4, 6 or 8 nodes"
+                f"{what} of type {name} are not read, only plane ones: CPS, CPE and CAX of 3, 4, "
+                "6 or 8 nodes"
             )
+        n_nodes = name[3]
+        size = 1 + int(n_nodes)
         values = [scope.key(value) for row in rows for value in row if value]
-        size = 1 + int(kind[3])
         if len(values) % size:
             raise ValueError(
-                f"elements of type {kind} have {len(values)} numbers, no multiple of {size}"
+                f"elements of type {name} have {len(values)} numbers, no multiple of {size}"
             )
-        found = self.lines if kind.startswith("T") else self.cells
+        found = self.lines
+        if not name.startswith("T"):
+            found = self.cells
+            self.shapes.add(_SHAPES[n_nodes])
         for start in range(0, len(values), size):
             key, *nodes = values[start : start + size]
             if key in self.cells or key in self.lines:
@@ -129,21 +144,19 @@ class _Model:
         if options.get("TYPE", "").upper() == "NODE":
             self._add(scope, "NSET", name, self._chosen(scope, "NSET", (row[0] for row in rows)))
             return
-        found = [
-            (self._chosen(scope, "ELSET", [item]), "".join(face).upper()) for item, *face in rows
-        ]
-        self.surfaces[scope.qualified(name)] += found
+        for item, *face in rows:
+            elements = self._chosen(scope, "ELSET", [item])
+            self.surfaces[scope.qualified(name)].append((elements, "".join(face).upper()))
 
     def _add(self, scope: Scope, kind: str, name: str | None, keys: list[int]) -> None:
-        if name:
-            whole = scope.qualified(name)
-            if self._owners.setdefault((kind, whole.upper()), scope.index) != scope.index:
-                raise ValueError(
-                    f"the *{kind} {whole!r} is there twice, once as a set of an instance"
-                )
-            self.sets[kind].setdefault(self._names.setdefault(whole.upper(), whole), []).extend(
-                keys
-            )
+        if not name:
+            return
+        whole = scope.qualified(name)
+        owner = self._owners.setdefault((kind, whole.upper()), scope.index)
+        if owner != scope.index:
+            raise ValueError(f"the *{kind} {whole!r} is there twice, once as a set of an instance")
+        first_written = self._names.setdefault(whole.upper(), whole)
+        self.sets[kind].setdefault(first_written, []).extend(keys)
 
     def _chosen(self, scope: Scope, kind: str, items: Iterable[str]) -> list[int]:
         """The keys of the numbers among ``items``, and those in the sets named there, of the
@@ -162,57 +175,54 @@ class _Model:
 
 
 def read_abaqus(path: Path) -> PlaneMesh:
-    """The mesh of an .inp file: its element sets, and as facet sets its surfaces, its sets of lines
-    and what its node sets have of the boundary; other nodes of these are point sets. Raises
-    ValueError."""
+    """The mesh of an .inp file. Raises ValueError.
+
+    Its element sets are cell sets. Facet sets are its surfaces, its sets of trusses and what its
+    node sets have of the boundary. Other nodes of the node sets are point sets.
+    """
     model = _Model(path)
-    kind = one_kind(set(map(len, model.cells.values())))
-    node, cell = (
-        {number: k for k, number in enumerate(there)} for there in (model.nodes, model.cells)
-    )
-    corners = _places(node, chain(*model.cells.values()), "node").reshape(-1, kind)
-    cell_sets, facet_sets, point_sets = {}, defaultdict[str, list[np.ndarray]](list), {}
-    for name, numbers in model.sets["ELSET"].items():
-        ends = [
-            model.lines[number][:: len(model.lines[number]) - 1]
-            for number in numbers
-            if number in model.lines
-        ]
-        members = sorted(set(numbers) - model.lines.keys() - model.without_area)
-        named = name not in model.internal and not (
-            numbers and model.without_area.issuperset(numbers)
-        )
-        if named and (members or not ends):
+    size = one_kind(set(map(len, model.cells.values())))
+    [kind] = model.shapes
+    node = {key: place for place, key in enumerate(model.nodes)}
+    cell = {key: place for place, key in enumerate(model.cells)}
+    nodes = _places(node, chain(*model.cells.values()), "node").reshape(-1, size)
+    x, cells = in_basix_order(kind, np.array(list(model.nodes.values())), nodes, perm_gmsh)
+    cell_sets = {}
+    facet_sets = defaultdict[str, list[np.ndarray]](list)
+    for name, keys in model.sets["ELSET"].items():
+        trusses = [model.lines[key] for key in keys if key in model.lines]
+        members = sorted(set(keys) - model.lines.keys() - model.without_area)
+        of_springs = keys and model.without_area.issuperset(keys)
+        named = name not in model.internal and not of_springs
+        if named and (members or not trusses):
             cell_sets[name] = _places(cell, members, f"element of the set {name!r}")
-        if ends:
+        if trusses:
+            ends = [(truss[0], truss[-1]) for truss in trusses]
             facet_sets[name].append(_places(node, chain(*ends), "node").reshape(-1, 2))
-    sides = 3 if kind in (3, 6) else 4
-    faces = {f"S{k}": [k - 1, k % sides] for k in range(1, sides + 1)}
+    n_sides = n_corners(kind)
+    faces = {f"S{k + 1}": [k, (k + 1) % n_sides] for k in range(n_sides)}
     for name, parts in model.surfaces.items():
         for elements, face in parts:
             if face not in faces:
                 raise ValueError(
-                    f"the surface {name!r} has the face {face!r}, which is none of S1 to S{sides}"
+                    f"the surface {name!r} has the face {face!r}, which is none of S1 to S{n_sides}"
                 )
             places = _places(cell, elements, f"element of the surface {name!r}")
-            facet_sets[name].append(corners[places][:, faces[face]])
-    x, cells = in_basix_order(np.array(list(model.nodes.values())), corners, perm_gmsh)
-    boundary, _ = outer_sides(cells)
-    for name, numbers in model.sets["NSET"].items():
-        if name not in facet_sets and name not in model.internal:
-            nodes = _places(node, sorted(set(numbers)), f"node of the set {name!r}")
-            edges = boundary[np.isin(boundary, nodes).all(axis=1)]
-            if len(edges):
-                facet_sets[name].append(edges[:, :2])
-            if len(rest := np.setdiff1d(nodes, edges)):
-                point_sets[name] = rest
-    return PlaneMesh.of_sets(
-        x,
-        cells,
-        cell_sets,
-        {name: np.concatenate(ends) for name, ends in facet_sets.items()},
-        point_sets,
-    )
+            facet_sets[name].append(nodes[places][:, faces[face]])
+    boundary, _ = outer_sides(kind, cells)
+    point_sets = {}
+    for name, keys in model.sets["NSET"].items():
+        if name in facet_sets or name in model.internal:
+            continue
+        of_set = _places(node, sorted(set(keys)), f"node of the set {name!r}")
+        edges = boundary[np.isin(boundary, of_set).all(axis=1)]
+        if len(edges):
+            facet_sets[name].append(edges[:, :2])
+        rest = np.setdiff1d(of_set, edges)
+        if len(rest):
+            point_sets[name] = rest
+    facets = {name: np.concatenate(ends) for name, ends in facet_sets.items()}
+    return PlaneMesh.of_sets(kind, x, cells, cell_sets, facets, point_sets)
 
 
 def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarray:

@@ -130,18 +130,16 @@ def _instance(name: str, index: int, rows: Rows) -> Scope:
         or any(len(row) != 7 for row in numbers[1:])
     ):
         raise ValueError(
-            f"the *INSTANCE {name!r} must have a row of 3 numbers to move it, and one of 7 to turn it"
+            f"the *INSTANCE {name!r} must have a row of 3 numbers to move it, and one of 7 to "
+            "turn it"
         )
     shift = np.zeros(3)
     if numbers:
         shift[: len(numbers[0])] = numbers[0]
     if len(numbers) < 2:
         return Scope(name, index, shift)
-    start, end, angle = (
-        np.array(numbers[1][:3]),
-        np.array(numbers[1][3:6]),
-        np.radians(numbers[1][6]),
-    )
+    start, end = np.array(numbers[1][:6]).reshape(2, 3)
+    angle = np.radians(numbers[1][6])
     length = np.linalg.norm(end - start)
     if not length > 0:
         raise ValueError(

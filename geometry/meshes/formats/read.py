@@ -15,14 +15,14 @@ import numpy as np
 from dolfinx.mesh import Mesh, MeshTags, meshtags
 from mpi4py import MPI
 
-from archord.geometry.meshes.check import faults
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
 from archord.geometry.meshes.formats.abaqus import read_abaqus
 from archord.geometry.meshes.formats.xdmf import read_xdmf
 from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
+from archord.geometry.meshes.quality import faults
 from archord.geometry.meshes.refine import Circle, refined
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
-from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import Sets, TaggedMesh
 from archord.report.readable import require_file
 
 _HEADERS = (b"$MeshFormat", b"$NOD", b"$Comments")
@@ -84,23 +84,38 @@ def tagged(
     """A dolfinx ``mesh`` with its tags, named by ``cell_sets`` and ``facet_sets`` or else by their
     numbers; without tags, all cells are "all". Collective; raises ValueError on all ranks for what
     is not plane."""
-    if mesh.topology.dim != 2 or (cells and cells.dim != 2) or (facets and facets.dim != 1):
+    dim = mesh.topology.dim
+    if dim != 2 or (cells and cells.dim != dim) or (facets and facets.dim != dim - 1):
         raise ValueError(
-            "the mesh and the tags of its cells must be of dimension 2, the tags of facets of dimension 1"
+            "the mesh and the tags of its cells must be of dimension 2, the tags of facets of "
+            "dimension 1"
         )
     flat(np.concatenate(mesh.comm.allgather(mesh.geometry.x)))
-    mesh.topology.create_connectivity(1, 2)
-    index_map, none = mesh.topology.index_map(2), np.zeros(0, dtype=np.int32)
+    mesh.topology.create_connectivity(dim - 1, dim)
     if cells is None:
+        index_map = mesh.topology.index_map(dim)
         every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
-        cells, cell_sets = meshtags(mesh, 2, every, np.ones(len(every), dtype=np.int32)), {"all": 1}
-    facets = meshtags(mesh, 1, none, none) if facets is None else facets
-    sets = []
-    for tags, names in ((cells, cell_sets), (facets, facet_sets)):
-        values = sorted(set().union(*mesh.comm.allgather(set(tags.values.tolist()))))
-        names = names or {str(value): value for value in values}
-        sets.append({name: (tag,) if tag in values else () for name, tag in names.items()})
-    return TaggedMesh(mesh, cells, facets, sets[0], sets[1])
+        cells = meshtags(mesh, dim, every, np.ones(len(every), dtype=np.int32))
+        cell_sets = {"all": 1}
+    if facets is None:
+        none = np.zeros(0, dtype=np.int32)
+        facets = meshtags(mesh, dim - 1, none, none)
+    return TaggedMesh(
+        mesh,
+        cells,
+        facets,
+        _named(mesh.comm, cells, cell_sets),
+        _named(mesh.comm, facets, facet_sets),
+    )
+
+
+def _named(comm: MPI.Comm, tags: MeshTags, names: Mapping[str, int] | None) -> Sets:
+    """Sets by the ``names`` of values of ``tags``, or by the values where there are no names.
+    Collective."""
+    here = set(tags.values.tolist())
+    values = set().union(*comm.allgather(here))
+    names = names or {str(value): value for value in sorted(values)}
+    return {name: (tag,) if tag in values else () for name, tag in names.items()}
 
 
 def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
@@ -113,9 +128,8 @@ def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
     readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf, ".npz": stored_mesh}
     if path.suffix.lower() not in readers:
         raise ValueError(f"is none of the files of meshes that are read: {', '.join(readers)}")
-    require_file(path).open(
-        "rb"
-    ).close()  # or gmsh would say something else of a file that is not there
+    with require_file(path).open("rb"):
+        pass  # or gmsh would say something else of a file that cannot be read
     if not path.stat().st_size:
         raise ValueError("is empty")
     return readers[path.suffix.lower()](path)
@@ -127,10 +141,10 @@ def _read_gmsh(path: Path) -> PlaneMesh:
         if not file.read(20).startswith(_HEADERS):  # gmsh would run it as a script
             raise ValueError("is no mesh of gmsh: it must begin with $MeshFormat")
     with TemporaryDirectory() as folder:
-        found, said = Path(folder) / "mesh.npz", Path(folder) / "error"
-        child = (
-            os.fork()
-        )  # not of multiprocessing, whose daemons, as the workers of a pool, may have no children
+        found = Path(folder) / "mesh.npz"
+        said = Path(folder) / "error"
+        # not by multiprocessing, whose daemons, as the workers of a pool, may have no children
+        child = os.fork()
         if child == 0:
             _merge(path, found, said)
         _, status = os.waitpid(child, 0)

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
 from xml.etree import ElementTree
 
+import basix
 import h5py
 import numpy as np
 from dolfinx.cpp.io import perm_vtk
 
+from archord.geometry.basis import QUADRILATERAL, TRIANGLE
+from archord.geometry.meshes.cells import in_basix_order, n_corners
 from archord.geometry.meshes.formats.beside import beside
-from archord.geometry.meshes.plane_mesh import SOLID, PlaneMesh, in_basix_order
+from archord.geometry.meshes.plane_mesh import SOLID, PlaneMesh
 from archord.report.readable import require_memory
 
 _SOLIDS = ("tet", "hex", "wedge", "pyramid")
+_PLANE = {"tri": TRIANGLE, "quad": QUADRILATERAL}  # by how the names of topologies start
+_TAGS = "Attribute[@Center='Cell']"
 
 
 def read_xdmf(path: Path) -> PlaneMesh:
-    """The first grid with a geometry; sets are what other grids, or it, have as values of cells,
-    lines and points, and their names are those values as text. Raises ValueError."""
+    """The first grid with a geometry. Raises ValueError.
+
+    Sets are what other grids, or this one, have as values of cells, lines and points. The names of
+    sets are these values as text.
+    """
     grids = [
         grid
         for grid in ElementTree.parse(path).iter("Grid")
@@ -27,43 +36,65 @@ def read_xdmf(path: Path) -> PlaneMesh:
     meshes = [grid for grid in grids if grid.find("Geometry/DataItem") is not None]
     if not meshes:
         raise ValueError("there is no grid with topology and geometry")
-    topology = meshes[0].find("Topology")
-    kind = "" if topology is None else topology.attrib.get("TopologyType", "").lower()
-    if kind.startswith(_SOLIDS):
-        raise ValueError(SOLID)
-    x, cells = (_data(path, meshes[0], part) for part in ("Geometry", "Topology"))
-    sets: dict[int, dict[str, np.ndarray]] = {
-        1: {},
-        2: {},
-        cells.shape[1]: {},
-    }  # by the number of nodes
+    mesh = meshes[0]
+    kind = _kind(mesh)
+    x = _data(path, mesh, "Geometry")
+    cells = _data(path, mesh, "Topology")
+    sets: dict[int, dict[str, np.ndarray]] = defaultdict(dict)  # by their topological dimension
     for grid in grids:
-        if grid.find("Attribute[@Center='Cell']/DataItem") is None:
+        if grid.find(f"{_TAGS}/DataItem") is None:
             continue
-        entities, values = (
-            _data(path, grid, "Topology"),
-            _data(path, grid, "Attribute[@Center='Cell']").ravel(),
-        )
-        n = entities.shape[1] if entities.shape[1] in sets else 2
+        of_dimension = sets[_dimension(grid)]
+        entities = _data(path, grid, "Topology")
+        values = _data(path, grid, _TAGS).ravel()
         for value in np.unique(values):
-            if (name := str(int(value))) in sets[n]:
+            name = str(int(value))
+            if name in of_dimension:
                 raise ValueError(
-                    f"two tags have the value {name}, which is to name a set: give them other values"
+                    f"two tags have the value {name}, which is to name a set: give them other "
+                    "values"
                 )
-            sets[n][name] = entities[values == value][:, : max(n, 2)]
-    corners = 3 if cells.shape[1] in (3, 6, 10) else 4
-    tagged = np.concatenate([cells, *sets[cells.shape[1]].values()])[:, :corners]
+            of_dimension[name] = entities[values == value]
+    corners = slice(n_corners(kind))
+    parts = [np.sort(part[:, corners]) for part in (cells, *sets[2].values())]
     _, first, which = np.unique(
-        np.sort(tagged, axis=1), axis=0, return_index=True, return_inverse=True
+        np.concatenate(parts), axis=0, return_index=True, return_inverse=True
     )
-    ends = np.cumsum([len(cells), *map(len, sets[cells.shape[1]].values())])
-    cell_sets = dict(
-        zip(sets[cells.shape[1]], np.split(first[which.ravel()], ends[:-1])[1:], strict=True)
-    )
-    points = {name: nodes[:, 0] for name, nodes in sets[1].items()}
+    _, *members = np.split(first[which.ravel()], np.cumsum([len(part) for part in parts[:-1]]))
+    x, cells = in_basix_order(kind, x, cells.astype(np.int64), perm_vtk)
     return PlaneMesh.of_sets(
-        *in_basix_order(x, cells.astype(np.int64), perm_vtk), cell_sets, sets[2], points
+        kind,
+        x,
+        cells,
+        dict(zip(sets[2], members, strict=True)),
+        {name: lines[:, :2] for name, lines in sets[1].items()},
+        {name: nodes[:, 0] for name, nodes in sets[0].items()},
     )
+
+
+def _topology(grid: ElementTree.Element) -> str:
+    """The name of a grid's topology in small letters."""
+    topology = grid.find("Topology")
+    return "" if topology is None else topology.attrib.get("TopologyType", "").lower()
+
+
+def _kind(grid: ElementTree.Element) -> basix.CellType:
+    """The kind of the cells of a ``grid``. Raises ValueError."""
+    name = _topology(grid)
+    if name.startswith(_SOLIDS):
+        raise ValueError(SOLID)
+    for start, kind in _PLANE.items():
+        if name.startswith(start):
+            return kind
+    raise ValueError(f"a grid has cells of type {name!r}; triangles and quadrilaterals are read")
+
+
+def _dimension(grid: ElementTree.Element) -> int:
+    """Topological dimension of what a ``grid`` has."""
+    name = _topology(grid)
+    if name.startswith(tuple(_PLANE)):
+        return 2
+    return 0 if name.startswith("polyvertex") else 1
 
 
 def _data(path: Path, grid: ElementTree.Element, part: str) -> np.ndarray:
@@ -77,5 +108,5 @@ def _data(path: Path, grid: ElementTree.Element, part: str) -> np.ndarray:
         with h5py.File(beside(path, name)) as file:
             require_memory(file[place].nbytes)
             return file[place][()].reshape(rows, -1)
-    numbers = np.array(item.text.split(), dtype=float)
-    return (numbers.astype(np.int64) if part == "Topology" else numbers).reshape(rows, -1)
+    kind = np.int64 if part == "Topology" else np.float64
+    return np.array(item.text.split(), dtype=float).astype(kind).reshape(rows, -1)

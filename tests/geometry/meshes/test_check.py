@@ -8,10 +8,12 @@ from mpi4py import MPI
 
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE, lagrange_element, tabulate
 from archord.geometry.curve import circle_through
-from archord.geometry.meshes.check import check_mesh, distorted, faults, free_motions
+from archord.geometry.meshes.check import check_mesh
 from archord.geometry.meshes.fenicsx import distribute, gathered
 from archord.geometry.meshes.jacobian import smallest_determinants
+from archord.geometry.meshes.motions import AXISYMMETRIC, free_motions
 from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.quality import beyond_axis, distorted, faults
 from archord.geometry.meshes.refine import Circle, refined
 
 
@@ -43,7 +45,7 @@ def joined(*grids):
 
 
 def check(comm, made, bodies, **options):
-    mesh = PlaneMesh.of_sets(*made, {}) if comm.rank == 0 else None
+    mesh = PlaneMesh.of_sets(QUADRILATERAL, *made, {}) if comm.rank == 0 else None
     return check_mesh(distribute(comm, mesh), bodies, **options)
 
 
@@ -209,7 +211,7 @@ def test_straight_sides_of_arcs_are_told_with_their_sagitta():
         check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[:1])
     (said,) = check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[1:])
     assert "their corners" in said
-    straight = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2)
+    straight = refined(PlaneMesh.of_sets(QUADRILATERAL, *arcs(0.01), {}), order=2)
     with pytest.raises(ValueError, match=r"a sagitta of 0.0031"):
         check_mesh(distribute(MPI.COMM_SELF, straight), bodies, **PAIR)
     assert (
@@ -221,7 +223,7 @@ def test_straight_sides_of_arcs_are_told_with_their_sagitta():
         == []
     )
     circles = [Circle("0 top", (0.0, 0.0), 1.0), Circle("1 top", (0.0, 0.0), 1.01)]
-    curved = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2, circles=circles)
+    curved = refined(PlaneMesh.of_sets(QUADRILATERAL, *arcs(0.01), {}), order=2, circles=circles)
     assert check_mesh(distribute(MPI.COMM_SELF, curved), bodies, **PAIR) == []
 
 
@@ -232,7 +234,7 @@ def test_a_circle_that_is_not_the_drawn_one_is_told(radius, x, warned):
     """It changes the clearance: nodes were moved by up to a twentieth of the radius without a
     word."""
     given = [Circle("0 top", (x, 0.0), radius), Circle("1 top", (0.0, 0.0), 1.1)]
-    made = refined(PlaneMesh.of_sets(*arcs(0.1), {}), order=2, circles=given)
+    made = refined(PlaneMesh.of_sets(QUADRILATERAL, *arcs(0.1), {}), order=2, circles=given)
     for mesh in (made, gathered(distribute(MPI.COMM_SELF, made))):
         assert len(mesh.notes) == warned
         assert all(
@@ -262,7 +264,7 @@ def bent(kind, order, amount, mirrored=False):
     x = nodes.copy()
     x[middle, 1] += 4 * amount * x[middle, 0] * (1 - x[middle, 0])
     x[:, 0] *= -1 if mirrored else 1
-    return PlaneMesh.of_sets(x, np.arange(len(x))[None], {}, {}, {})
+    return PlaneMesh.of_sets(kind, x, np.arange(len(x))[None], {}, {}, {})
 
 
 def test_a_corner_of_two_sides_on_one_arc_is_a_warning():
@@ -309,7 +311,7 @@ def test_a_fold_between_corners_and_nodes_is_found():
         nodes = lagrange_element(kind, order).points
         x = nodes + rng.uniform(-0.35, 0.35, (300, *nodes.shape)) / order
         made = PlaneMesh.of_sets(
-            x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {}
+            kind, x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {}
         )
         table = tabulate(kind, order, inside)[1:]
         sampled = np.linalg.det(np.einsum("jqa,nai->nqij", table, x)).min(axis=1)
@@ -327,14 +329,14 @@ def test_a_straight_cell_may_not_fold_at_all():
     x = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
     for inward, refused in ((0.505, False), (0.495, True)):
         x[3] = inward
-        mesh = PlaneMesh.of_sets(x[[0, 1, 2, 3]], np.arange(4)[None], {}, {}, {})
+        mesh = PlaneMesh.of_sets(QUADRILATERAL, x[[0, 1, 2, 3]], np.arange(4)[None], {}, {}, {})
         assert bool(faults(mesh)) == refused
 
 
 def test_collapsed_cells_say_so():
     x, cells = grid(2, 1)
     cells[1, 3] = cells[1, 1]
-    said = faults(PlaneMesh.of_sets(x, cells, {"plate": np.arange(2)}, {}, {}))[0]
+    said = faults(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {"plate": np.arange(2)}, {}, {}))[0]
     assert said.startswith(
         "1 cells have a node twice, the first at (0.75, 0.25) in 'plate': a quadrilateral must not"
     )
@@ -345,16 +347,16 @@ def test_cells_that_cannot_be_used(mirrored):
     """Folded, flat or there twice; clockwise ones can be."""
     x, cells = grid(2, 2)
     x = x * [-1, 1] if mirrored else x
-    made = PlaneMesh.of_sets(x, cells, {}, {}, {})
+    made = PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {})
     assert faults(made) == []
     x[4] = [0.9 * np.sign(x[5, 0]), -0.6]
-    assert faults(PlaneMesh.of_sets(x, cells, {}, {}, {}))[0].startswith(
+    assert faults(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {}))[0].startswith(
         "2 cells are folded or have no area"
     )
     x, cells = grid(2, 1)
-    twice = PlaneMesh.of_sets(x, np.concatenate([cells, cells[:1]]), {}, {}, {})
+    twice = PlaneMesh.of_sets(QUADRILATERAL, x, np.concatenate([cells, cells[:1]]), {}, {}, {})
     assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5) in 'all'"
-    curved = refined(PlaneMesh.of_sets(x, cells, {}, {}, {}), order=2)
+    curved = refined(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {}), order=2)
     apart, bound = curved.cells.copy(), curved.cells.copy()
     apart[1, 5] = apart[1, 6]
     bound[0, 4] = bound[1, 1]
@@ -363,7 +365,9 @@ def test_cells_that_cannot_be_used(mirrored):
             faults(replace(curved, cells=wrong))
         )
     third = np.concatenate([cells, [[1, 6, 4, 7]]])
-    crowded = PlaneMesh.of_sets(np.concatenate([x, [[2.0, 0], [2, 1]]]), third, {}, {}, {})
+    crowded = PlaneMesh.of_sets(
+        QUADRILATERAL, np.concatenate([x, [[2.0, 0], [2, 1]]]), third, {}, {}, {}
+    )
     assert (
         faults(crowded)[0]
         == "1 edges belong to more than two cells, the first at (0.5, 0.5): cells overlap"
@@ -392,6 +396,27 @@ def test_motions_that_nothing_holds(held, free):
     assert free_motions({"body": held}) == {"body": free}
 
 
+def test_a_body_of_revolution_moves_along_its_axis_alone():
+    """A radial support holds nothing: the hoop strain does."""
+    radial = along(X, (1, 0), (1, 5))
+    axial = along(Y, (0, 0))
+    assert free_motions({"ring": []}, (), AXISYMMETRIC) == {"ring": ["y"]}
+    assert free_motions({"ring": [radial]}, (), AXISYMMETRIC) == {"ring": ["y"]}
+    assert free_motions({"ring": [axial]}, (), AXISYMMETRIC) == {"ring": []}
+    pressed = [("punch", "block", np.array([[1.0, 0.0]]), Y[None])]
+    held = {"punch": [], "block": [axial]}
+    assert free_motions(held, pressed, AXISYMMETRIC) == {"punch": [], "block": []}
+
+
+def test_nodes_beyond_the_axis_are_told():
+    """Rounding is not: nodes on the axis may come out a little below zero."""
+    x, _ = grid(2, 2, corner=(0.0, 0.0))
+    assert beyond_axis(x) == []
+    assert beyond_axis(x - [1e-12, 0]) == []
+    (said,) = beyond_axis(x - [0.7, 0])
+    assert said.startswith("6 nodes have a negative radius, the farthest at (-0.7, 0)")
+
+
 def test_a_short_clamp_beside_a_long_one_holds():
     long = np.random.default_rng(1).uniform(-500, 500, (3000, 2))
     wide = [(long, np.tile(d, (3000, 1))) for d in (X, Y)]
@@ -418,6 +443,6 @@ def test_bodies_that_hold_each_other():
 
 @pytest.mark.mpi
 def test_checks_see_the_mesh_of_all_ranks(comm):
-    mesh = distribute(comm, PlaneMesh.of_sets(*TWO, {}) if comm.rank == 0 else None)
+    mesh = distribute(comm, PlaneMesh.of_sets(QUADRILATERAL, *TWO, {}) if comm.rank == 0 else None)
     whole = gathered(mesh)
     assert (whole is None) or len(whole.cells) == 10

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.basis import TRIANGLE
 from archord.geometry.meshes.interpolation import Interpolation
 from archord.geometry.shapes.pin_in_block import quarter_joint
 from tests.geometry.shapes.measures import Cells
@@ -25,7 +26,7 @@ def test_linear_fields_are_kept_everywhere_and_curved_ones_to_the_order_of_the_m
     for size in (0.3, 0.15):
         coarse = quarter_joint(MPI.COMM_SELF, 1.0, 0.005, 10.0, size, size, degree=degree)
         y, of = nodes_of(coarse.mesh, coarse.cells.find(body))
-        f = Interpolation(y, of, to)
+        f = Interpolation(TRIANGLE, y, of, to)
         linear = lambda z: np.stack([1 + 2 * z[:, 0] - z[:, 1], z[:, 1]], axis=1)  # noqa: E731
         assert f(linear(y)) == pytest.approx(linear(to), abs=1e-11)
         wave = lambda z: np.sin(z[:, :1]) * np.cos(z[:, 1:])  # noqa: E731

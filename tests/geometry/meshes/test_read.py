@@ -233,11 +233,13 @@ def test_an_input_deck_of_sets_and_surfaces(comm, deck):
             '*NSET, NSET="some of it"\n 1, 2\n*NSET, NSET=floor\n "some of it", 3,',
         ),
         ("*INCLUDE, INPUT=more.inp\n", "*NODE, NSET=Nall, INPUT=more.inp\n"),
+        ("TYPE=CPE8R", "TYPE=CAX8R"),
+        ("type=cpe8r", "type=cax8"),
     ],
 )
 def test_what_an_input_deck_may_look_like(comm, deck, old, new):
-    """Comments, keywords on two lines and names between quotes, and data in other files lose
-    nothing."""
+    """Comments, keywords on two lines, names between quotes, data in other files and axisymmetric
+    elements lose nothing."""
     expected, found = (
         content(read_mesh(deck(), comm))[2],
         content(read_mesh(deck((old, new)), comm))[2],
@@ -249,6 +251,7 @@ def test_what_an_input_deck_may_look_like(comm, deck, old, new):
     ("old", "new", "said"),
     [
         ("cpe8r", "C3D20R", "solid elements of type C3D20R are not read, only plane ones"),
+        ("cpe8r", "CGAX8", "axisymmetric elements with twist of type CGAX8 are not read"),
         ("cpe8r", "CPE4", "type CPE4 have 9 numbers, no multiple of 5"),
         (" Both, S3", " Bath, S3", "there is no .ELSET 'Bath'"),
         (" Both, S3", " Both, S5", "surface 'Top' has the face 'S5', which is none of S1 to S4"),
