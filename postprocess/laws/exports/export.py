@@ -139,18 +139,12 @@ def export_curve(curve: JointCurve, target: Path) -> str:
     names: .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), .json. Its stem becomes the name of
     the law, but in JSON.
 
-    Raises ValueError on another suffix, a stem that is no name, tables of several joints, and
-    tables that have gaps or a way back that does not rise.
+    Raises ValueError on another suffix, a stem that is no name, and tables that have gaps or a way
+    back that does not rise.
     """
     if target.suffix not in (*_FORMS, ".json"):
         raise ValueError(
             f"{target.name}: a law is exported to files that end in {', '.join(_FORMS)} or .json"
-        )
-    if curve.y.ndim != 1 or any(
-        np.size(unit) != 1 for unit in (curve.length, curve.force, curve.pressure)
-    ):
-        raise ValueError(
-            "a file holds the law of one joint, and this table has several: take them one by one"
         )
     if target.suffix == ".json":
         return replace(curve, about=curve.about | {"forces": _units(curve)}).to_json()
@@ -206,9 +200,9 @@ def _check_name(target: Path, language: str) -> None:
 
 def _tables(curve: JointCurve) -> Tables:
     """All numbers of the law, in the units of the joint."""
-    length, force, pressure = (
-        float(np.squeeze(unit)) for unit in (curve.length, curve.force, curve.pressure)
-    )
+    length = float(curve.length)
+    force = float(curve.force)
+    pressure = float(curve.pressure)
     root = np.sqrt(force)
     arrays = {
         "NODES": length * curve.x,

@@ -32,17 +32,18 @@ _CLEARANCE = 0.02  # dR/R of which dR/R is counted
 
 
 class Elastic(NamedTuple):
-    """What decides elastic joints, each ``(m,)``: share of the pin p, ``m`` and ``n`` of pin and
-    block, ``clearance`` dR/R."""
+    """What decides an elastic joint, or ``(m,)`` joints: share of the pin p, ``m`` and ``n`` of pin
+    and block, ``clearance`` dR/R."""
 
-    p: Array
-    m: Array
-    n: Array
-    clearance: Array
+    p: Any
+    m: Any
+    n: Any
+    clearance: Any
 
 
 class ElasticState(NamedTuple):
-    """Of joints at ``x`` ``(m, k)``: y and dy/dx, F and dF/dx, p0 R/(E* dR) and eps [rad]."""
+    """Of a joint at ``x`` ``(k,)``, or of joints ``(m, k)``: y and dy/dx, F and dF/dx, p0 R/(E* dR)
+    and eps [rad]."""
 
     y: Array
     slope: Array
@@ -53,10 +54,10 @@ class ElasticState(NamedTuple):
 
 
 def products(joints: Elastic, exponents: Array) -> Array:
-    """``p^a (p m)^b (q n)^c d^e`` ``(m, terms)`` for the rows a, b, c, e of ``exponents``."""
-    p, m, n, clearance = map(np.asarray, joints)
-    factors = np.stack([p, p * m, (1 - p) * n, clearance / _CLEARANCE])
-    return np.prod(factors[:, :, None] ** exponents.T[:, None, :], axis=0)
+    """``p^a (p m)^b (q n)^c d^e`` ``(..., terms)`` for the rows a, b, c, e of ``exponents``."""
+    p, m, n, clearance = joints
+    factors = np.stack([p, p * m, (1 - p) * n, clearance / _CLEARANCE], axis=-1)
+    return np.prod(factors[..., None, :] ** exponents, axis=-1)
 
 
 def depth(x: Array) -> Array:
@@ -73,15 +74,11 @@ class Polynomials:
     coefficients: Array
 
     def at(self, joints: Elastic, x: Array) -> tuple[Array, Array]:
-        """The function and its derivative by x ``(m, k)``, at ``x`` ``(k,)`` of all or ``(m, k)``
-        of each joint."""
+        """The function and its derivative by x ``(..., k)``, at ``x`` ``(k,)``."""
         series = (products(joints, self.exponents) @ self.coefficients).T[..., None]
-        slope = 2 * (1 + FARTHEST) / FARTHEST / (1 + x) ** 2
-        value, rise = (
-            chebyshev.chebval(depth(x), c, tensor=False)
-            for c in (series, chebyshev.chebder(series))
-        )
-        return value, rise * slope
+        value = chebyshev.chebval(depth(x), series, tensor=False)
+        rise = chebyshev.chebval(depth(x), chebyshev.chebder(series), tensor=False)
+        return value, rise * (2 * (1 + FARTHEST) / FARTHEST / (1 + x) ** 2)
 
 
 @dataclass(frozen=True)
@@ -93,22 +90,24 @@ class ElasticModel:
     angle: Polynomials
 
     def at(self, joints: Elastic, x: Array) -> ElasticState:
-        """All quantities of ``joints`` at ``x > 0``, ``(k,)`` or ``(m, k)``."""
-        (F, F_slope), (peak, _), (angle, _) = (
-            of.at(joints, x) for of in (self.F, self.peak, self.angle)
-        )
-        y, slope = line_contact(np.asarray(x), F, F_slope)
+        """All quantities of ``joints`` at ``x > 0`` ``(k,)``."""
+        F, F_slope = self.F.at(joints, x)
+        peak, _ = self.peak.at(joints, x)
+        angle, _ = self.angle.at(joints, x)
+        y, slope = line_contact(x, F, F_slope)
         return ElasticState(y, slope, F, F_slope, peak * np.sqrt(y), angle * np.sqrt(y))
 
     def to_json(self) -> str:
         """The model as a table: a row for each product, its exponents and coefficients in six
         digits."""
-        lines = []
+        tables = []
         for name, of in vars(self).items():
-            rows = [[*map(int, e), *(float(f"{c:.6g}") for c in row)]
-                    for e, row in zip(of.exponents, of.coefficients, strict=True)]  # fmt: skip
-            lines.append(f' "{name}": [\n  ' + ",\n  ".join(map(json.dumps, rows)) + "\n ]")
-        return "{\n" + ",\n".join(lines) + "\n}\n"
+            rows = []
+            for exponents, coefficients in zip(of.exponents, of.coefficients, strict=True):
+                digits = [float(f"{c:.6g}") for c in coefficients]
+                rows.append(json.dumps([*map(int, exponents), *digits]))
+            tables.append(f' "{name}": [\n  ' + ",\n  ".join(rows) + "\n ]")
+        return "{\n" + ",\n".join(tables) + "\n}\n"
 
     @classmethod
     def from_json(cls, text: str) -> ElasticModel:

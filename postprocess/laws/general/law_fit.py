@@ -1,7 +1,8 @@
 """The general law from solved joints: its elastic polynomials, and what yielding adds, by least
 squares and likelihood.
 
-    mpirun -n 2 archord sweep scenes/law.sweep.toml
+    python3 -m archord.studies.law_design > law.sweep.toml
+    mpirun -n 2 archord sweep law.sweep.toml
     python3 -m archord.postprocess.laws.general.law_fit runs/law
 
 A joint that yields is solved with one step between nodes, and with two where yielding begins early;
@@ -57,13 +58,11 @@ from archord.postprocess.laws.general.yield_model import (
 from archord.postprocess.run import Run
 from archord.report.table import Table
 
-_TERMS = {
-    "F": (4, 5),
-    "peak": (2, 4),
-    "angle": (2, 4),
-}  # degree in the joint's numbers, and in x/(1 + x)
+# degree in the joint's numbers, and in x/(1 + x)
+_TERMS = {"F": (4, 5), "peak": (2, 4), "angle": (2, 4)}
 EARLY = 0.6  # s below which steps count
-_LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
+SOFT = 0.5  # p m of soft pins in plane strain
+_LAST = 3.0  # x that the law reaches
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
 # Fits of a way back begin with these travels, at most that share of the largest, and toes. In plane
@@ -77,31 +76,27 @@ _LITTLE = 0.03  # of the largest force, below which points on the way back count
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
 _LAW = NODES[1:]
-_NOTHING: Array = np.zeros((1, len(_LAW)))
+
+Numbers = tuple[float, ...]  # of a joint, as `joint_numbers` has them
 
 
 def exponents(degree: int) -> Array:
     """Those of all products of four numbers up to ``degree``, of which the clearance, whose
     influence is small, counts twice."""
-    found = [
-        e for e in product(range(degree + 1), repeat=4) if e[0] + e[1] + e[2] + 2 * e[3] <= degree
-    ]
-    return np.array(found, float)
+    all_products = np.array([*product(range(degree + 1), repeat=4)], float)
+    return all_products[all_products @ [1, 1, 1, 2] <= degree]
 
 
 def fit_elastic(joints: Elastic, x: Array, y: Array, peak: Array, angle: Array) -> ElasticModel:
     """The model of elastic ``joints`` ``(m,)`` from ``y``, p0 R/(E* dR) and eps ``(m, k)`` at ``x``
     ``(k,)``, by least squares of relative errors of y, and of the two others."""
     F = np.pi * x / y + np.log(y / (1 + y))
-    felt = 1 / (np.pi * x / y - 1 / (1 + y))  # -d(ln y)/dF
+    F_weights = 1 / (np.pi * x / y - 1 / (1 + y))  # -d(ln y)/dF
     root = np.sqrt(y)
-    data = {
-        "F": (F, felt),
-        "peak": (peak / root, root / peak),
-        "angle": (angle / root, root / angle),
-    }
     return ElasticModel(
-        **{name: _polynomials(joints, x, *data[name], *_TERMS[name]) for name in data}
+        F=_polynomials(joints, x, F, F_weights, *_TERMS["F"]),
+        peak=_polynomials(joints, x, peak / root, root / peak, *_TERMS["peak"]),
+        angle=_polynomials(joints, x, angle / root, root / angle, *_TERMS["angle"]),
     )
 
 
@@ -109,18 +104,21 @@ def _polynomials(
     joints: Elastic, x: Array, values: Array, weights: Array, degree: int, order: int
 ) -> Polynomials:
     powers = exponents(degree)
-    shapes, series = products(joints, powers), np.polynomial.chebyshev.chebvander(depth(x), order)
-    design = shapes[:, None, :, None] * series[None, :, None, :] * weights[:, :, None, None]
-    found = np.linalg.lstsq(
-        design.reshape(values.size, -1), (values * weights).ravel(), rcond=1e-13
-    )[0]
+    shapes = products(joints, powers)
+    series = np.polynomial.chebyshev.chebvander(depth(x), order)
+    design = np.einsum("mt,kc,mk->mktc", shapes, series, weights).reshape(values.size, -1)
+    found, *_ = np.linalg.lstsq(design, (values * weights).ravel(), rcond=1e-13)
     return Polynomials(powers, found.reshape(len(powers), -1))
 
 
 @dataclass(frozen=True)
 class NodeRun:
-    """Of a run the ends of its stages: ``x``, y, p0 R/(E* dR) and eps ``(n, 4)``, of which the
-    first ``loading`` are first loading; ``steps`` lie between two."""
+    """The ends of a run's stages.
+
+    - ``nodes`` ``(n, 4)``: x, y, p0 R/(E* dR) and eps, of which the first ``loading`` are first
+      loading
+    - ``steps``: how many lie between two nodes
+    """
 
     nodes: Array
     steps: int
@@ -130,10 +128,8 @@ class NodeRun:
         """That of a run which has all its steps."""
         each = curve.scene.load.stage_steps
         unit = curve.E_star * curve.dR
-        table = np.column_stack(
-            [curve.delta / curve.dR, curve.P / unit, curve.p0 * curve.R / unit, curve.eps]
-        )
-        return cls(table[np.cumsum(each) - 1], each[0])
+        columns = [curve.delta / curve.dR, curve.P / unit, curve.p0 * curve.R / unit, curve.eps]
+        return cls(np.column_stack(columns)[np.cumsum(each) - 1], each[0])
 
     @property
     def loading(self) -> int:
@@ -150,7 +146,7 @@ class NodeRun:
         return rest[: int(rises[0]) + 1] if len(rises) else rest
 
 
-def solved_joints(curves: Iterable[RunCurve]) -> dict[tuple[float, ...], list[NodeRun]]:
+def solved_joints(curves: Iterable[RunCurve]) -> dict[Numbers, list[NodeRun]]:
     """The runs that are complete by the numbers of their joints, as `joint_numbers` has them."""
     found = defaultdict(list)
     for curve in curves:
@@ -161,23 +157,31 @@ def solved_joints(curves: Iterable[RunCurve]) -> dict[tuple[float, ...], list[No
     return dict(found)
 
 
+def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
+    """The joints that are solved as far as the law needs them, of the sweep in ``folder``."""
+    runs = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
+    solved = solved_joints(Run(run).curve for run in runs)
+    return {numbers: nodes for numbers, nodes in solved.items() if complete(numbers, nodes)}
+
+
 def fit_law(
-    solved: dict[tuple[float, ...], list[NodeRun]],
+    solved: dict[Numbers, list[NodeRun]],
 ) -> tuple[ElasticModel, SolvedJoints, dict[str, Any]]:
     """The elastic model, the joints that yield as the processes take them, and the processes'
     kernels by side."""
-    elastic = {
-        numbers: runs[0].nodes for numbers, runs in solved.items() if np.isinf(numbers[5:]).all()
-    }
-    tables = np.stack([*elastic.values()])
-    model = fit_elastic(
-        Elastic(*np.array([*elastic]).T[1:5]), tables[0, :, 0], *np.moveaxis(tables[..., 1:], -1, 0)
-    )
-    others = {numbers: runs for numbers, runs in solved.items() if np.isfinite(numbers[5:]).any()}
-    alone = {numbers: runs for numbers, runs in others.items() if PIN_ALONE in sides_of(numbers)}
+    elastic: dict[Numbers, Array] = {}
+    yielding: dict[Numbers, list[NodeRun]] = {}
+    for numbers, runs in solved.items():
+        if np.isinf(numbers[5:]).all():
+            elastic[numbers] = runs[0].nodes
+        else:
+            yielding[numbers] = runs
+    x, *quantities = np.moveaxis(np.array([*elastic.values()]), -1, 0)
+    model = fit_elastic(Elastic(*np.array([*elastic]).T[1:5]), x[0], *quantities)
+    alone = {numbers: runs for numbers, runs in yielding.items() if PIN_ALONE in sides_of(numbers)}
     pins = yielding_joints(model, alone)
     kernels = {PIN_ALONE: fit_side(pins, PIN_ALONE)}
-    joints = yielding_joints(model, others, side_model(pins, PIN_ALONE, kernels[PIN_ALONE]))
+    joints = yielding_joints(model, yielding, side_model(pins, PIN_ALONE, kernels[PIN_ALONE]))
     return model, joints, kernels | {side: fit_side(joints, side) for side in SIDES[1:]}
 
 
@@ -194,7 +198,7 @@ def first_loading(runs: list[NodeRun]) -> Array:
 
 def yielding_joints(
     model: ElasticModel,
-    solved: dict[tuple[float, ...], list[NodeRun]],
+    solved: dict[Numbers, list[NodeRun]],
     pins: YieldModel | None = None,
 ) -> SolvedJoints:
     """The joints that yield relative to ``model``, with those digits that yield_model.npz keeps; of
@@ -202,38 +206,31 @@ def yielding_joints(
     rows: list[tuple[Any, ...]] = []
     back: list[tuple[float, ...]] = []
     for numbers, runs in solved.items():
-        joint, yielding = (
-            Elastic(*np.array(numbers[1:5])[:, None]),
-            Yielding(*np.array(numbers[5:])[:, None]),
-        )
-        nodes, dense = first_loading(runs), model.at(joint, _FINE)
-        base = model.at(joint, nodes[:, 0])
-        total = np.log(nodes[:, 1:].T / np.stack([base.y[0], base.peak[0], base.angle[0]]))
+        joint = Elastic(*numbers[1:5])
+        yielding = Yielding(*numbers[5:])
+        x, *quantities = first_loading(runs).T
+        base = model.at(joint, x)
+        total = np.log(np.divide(quantities, [base.y, base.peak, base.angle]))
         plane = "strain" if numbers[0] else "stress"
-        ways = [way_told(plane, dense, run) for run in runs if run.steps == 1 and len(run.back) > 2]
+        elastic = model.at(joint, _FINE)
+        unloaded = [run for run in runs if run.steps == 1 and len(run.back) > 2]
+        ways = [way_told(plane, elastic, run) for run in unloaded]
         for side in sides_of(numbers):
-            curves, of_pins = total, _NOTHING
+            curves = total
+            of_pins: Array = np.zeros(len(_LAW))
             if side == PIN_WEAKER and pins is not None:
-                own, fine = (
-                    total_loss({PIN_ALONE: pins}, model, joint, yielding, x)
-                    for x in (nodes[:, 0], _LAW)
-                )
-                curves, of_pins = (
-                    total - np.concatenate([own.force, own.peak, own.angle]),
-                    fine.peak,
-                )
-            (x0,), (lost,) = onset(side, model, joint, yielding, _LAW, of_pins)
+                own = total_loss({PIN_ALONE: pins}, model, joint, yielding, x)
+                curves = total - [own.force, own.peak, own.angle]
+                of_pins = total_loss({PIN_ALONE: pins}, model, joint, yielding, _LAW).peak
+            x0, lost = onset(side, model, joint, yielding, _LAW, of_pins)
             back += [(len(rows), deepest / x0, *told) for deepest, *told in ways]
-            rows.append(
-                (SIDES.index(side), numbers, x0, lost, *_at_multiples(nodes[:, 0] / x0, curves))
-            )
-    index, given, onsets, lost, counts, losses = (
-        np.array(column) for column in zip(*rows, strict=True)
-    )
+            rows.append((SIDES.index(side), numbers, x0, lost, *_at_multiples(x / x0, curves)))
+    columns = (np.array(column) for column in zip(*rows, strict=True))
+    indices, given, onsets, of_others, counts, losses = columns
     force, peak, angle = np.moveaxis(losses, 1, 0)
     back.sort(key=lambda way: np.isnan(way[-1]))
     return SolvedJoints(
-        index, given, onsets, lost, counts, force, peak, angle, np.array(back)
+        indices, given, onsets, of_others, counts, force, peak, angle, np.array(back)
     ).stored()
 
 
@@ -244,7 +241,8 @@ def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
     count = int(np.searchsorted(MULTIPLES, u[-1] * _SPACING)) if known.sum() > 1 else 0
     curves = np.full((3, len(MULTIPLES)), np.nan)
     if count:
-        at, of = np.log([ELASTIC_BELOW, *u[known]]), np.insert(lost[:, known], 0, 0.0, axis=1)
+        at = np.log([ELASTIC_BELOW, *u[known]])
+        of = np.insert(lost[:, known], 0, 0.0, axis=1)
         spline = CubicSpline(at, of, axis=1, bc_type=((1, np.zeros(3)), "not-a-knot"))
         curves[:, :count] = spline(np.log(MULTIPLES[:count]))
     return count, curves
@@ -254,30 +252,30 @@ def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ..
     """Of a way back its deepest x, the travel and toe of `Loss` that fit best by least squares,
     which count more where little is left, and over the largest force how far P is from that way,
     rms, and at the first point of reloading, nan without one."""
-    (deepest, largest), base = run.back[0], (_FINE, elastic.y[0], elastic.slope[0])
-    unit = deepest * largest / np.interp(deepest, _FINE, elastic.y[0])
+    deepest, largest = run.back[0]
+    unit = deepest * largest / np.interp(deepest, _FINE, elastic.y)
 
     def off(way: Array, points: Array) -> Array:
-        return (
-            way_back(*base, points[:, 0] - deepest, largest, *(way * unit)) - points[:, 1]
-        ) / largest
+        below = points[:, 0] - deepest
+        y = way_back(_FINE, elastic.y, elastic.slope, below, largest, *(way * unit))
+        return (y - points[:, 1]) / largest
 
-    weights, most = 1 / (_LITTLE + run.back[:, 1] / largest), min(1.5, deepest / unit)
-    starts = [[min(travel, share * most), toe] for travel, share, toe in _WAYS[plane]]
-    bounds = [0.3, 0.0], [most, 1.0]
+    weights = 1 / (_LITTLE + run.back[:, 1] / largest)
+    most = min(1.5, deepest / unit)
     tries = [
-        least_squares(lambda way: weights * off(way, run.back), start, bounds=bounds, x_scale=0.1)
-        for start in starts
+        least_squares(
+            lambda way: weights * off(way, run.back),
+            [min(travel, share * most), toe],
+            bounds=([0.3, 0.0], [most, 1.0]),
+            x_scale=0.1,
+        )
+        for travel, share, toe in _WAYS[plane]
     ]
-    found = min(tries, key=lambda way: way.cost).x
-    again = off(found, run.nodes[run.loading + len(run.back) - 1 :, :2][:1])
+    travel, toe = found = min(tries, key=lambda way: way.cost).x
     rms = np.sqrt(np.mean(off(found, run.back[1:]) ** 2))
-    return (
-        float(deepest),
-        *map(float, found),
-        float(rms),
-        float(abs(again[0])) if len(again) else np.nan,
-    )
+    reloaded = run.nodes[run.loading + len(run.back) - 1 :, :2]
+    again = abs(off(found, reloaded[:1])[0]) if len(reloaded) else np.nan
+    return tuple(map(float, (deepest, travel, toe, rms, again)))
 
 
 def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
@@ -292,30 +290,26 @@ def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
         kernel = fit_kernel(points, of, _STARTS[name])
         found["kernels"][name] = {"lengths": kernel.lengths.tolist(), "noise": kernel.noise}
         off, deviation = Process(kernel, points, of).left_out()
-        part = slice(1) if name == "back" else slice(None)  # errors of travel
-        found["spread"][name] = float(
-            f"{np.nanquantile(np.abs(off / deviation)[:, part], 0.9):.3g}"
-        )
+        errors = np.abs(off / deviation)
+        if name == "back":  # errors of travel
+            errors = errors[:, :1]
+        found["spread"][name] = float(f"{np.nanquantile(errors, 0.9):.3g}")
     return found
 
 
 def fit_kernel(points: Array, values: Array, noise: float) -> Kernel:
     """The kernel of the largest likelihood, in four digits."""
 
-    def kernel(logarithms: Array) -> Kernel:
-        *lengths, noise = (float(f"{value:.4g}") for value in np.exp(logarithms))
-        return Kernel(np.array(lengths), noise)
-
     def cost(logarithms: Array) -> float:
-        return -Process(
-            Kernel(np.exp(logarithms[:-1]), np.exp(logarithms[-1])), points, values
-        ).likelihood
+        *lengths, noise = np.exp(logarithms)
+        return -Process(Kernel(np.array(lengths), noise), points, values).likelihood
 
-    start = np.log([*_LENGTHS[: points.shape[1]], noise])
-    bounds = [(np.log(0.1), np.log(60.0))] * points.shape[1] + [(np.log(1e-7), np.log(0.1))]
-    return kernel(
-        minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x
-    )
+    inputs = points.shape[1]
+    start = np.log([*_LENGTHS[:inputs], noise])
+    bounds = np.log([(0.1, 60.0)] * inputs + [(1e-7, 0.1)])
+    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x
+    *lengths, noise = (float(f"{value:.4g}") for value in np.exp(found))
+    return Kernel(np.array(lengths), noise)
 
 
 def rms_largest(errors: Array) -> str:
@@ -332,13 +326,18 @@ def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
     for side in SIDES:
         off, deviation = side_model(joints, side, kernels[side]).processes["force"].left_out()
         chosen = joints.rows(side)
-        x, own = MULTIPLES * joints.x0[chosen, None], joints.numbers[chosen]
-        soft = (own[:, 0] * own[:, 1] * own[:, 2] > SOFT)[:, None] & (x <= _LAST)
-        cells = []
-        for part in (~soft & (x >= 0.1) & (x <= 2), ~soft & (x > 2) & (x <= _LAST), soft):
-            cells.append(rms_largest(100 * off[part & ~np.isnan(off)]))
+        x = MULTIPLES * joints.x0[chosen, None]
+        strain, p, m, *_ = joints.numbers[chosen].T[..., None]
+        known = ~np.isnan(off)
+        soft = strain * p * m > SOFT
+        parts = [
+            ~soft & (x >= 0.1) & (x <= 2),
+            ~soft & (x > 2) & (x <= _LAST),
+            soft & (x <= _LAST),
+        ]
+        cells = [rms_largest(100 * off[part & known]) for part in parts]
         inside = np.abs(off) <= kernels[side]["spread"]["force"] * deviation
-        table.add(side, len(chosen), *cells, f"{inside[~np.isnan(off)].mean():.0%}")
+        table.add(side, len(chosen), *cells, f"{inside[known].mean():.0%}")
     return table
 
 
@@ -346,13 +345,7 @@ def main(folder: Path | None) -> None:
     """Fit the law to the sweep in ``folder``, if one is given, and write its files beside this one;
     print how good it is."""
     if folder:
-        finished = (
-            run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists()
-        )
-        solved = solved_joints(Run(run).curve for run in finished)
-        model, joints, kernels = fit_law(
-            {numbers: runs for numbers, runs in solved.items() if complete(numbers, runs)}
-        )
+        model, joints, kernels = fit_law(solved_in(folder))
         TABLE.write_text(model.to_json(), encoding="utf-8")
         KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
         arrays: dict[str, Any] = joints.compact()
@@ -360,7 +353,7 @@ def main(folder: Path | None) -> None:
     print(error_table(stored_joints(), json.loads(KERNELS.read_text(encoding="utf-8"))).markdown())
 
 
-def complete(numbers: tuple[float, ...], runs: list[NodeRun]) -> bool:
+def complete(numbers: Numbers, runs: list[NodeRun]) -> bool:
     """Whether the runs of a joint reach 3 dR, in two step sizes where yielding begins early."""
     reached = {run.steps for run in runs if run.nodes[:, 0].max() >= _LAST - 0.05}
     return 1 in reached and (2 in reached or min(numbers[5:]) >= EARLY)

@@ -36,13 +36,8 @@ KERNELS = Path(__file__).parent / "yield_model.json"
 MULTIPLES = np.array([0.95, 1.05, 1.15, 1.27, 1.4, 1.55, 1.75, 2, 2.3, 2.65, 3.05, 3.5, 4.1, 4.8, 5.7, 6.8, 8.2, 10,
                       12.3, 15.2, 19, 24, 30])  # fmt: skip
 PIN_ALONE, PIN_WEAKER = "strain pin alone", "strain pin weaker"
-SIDES = (
-    PIN_ALONE,
-    PIN_WEAKER,
-    "strain block",
-    "stress pin",
-    "stress block",
-)  # plane, and the body that yields first
+# plane, and the body that yields first
+SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
 # Parts by which the other body is stronger, within which it matters by how much: beyond the last it
 # stays elastic. In plane stress the first is that of a contact at the largest pressure of plastic
@@ -56,68 +51,63 @@ _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
 
 
 class Yielding(NamedTuple):
-    """What decides joints that yield, each ``(m,)``, beside `Elastic`: ``s = sigY R/(E* dR)`` of
-    pin and block, infinite of a body that stays elastic."""
+    """What decides a joint that yields, or ``(m,)`` joints, beside `Elastic`: ``s = sigY R/(E*
+    dR)`` of pin and block, infinite of a body that stays elastic."""
 
-    pin: Array
-    block: Array
+    pin: Any
+    block: Any
 
-    def of(self, side: str) -> Array:
+    def of(self, side: str) -> Any:
         """s of the body from whose first yield one of `SIDES` tells."""
         return self.pin if side in (PIN_ALONE, "stress pin") else self.block
 
 
 class Loss(NamedTuple):
-    """What yielding does at ``x`` ``(m, k)``: ``ln(P/P_el)`` with its slope by x and its error,
-    ``ln(p0/p0_el)``, ``ln(eps/eps_el)``, ``travel`` back and its ``toe``, and the error of P on
-    that way over the largest P; errors are those of 9 in 10 joints."""
+    """What yielding does to a joint at ``x`` ``(k,)``; errors are the errors of 9 in 10 joints."""
 
-    force: Array
-    slope: Array
-    deviation: Array
-    peak: Array
-    angle: Array
-    travel: Array
+    force: Array  # ln(P/P_el)
+    slope: Array  # its slope by x
+    deviation: Array  # its error
+    peak: Array  # ln(p0/p0_el)
+    angle: Array  # ln(eps/eps_el)
+    travel: Array  # the way back
     toe: Array
-    way_error: Array
+    way_error: Array  # of P on the way back, over the largest P
 
 
 def first_yield(
-    model: ElasticModel, strain: bool, joints: Elastic, s: Array, left: Array | float = 1.0
+    model: ElasticModel, strain: bool, joint: Elastic, s: npt.ArrayLike, left: Array | float = 1.0
 ) -> Array:
-    """About the x ``(m,)`` of first yield: where the elastic p0, times what is ``left`` of it, is
-    ``g`` sigY, with g of Hertz's contact at first and less in wide ones; at the end of the range or
-    beyond for a larger s, infinite for an infinite one."""
-    over = np.maximum.accumulate(
-        left * model.at(joints, _GRID).peak / _pressure_at_yield(strain, _GRID), axis=1
-    )
-    found = [
-        np.interp(np.log(own), np.log(row), np.log(_GRID)) for own, row in zip(s, over, strict=True)
-    ]
+    """About the x of first yield by ``s`` (any shape): where the elastic p0, times what is ``left``
+    of it, is ``g`` sigY, with g of Hertz's contact at first and less in wide ones; at the end of
+    the range or beyond for a larger s, infinite for an infinite one."""
+    pressure = left * model.at(joint, _GRID).peak / _pressure_at_yield(strain, _GRID)
+    over = np.maximum.accumulate(pressure)
+    found = np.interp(np.log(s), np.log(over), np.log(_GRID))
     return np.where(np.isfinite(s), np.exp(found), np.inf)
 
 
 def onset(
-    side: str, model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array, lost: Array
-) -> tuple[Array, Array]:
-    """About the x ``(m,)`` of first yield of the body of one of `SIDES`, and how far
-    ``ln(p0/p0_el)`` is lost ``(m,)`` to a weaker pin some way beyond; ``lost`` ``(m, k)`` is that
-    at ``x`` ``(k,)``."""
-    strain, s = side.startswith("strain"), yielding.of(side)
+    side: str, model: ElasticModel, joint: Elastic, yielding: Yielding, x: Array, lost: Array
+) -> tuple[float, float]:
+    """About the x of first yield of the body of one of `SIDES`, and how far ``ln(p0/p0_el)`` is
+    lost to a weaker pin some way beyond; ``lost`` ``(k,)`` is the loss at ``x`` ``(k,)``."""
+    strain = side.startswith("strain")
+    s = yielding.of(side)
     if side != PIN_WEAKER:
-        return first_yield(model, strain, joints, s), np.zeros(len(s))
-    left = np.stack([np.exp(np.interp(_GRID, x, row)) for row in lost]) * _GRID / 0.7
-    x0 = first_yield(model, strain, joints, s, left**_FELT)
-    return x0, np.array([np.interp(_DEEPER * at, x, row) for at, row in zip(x0, lost, strict=True)])
+        return float(first_yield(model, strain, joint, s)), 0.0
+    left = np.exp(np.interp(_GRID, x, lost)) * _GRID / 0.7
+    x0 = float(first_yield(model, strain, joint, s, left**_FELT))
+    return x0, float(np.interp(_DEEPER * x0, x, lost))
 
 
 def _pressure_at_yield(strain: bool, x: Array) -> Array:
     return 0.95 + (0.5 if strain else 0.12) * np.exp(-x / 0.35)
 
 
-def features(side: str, joints: Elastic, yielding: Yielding, lost: Array) -> Array:
-    """The inputs of the process of a side ``(m, d)``, each of a size of about one; the last ones
-    tell how much stronger the other body is, and what is ``lost`` ``(m,)`` to it (see `onset`)."""
+def features(side: str, joints: Elastic, yielding: Yielding, lost: npt.ArrayLike) -> Array:
+    """The inputs of the process of a side ``(..., d)``, each of a size of about one; the last ones
+    tell how much stronger the other body is, and what is ``lost`` to it (see `onset`)."""
     p, m, n, clearance = joints
     s = yielding.of(side)
     inputs = [p, p * m, (1 - p) * n, np.log(clearance / 0.005) / 1.5, np.log(s)]
@@ -125,18 +115,22 @@ def features(side: str, joints: Elastic, yielding: Yielding, lost: Array) -> Arr
         inputs += [np.log(yielding.pin / s), lost]
     elif side != PIN_ALONE:
         share = s / (yielding.block if side == "stress pin" else yielding.pin)
-        inputs += [np.minimum((1 - share) / within, 1.0) for within in _STRONGER[side.split()[0]]]
+        plane = side.split()[0]
+        inputs += [np.minimum((1 - share) / within, 1.0) for within in _STRONGER[plane]]
     return np.stack(inputs, axis=-1)
 
 
 @dataclass(frozen=True)
 class YieldModel:
-    """The processes of a ``side``: ``inputs`` ``(n, d)`` of its joints, from the one known to most
-    `MULTIPLES` down, and their curves ``force``, ``peak``, ``angle`` ``(n, multiples)``, nan beyond
-    what is known; ``back_inputs`` ``(k, d + 1)``, of which the last is ln u of the deepest point,
-    and ``back`` ``(k, 4)``, the last columns of `SolvedJoints.back`. ``kernels`` by the names of
-    `processes`, and ``spread``, the factors on standard deviations below which 9 in 10 errors
-    are."""
+    """The processes of a ``side``.
+
+    - ``inputs`` ``(n, d)``: `features` of its joints, from the one known to most `MULTIPLES` down
+    - ``force``, ``peak``, ``angle`` ``(n, multiples)``: their curves, nan beyond what is known
+    - ``back_inputs`` ``(k, d + 1)``: features, and ln u of the deepest point
+    - ``back`` ``(k, 4)``: the last columns of `SolvedJoints.back`
+    - ``kernels``: by the names of `processes`
+    - ``spread``: factors on standard deviations below which 9 in 10 errors are
+    """
 
     side: str
     inputs: Array
@@ -158,38 +152,36 @@ class YieldModel:
             "back": Process(self.kernels["back"], self.back_inputs, self.back - [1, 0, 0, 0]),
         }
 
-    def at(self, inputs: Array, x0: Array, x: Array) -> Loss:
-        """What yielding does to joints with these `features`, of which ``x0`` ``(m,)`` is about
+    def at(self, inputs: Array, x0: float, x: Array) -> Loss:
+        """What yielding does to a joint with these `features` ``(d,)``, of which ``x0`` is about
         first yield, at ``x`` ``(k,)``; of side `PIN_WEAKER` what that of the block adds, but for
         the way back."""
-        u = np.log(x / x0[:, None])
-        (force, deviation), (shape, _) = (
-            self.processes[name].predict(inputs) for name in ("force", "shape")
-        )
-        rows = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=2)
-        found = np.stack(
-            [
-                _between(row, own, float(x[-1] / at))
-                for row, own, at in zip(rows, u, x0, strict=True)
-            ]
-        )
-        deep = np.concatenate([np.repeat(inputs, len(x), axis=0), u.reshape(-1, 1)], axis=1)
+        u = np.log(x / x0)
+        force, deviation = self.processes["force"].predict(inputs[None])
+        shape, _ = self.processes["shape"].predict(inputs[None])
+        nodes = np.concatenate([force, *np.split(shape, 2, axis=1), deviation]).T
+        force, slope, peak, angle, deviation = _between(nodes, u, x[-1] / x0).T
+        deep = np.column_stack([np.tile(inputs, (len(x), 1)), u])
         way, uncertain = self.processes["back"].predict(deep)
         travel, toe, misfit, again = way.T
-        error = np.linalg.norm(
-            [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again], axis=0
+        errors = [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again]
+        return Loss(
+            force=force,
+            slope=slope / x,
+            deviation=self.spread["force"] * deviation,
+            peak=peak,
+            angle=angle,
+            travel=1 + travel,
+            toe=toe,
+            way_error=np.linalg.norm(errors, axis=0),
         )
-        force, slope, peak, angle, deviation = np.moveaxis(found, -1, 0)
-        back = (part.reshape(u.shape) for part in (1 + travel, toe, error))
-        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle, *back)
 
 
-def loss(side: str, model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array) -> Loss:
-    """What yielding does to ``joints`` of one side at ``x`` ``(k,)``, with the processes that come
+def loss(side: str, model: ElasticModel, joint: Elastic, yielding: Yielding, x: Array) -> Loss:
+    """What yielding does to a ``joint`` of one side at ``x`` ``(k,)``, with the processes that come
     with archord."""
-    return total_loss(
-        {name: yield_model(name) for name in needed(side)}, model, joints, yielding, x
-    )
+    models = {name: yield_model(name) for name in needed(side)}
+    return total_loss(models, model, joint, yielding, x)
 
 
 def needed(side: str) -> tuple[str, ...]:
@@ -200,27 +192,29 @@ def needed(side: str) -> tuple[str, ...]:
 def total_loss(
     models: Mapping[str, YieldModel],
     model: ElasticModel,
-    joints: Elastic,
+    joint: Elastic,
     yielding: Yielding,
     x: Array,
 ) -> Loss:
-    """The sum of what ``models`` tell at ``x``; each begins where its body yields."""
-    none = np.zeros((len(joints.p), len(x)))
+    """The sum of what ``models`` tell at ``x`` ``(k,)``; each begins where its body yields."""
+    none = np.zeros(len(x))
     total = Loss(none, none, none, none, none, none + 1, none, none)
     for side, told in models.items():
-        x0, lost = onset(side, model, joints, yielding, x, total.peak)
-        some = ELASTIC_BELOW * x0 < x[-1]
-        if not some.any():
+        x0, lost = onset(side, model, joint, yielding, x, total.peak)
+        if not ELASTIC_BELOW * x0 < x[-1]:
             continue
-        own = told.at(features(side, joints, yielding, lost)[some], x0[some], x)
-        begun = np.clip(np.log(x / (ELASTIC_BELOW * x0[some, None])) / 0.2, 0.0, 1.0)
-        found = Loss(*(values.copy() for values in total))
-        for name in ("force", "slope", "peak", "angle"):
-            getattr(found, name)[some] += getattr(own, name)
-        found.deviation[some] = np.hypot(total.deviation[some], own.deviation)
-        for name in ("travel", "toe", "way_error"):
-            getattr(found, name)[some] += begun * (getattr(own, name) - getattr(total, name)[some])
-        total = found
+        own = told.at(features(side, joint, yielding, lost), x0, x)
+        begun = np.clip(np.log(x / (ELASTIC_BELOW * x0)) / 0.2, 0.0, 1.0)
+        total = Loss(
+            force=total.force + own.force,
+            slope=total.slope + own.slope,
+            deviation=np.hypot(total.deviation, own.deviation),
+            peak=total.peak + own.peak,
+            angle=total.angle + own.angle,
+            travel=total.travel + begun * (own.travel - total.travel),
+            toe=total.toe + begun * (own.toe - total.toe),
+            way_error=total.way_error + begun * (own.way_error - total.way_error),
+        )
     return total
 
 
@@ -228,26 +222,30 @@ def _between(nodes: Array, u: Array, most: float) -> Array:
     """The first of four columns of ``nodes`` ``(multiples, 4)`` at ``ln(x/x0) = u`` ``(k,)``, its
     slope by u, and the others ``(k, 5)``: smooth between nodes, of which only those up to ``most``
     x0 and one beyond are known."""
-    known = int(np.searchsorted(MULTIPLES, most)) + 1
+    known = np.searchsorted(MULTIPLES, most) + 1
     at = np.log([ELASTIC_BELOW, *MULTIPLES[:known]])
-    spline = CubicSpline(
-        at,
-        np.concatenate([np.zeros((1, 4)), nodes[:known]]),
-        bc_type=((1, np.zeros(4)), "not-a-knot"),
-    )
-    values = np.insert(spline(u), 1, spline(u, 1)[:, 0], axis=1)
-    values[:, 4] = np.interp(u, at, [0.0, *nodes[:known, 3]])
-    return np.where(u[:, None] > at[0], values, 0.0)
+    values = np.insert(nodes[:known], 0, 0.0, axis=0)
+    spline = CubicSpline(at, values, bc_type=((1, np.zeros(4)), "not-a-knot"))
+    force, peak, angle, _ = spline(u).T
+    deviation = np.interp(u, at, values[:, 3])
+    found = np.stack([force, spline(u, 1)[:, 0], peak, angle, deviation], axis=1)
+    return np.where(u[:, None] > at[0], found, 0.0)
 
 
 @dataclass(frozen=True)
 class SolvedJoints:
-    """Joints that yield, ``(n, ...)``, as yield_model.npz has them: ``side`` is the index in
-    `SIDES` of the process that a row is for (joints of like bodies have two), ``numbers`` are plane
-    (1: strain), p, m, n, dR/R, s of pin and of block; ``x0`` and ``lost`` are those of `onset`;
-    ``count`` how many `MULTIPLES` are known; ``force``, ``peak`` and ``angle`` there; ``back``
-    ``(k, 6)`` the row of a joint, u of its deepest point, its travel back and toe, and over the
-    largest force how far P is from that way, rms, and on reloading; those that tell of it first."""
+    """Joints that yield, ``(n, ...)``, as yield_model.npz has them. Joints of like bodies have two
+    rows.
+
+    - ``side`` ``(n,)``: the index in `SIDES` of the process that a row is for
+    - ``numbers`` ``(n, 7)``: plane (1: strain), p, m, n, dR/R, s of pin and of block
+    - ``x0``, ``lost`` ``(n,)``: what `onset` tells
+    - ``count`` ``(n,)``: how many `MULTIPLES` are known
+    - ``force``, ``peak``, ``angle`` ``(n, multiples)``: the curves there
+    - ``back`` ``(k, 6)``: the row of a joint, u of its deepest point, its travel back and toe, and
+      over the largest force how far P is from that way, rms, and on reloading; those that tell of
+      reloading first
+    """
 
     side: Array
     numbers: Array
@@ -267,9 +265,8 @@ class SolvedJoints:
         """Arrays for a small file: curves in steps of `_STEP`."""
         found = {name: np.asarray(value, np.float32) for name, value in vars(self).items()}
         for name in _CURVES:
-            found[name] = np.where(
-                np.isnan(found[name]), _UNKNOWN, np.round(found[name] / _STEP)
-            ).astype(np.int16)
+            steps = np.round(found[name] / _STEP)
+            found[name] = np.where(np.isnan(steps), _UNKNOWN, steps).astype(np.int16)
         return found
 
     def rows(self, side: str) -> npt.NDArray[np.intp]:
@@ -284,24 +281,26 @@ class SolvedJoints:
         curves = {name: np.where(beyond, np.nan, getattr(self, name)[chosen]) for name in _CURVES}
         own = self.numbers[chosen].T
         inputs = features(side, Elastic(*own[1:5]), Yielding(*own[5:]), self.lost[chosen])
-        row = np.full(len(self.numbers), -1)
-        row[chosen] = np.arange(len(chosen))
-        back = self.back[row[self.back[:, 0].astype(int)] >= 0]
-        back = back[back[:, 1] > ELASTIC_BELOW]
-        deep = np.column_stack([inputs[row[back[:, 0].astype(int)]], np.log(back[:, 1])])
-        return {"inputs": inputs, **curves, "back_inputs": deep, "back": back[:, 2:]}
+        place = np.full(len(self.numbers), -1)
+        place[chosen] = np.arange(len(chosen))
+        rows = place[self.back[:, 0].astype(int)]
+        u = self.back[:, 1]
+        told = (rows >= 0) & (u > ELASTIC_BELOW)
+        deep = np.column_stack([inputs[rows[told]], np.log(u[told])])
+        return {"inputs": inputs, **curves, "back_inputs": deep, "back": self.back[told, 2:]}
 
 
 def sides_of(numbers: Any) -> tuple[str, ...]:
     """The `SIDES` that a joint with these ``numbers`` (see `SolvedJoints`) belongs to, of which the
     first tells its law."""
     strain, *_, pin, block = numbers
-    plane, weaker = ("strain", PIN_WEAKER) if strain else ("stress", "stress pin")
     if strain and np.isinf(block):
         return (PIN_ALONE,)
+    block_weaker = "strain block" if strain else "stress block"
+    pin_weaker = PIN_WEAKER if strain else "stress pin"
     if np.isclose(pin, block, rtol=1e-4):
-        return f"{plane} block", weaker
-    return (weaker,) if pin < block else (f"{plane} block",)
+        return block_weaker, pin_weaker
+    return (pin_weaker,) if pin < block else (block_weaker,)
 
 
 def _numbers(compact: Mapping[str, Array]) -> dict[str, Array]:

@@ -313,8 +313,6 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
         "real.mo",
     ):
         assert export_curve(curve, tmp_path / name)
-    with pytest.raises(ValueError, match="several"):
-        export_curve(replace(curve, y=np.stack([curve.y, curve.y])), tmp_path / "law.h")
     with pytest.raises(ValueError, match="gaps in its tables cannot be exported: LOAD"):
         export_curve(replace(curve, y=np.full(61, np.nan)), tmp_path / "law.h")
     with pytest.raises(ValueError, match="does not rise"):

@@ -1,5 +1,5 @@
 """The table of a joint's law: continuity, slopes, inverse, the way back, first touch, units,
-several joints at once."""
+shapes."""
 
 from __future__ import annotations
 
@@ -88,21 +88,22 @@ def test_units_scale_and_nothing_else() -> None:
         np.testing.assert_allclose(mine * unit, theirs, rtol=1e-9, atol=1e-9 * unit)
 
 
-def test_several_joints_at_once_and_json() -> None:
-    """Tables of several joints give what each gives alone; JSON keeps every digit."""
-    curves = [yielding_curve(onset) for onset in (0.4, 0.8)]
-    names = [
-        name
-        for name in vars(curves[0])
-        if name not in ("x", "length", "force", "pressure", "about")
-    ]
-    both = replace(
-        curves[0], **{name: np.stack([getattr(curve, name) for curve in curves]) for name in names}
-    )
-    for deepest in (0.0, 2.0):
-        for row, curve in enumerate(curves):
-            np.testing.assert_array_equal(both.at(X, deepest).load[row], curve.at(X, deepest).load)
-    again = JointCurve.from_json(curves[0].to_json())
-    np.testing.assert_array_equal(again.at(X, 1.0).load, curves[0].at(X, 1.0).load)
+def test_json_keeps_every_digit() -> None:
+    curve = yielding_curve()
+    again = JointCurve.from_json(curve.to_json())
+    np.testing.assert_array_equal(again.at(X, 1.0).load, curve.at(X, 1.0).load)
     with pytest.raises(ValueError, match="no table"):
         JointCurve.from_json("{}")
+
+
+def test_any_shape_is_taken() -> None:
+    """Numbers, rows and tables of displacements, with one deepest displacement or one for each."""
+    curve = yielding_curve()
+    table = X[:12].reshape(3, 4)
+    deepest = np.array([[0.5], [1.0], [2.0]])
+    state = curve.at(table, deepest)
+    opens = curve.residual(deepest)
+    for row in range(3):
+        np.testing.assert_array_equal(state.load[row], curve.at(table[row], deepest[row, 0]).load)
+        assert opens[row, 0] == curve.residual(deepest[row, 0])
+    assert curve.at(1.0).load.shape == curve.displacement(0.1).shape == ()
