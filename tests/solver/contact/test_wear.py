@@ -19,6 +19,9 @@ from archord.solver.contact.law import (
     Quantity,
     Response,
 )
+from archord.solver.path.load_path import Position
+from archord.solver.path.mesh_order import MeshOrder
+from archord.solver.path.stepping import march
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
 from tests.solver.contact.test_tangent import assert_tangent_is_derivative
@@ -273,3 +276,25 @@ def test_a_law_knows_the_length_of_the_step():
         system.solve([load])
         found = system.drive_force("slide")
         assert found == pytest.approx(Viscous.eta * rate, rel=1e-2), load
+
+
+@pytest.mark.mpi
+def test_wear_goes_on_from_a_checkpoint(comm):
+    """The depth of every point comes back, and the path goes on as if it had not been left."""
+    before = rubbed(comm, Wear(0.05))
+    before.solve([1.0, 1.5])
+    at = before.equilibrium
+    history = MeshOrder(before).collect_history()
+    after = rubbed(comm, Wear(0.05))
+    MeshOrder(after).spread_history(history)
+    after.equilibrium.resume(1.5, at.state(), at.largest_reaction)
+    assert worn(after) == pytest.approx(worn(before), rel=1e-12)
+    path = after.load_path(Position(load=1.5, stride=0.5))
+    march(path, [2.0, 3.0])
+    before.solve([2.0, 3.0])
+    assert worn(after) == pytest.approx(worn(before), rel=1e-9)
+
+
+def worn(system: System) -> float:
+    """The worn volume."""
+    return system.contact.interface().quantities()["worn volume"][0]
