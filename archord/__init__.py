@@ -17,8 +17,10 @@ from archord.report.version import VERSION
 __version__ = VERSION
 
 if TYPE_CHECKING:
-    from archord.api import InputError, Problem, Run, Sweep, load, load_scene, solve
+    from archord.api import InputError, Run, Sweep, load, load_scene, solve
+    from archord.geometry.curve import RigidCircle
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+    from archord.geometry.meshes.formats.source import Mesh
     from archord.materials.elasticity import Elastic
     from archord.materials.finite import LargeStrain
     from archord.materials.hardening import (
@@ -30,15 +32,16 @@ if TYPE_CHECKING:
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
     from archord.postprocess.pictures.pictures import draw_run
-    from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Support
     from archord.scene.problem import ProblemScene
     from archord.scene.scene import Scene
+    from archord.solver.contact.coulomb import Coulomb
     from archord.solver.path.system import System
+    from archord.solver.problem import Body, Coupling, Interaction, Load, Problem, Support
 
 
 __all__ = [
-    "Body", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LargeStrain",
-    "LinearHardening", "Load", "Mesh", "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening",
+    "Body", "Coulomb", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LargeStrain",
+    "LinearHardening", "Load", "Mesh", "Problem", "ProblemScene", "RigidCircle", "Run", "Scene", "Support", "Sweep", "SwiftHardening",
     "System", "TabularHardening", "VoceHardening", "draw_run", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
@@ -55,8 +58,11 @@ _HOME = {
     ),
     "Scene": "archord.scene.scene",
     "ProblemScene": "archord.scene.problem",
+    "Mesh": "archord.geometry.meshes.formats.source",
+    "RigidCircle": "archord.geometry.curve",
+    "Coulomb": "archord.solver.contact.coulomb",
     **dict.fromkeys(
-        ("Body", "Coupling", "Interaction", "Load", "Mesh", "Support"), "archord.scene.parts"
+        ("Body", "Coupling", "Interaction", "Load", "Problem", "Support"), "archord.solver.problem"
     ),
 }
 

@@ -1,42 +1,88 @@
-"""archord from Python: load results, load scenes, solve them. The names are those of the package:
-``archord.load``."""
+"""archord from Python: load results, load scenes, solve problems and scenes. The names are those of
+the package: ``archord.load``."""
 
 from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from archord.output.folder import is_sweep
+from archord.output.folder import MESH, is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene import file as scene_file
 from archord.scene.errors import InputError, toml_value
 from archord.scene.faults import shortened
 from archord.scene.file import ABSENT, AnyScene
-from archord.scene.parts import Mesh
-from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.scene.scene import plain
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from archord.output.restart import Plan
+    from archord.solver.problem import Problem
+
 
 def load(folder: str | Path) -> Any:
-    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises
-    `InputError` for neither."""
+    """Load the results in a folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder of a run or of a sweep.
+
+    Returns
+    -------
+    Run or Sweep
+
+    Raises
+    ------
+    InputError
+        For a folder that is neither.
+
+    Examples
+    --------
+    >>> import archord
+    >>> try:
+    ...     archord.load("runs/nothing")
+    ... except archord.InputError as error:
+    ...     print(error)
+    runs/nothing: is not a folder; give the folder of a run or of a sweep.
+    """
     if not Path(folder).is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder of a run or of a sweep.")
     return Sweep(folder) if is_sweep(folder) else Run(folder)
 
 
 def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> AnyScene:
-    """Read a scene file with ``changes`` like ``{"joint.clearance": 0.01}``; None or "none" drops a
-    key. Raises `InputError`."""
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file.
+    changes : dict
+        Values by their keys, ``{"joint.clearance": 0.01}``; None or "none" drops a key.
+
+    Returns
+    -------
+    Scene or ProblemScene
+
+    Raises
+    ------
+    InputError
+        One sentence for each fault: file, key, value and what is allowed.
+
+    Examples
+    --------
+    >>> import archord
+    >>> scene = archord.load_scene("scenes/steel_pin.toml", {"load.steps": 5})
+    >>> len(scene.targets)
+    5
+    """
     given = (
         (key, ABSENT if value is None else toml_value(plain(value)))
         for key, value in (changes or {}).items()
@@ -44,46 +90,107 @@ def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> An
     return scene_file.load_scene(path, [f"{key}={value}" for key, value in given])
 
 
-def Problem(
-    mesh: Any,
+def solve(
+    problem: Problem | AnyScene | str | Path | Mapping[str, Any],
+    folder: str | Path,
     *,
-    bodies: Sequence[Any] = (),
-    loads: Sequence[Any] = (),
-    interactions: Sequence[Any] = (),
-    couplings: Sequence[Any] = (),
-    supports: Sequence[Any] = (),
-    **sections: Any,
-) -> ProblemScene:
-    """A general scene in the words of scene files: parts are of the classes `Body`, `Load` and so
-    on, or tables.
+    force: bool = False,
+    restart: bool = False,
+    fields: str | bool = "nodes",
+    progress: bool = False,
+    comm: MPI.Comm | None = None,
+) -> Run:
+    """Solve a problem into a run folder.
 
-    ``mesh`` is a mesh file, gmsh with a model (meshed or not), a dolfinx mesh with tags ``(mesh,
-    cells, facets)``, or a `Mesh` or its table. Other ``sections`` are those of a scene: ``path``,
-    ``analysis``, ... Raises `InputError`.
+    All ranks of ``comm`` take part. Of a run that could not reach its end (status "stopped") the
+    logger "archord" warns.
+
+    Parameters
+    ----------
+    problem : Problem, Scene, ProblemScene, str, Path or dict
+        The problem, or a scene, its file, or the table of such a file.
+    folder : str or Path
+        The run folder, which is made. It is refused if it holds anything.
+    force : bool
+        Overwrite what the folder holds.
+    restart : bool
+        Go on after the last accepted step in the folder. The problem must be the run's own, but
+        that its loads may go further.
+    fields : {"cells", "nodes", "points"} or False
+        Of a `Problem`: where the run has stress and plastic strain, as means of cells, also at the
+        nodes, or also at the integration points. A scene says it itself.
+    progress : bool
+        Report steps as ``archord solve`` does.
+    comm : MPI.Comm
+        The communicator, by default all ranks.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        On all ranks, for a problem that contradicts itself or its mesh, and for the folder.
+    KeyboardInterrupt, SystemExit
+        For Ctrl-C, and for SIGTERM and SIGHUP, once the accepted steps are on disk.
+
+    Examples
+    --------
+    >>> import archord
+    >>> joint = {"radius": 10.0, "clearance": 0.1, "relative_element_size": 0.2}
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> load = {"displacement": 0.5, "steps": 1}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load=load)
+    >>> archord.solve(scene, "runs/doctest", force=True).status
+    'done'
     """
-    if isinstance(mesh, (str, Path, Mapping, Mesh)):
-        mesh = {"file": str(mesh)} if isinstance(mesh, (str, Path)) else plain(mesh)
-        scene_file.find_mesh(mesh, Path())
+    from mpi4py import MPI
+
+    from archord.progress import solve_and_report
+
+    folder = Path(folder)
+    comm = MPI.COMM_WORLD if comm is None else comm
+    if force and restart:
+        raise InputError("archord.solve: force and restart do not go together; give one of them.")
+    given = _problem_of(problem)
+    if given is None:
+        checked: Callable[[], AnyScene] = partial(_scene_of, problem)
     else:
-        if not isinstance(mesh, (tuple, ModuleType)) and not hasattr(mesh, "facet_sets"):
-            kinds = "a mesh file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
-            raise InputError(f"archord.Problem: mesh must be {kinds}, not {shortened(repr(mesh))}.")
-        name = f"mesh {len(LIVE) + 1}{GIVEN}"
-        LIVE[name], mesh = mesh, {"file": name}
-    parts = {
-        "body": bodies,
-        "interaction": interactions,
-        "coupling": couplings,
-        "support": supports,
-        "load": loads,
-    }
-    for name, part in parts.items():
-        if not isinstance(part, (list, tuple)):
-            raise InputError(
-                f"archord.Problem: {name} must be a list of parts, not {shortened(repr(part))}."
-            )
-    sections |= {"mesh": mesh, **{name: list(part) for name, part in parts.items()}}
-    return ProblemScene(**sections)
+        checked = partial(_words_of, given, folder, fields)
+    options: dict[str, Any] = {"force": force}
+    if restart:
+        planned = _plan(checked, folder, comm)
+        if planned.finished:
+            return Run(folder)
+        checked = partial(_scene_of, planned.scene)
+        options = {"force": True, "start": planned.start}
+    if given is not None:
+        options["problem"] = given
+    _, outcome = solve_and_report(checked, folder, comm, silent=not progress, **options)
+    if outcome.status == "interrupted":
+        by_user = outcome.signal == signal.SIGINT
+        raise KeyboardInterrupt(outcome.message) if by_user else SystemExit(128 + outcome.signal)
+    if outcome.status == "stopped" and comm.rank == 0:
+        # not warnings.warn: importing ffcx sends warnings to a logger that shows nothing
+        logging.getLogger("archord").warning("archord: %s: %s.", folder, outcome.message)
+    return Run(folder)
+
+
+def _problem_of(given: Any) -> Problem | None:
+    """The problem, None where something else is given."""
+    if isinstance(given, (str, Path, Mapping, AnyScene)):
+        return None
+    from archord.solver.problem import Problem
+
+    return given if isinstance(given, Problem) else None
+
+
+def _words_of(problem: Problem, folder: Path, fields: str | bool) -> AnyScene:
+    """The scene that tells of ``problem`` in a run ``folder``. Raises `InputError`."""
+    from archord.presets.words import words_of
+
+    return words_of(problem, str(folder.absolute() / MESH), fields)
 
 
 def _scene_of(given: Any) -> AnyScene:
@@ -94,38 +201,14 @@ def _scene_of(given: Any) -> AnyScene:
     if isinstance(given, Mapping):
         return scene_file.parse_any(plain(given))
     if not isinstance(given, AnyScene):
-        said = "scene must be a scene, a scene file or its table"
+        said = "problem must be a Problem, a scene, a scene file or its table"
         raise InputError(f"archord.solve: {said}, not {shortened(repr(given))}.")
     return given
 
 
-def solve(
-    scene: AnyScene | str | Path | Mapping[str, Any],
-    folder: str | Path,
-    *,
-    force: bool = False,
-    progress: bool = False,
-    comm: MPI.Comm | None = None,
-) -> Run:
-    """Solve ``scene`` (or the scene file of that name, or the table of such a file) into
-    ``folder``, and give back the run. Collective over ``comm`` (all ranks).
+def _plan(checked: Callable[[], AnyScene], folder: Path, comm: MPI.Comm) -> Plan:
+    """From where to go on in ``folder``. Collective; raises `InputError`."""
+    from archord.output.ranks import agreed
+    from archord.output.restart import plan_restart
 
-    An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as
-    ``archord solve`` does. Of a run that could not reach its end (status "stopped") the logger
-    "archord" warns. Raises `InputError` on all ranks, and KeyboardInterrupt for Ctrl-C (SystemExit
-    for SIGTERM and SIGHUP) once the accepted steps are on disk.
-    """
-    from mpi4py import MPI
-
-    from archord.progress import solve_and_report
-
-    checked: Callable[[], AnyScene] = partial(_scene_of, scene)
-    comm = MPI.COMM_WORLD if comm is None else comm
-    _, outcome = solve_and_report(checked, Path(folder), comm, force=force, silent=not progress)
-    if outcome.status == "interrupted":
-        by_user = outcome.signal == signal.SIGINT
-        raise KeyboardInterrupt(outcome.message) if by_user else SystemExit(128 + outcome.signal)
-    if outcome.status == "stopped" and comm.rank == 0:
-        # not warnings.warn: importing ffcx sends warnings to a logger that shows nothing
-        logging.getLogger("archord").warning("archord: %s: %s.", folder, outcome.message)
-    return Run(folder)
+    return agreed(comm, lambda: plan_restart(folder, checked()))

@@ -169,7 +169,7 @@ def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: 
     from archord.output.user_file import check_target
     from archord.postprocess.pictures.mesh import draw_mesh, mesh_text
     from archord.presets.joint import joint_problem
-    from archord.presets.problem import as_input_error, scene_mesh
+    from archord.presets.problem import as_input_error, mesh_name, scene_mesh
     from archord.scene.file import load_scene, override_key
     from archord.scene.problem import MeshScene
     from archord.scene.scene import Scene
@@ -183,7 +183,7 @@ def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: 
     if isinstance(scene, Scene):
         whole = gathered(joint_problem(scene, MPI.COMM_SELF).mesh)
     else:
-        with as_input_error(scene):
+        with as_input_error(mesh_name(scene)):
             whole = gathered(scene_mesh(scene, MPI.COMM_SELF))
     assert whole is not None  # this is rank 0
     print(mesh_text(str(file), whole))

@@ -4,7 +4,7 @@
 from mpi4py import MPI
 
 from archord import Elastic, J2Material, LinearHardening, System, gmsh_to_mesh
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 
 E, NU, SIGY, DEPTH, NAMES = 1.0, 0.3, 0.002, 0.02, ("lower", "middle", "upper")
 
@@ -28,8 +28,8 @@ contacts = [
     Interaction("low", ("middle b", "lower t")),
     Interaction("high", ("upper b", "middle t")),
 ]
-walls = [Support("walls", f"{name} {side}", 0) for name in NAMES for side in "lr"]
-supports = [Support("base", "lower b", 1), Support("lid", "upper t", 1, rate=-1.0), *walls]
+walls = [Dirichlet("walls", f"{name} {side}", 0) for name in NAMES for side in "lr"]
+supports = [Dirichlet("base", "lower b", 1), Dirichlet("lid", "upper t", 1, rate=-1.0), *walls]
 (
     system := System(Problem(gmsh_to_mesh(MPI.COMM_WORLD, squares), bodies, contacts, supports))
 ).solve([DEPTH])

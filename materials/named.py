@@ -6,7 +6,10 @@ import difflib
 import tomllib
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from archord.materials.j2 import J2Material
 
 _PSI = (
     6.894757293168361e-3  # one pound-force (4.4482216152605 N) on a square inch (25.4 mm), in MPa
@@ -43,3 +46,14 @@ def metal(name: str, unit: str) -> dict[str, Any]:
     scaled = {key: scale * found[key] for key in ("E", "yield", "tensile")}
     points = [[peeq, scale * stress] for peeq, stress in found["hardening"]]
     return scaled | {"nu": found["nu"], "hardening": points}
+
+
+def named_material(name: str, unit: str) -> J2Material:
+    """The metal ``name`` in a ``unit`` of stress, with its hardening from first yield on, in plane
+    strain. Raises ValueError as `metal`."""
+    from archord.materials.hardening import TabularHardening
+    from archord.materials.j2 import J2Material
+
+    found = metal(name, unit)
+    points = tuple((peeq, stress) for peeq, stress in found["hardening"])
+    return J2Material(found["E"], found["nu"], "strain", TabularHardening(points))

@@ -9,28 +9,21 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.formats.source import Mesh
 from archord.output.files.disk import replace_file
 from archord.output.folder import MESH
 from archord.scene.file import AnyScene, resolved
-from archord.scene.problem import LIVE, ProblemScene
+from archord.scene.problem import ProblemScene
+from archord.solver.problem import Problem
 
 if TYPE_CHECKING:
     from archord.geometry.meshes.plane_mesh import PlaneMesh
 
 
-def is_given(scene: AnyScene) -> bool:
-    """Whether the mesh of ``scene`` was given from Python, and is in no file."""
-    return isinstance(scene, ProblemScene) and scene.mesh.file in LIVE
-
-
 def scene_text(scene: AnyScene, folder: Path) -> str:
     """The TOML of ``scene`` in a run's ``folder``: a mesh that lies there is named without it, so
     that it may move."""
-    own = folder.absolute() / MESH
-    if is_given(scene):
-        mesh = scene.mesh.model_copy(update={"file": str(own)})  # type: ignore[union-attr]
-        scene = scene.model_copy(update={"mesh": mesh})
-    return resolved(scene, own)
+    return resolved(scene, folder.absolute() / MESH)
 
 
 def mesh_in_use(scene: AnyScene, folder: Path) -> str:
@@ -40,13 +33,12 @@ def mesh_in_use(scene: AnyScene, folder: Path) -> str:
     return MESH if in_use else ""
 
 
-def given_mesh(scene: AnyScene, comm: MPI.Comm) -> PlaneMesh | None:
-    """The mesh given from Python, if ``scene`` has one: on rank 0, None elsewhere. Collective."""
-    if not isinstance(scene, ProblemScene) or not is_given(scene):
+def given_mesh(problem: Problem | None, comm: MPI.Comm) -> PlaneMesh | None:
+    """The mesh that a ``problem`` from Python has in no file: on rank 0, None elsewhere.
+    Collective."""
+    if problem is None or problem.mesh_file:
         return None
-    from archord.presets.problem import given_mesh as mesh_of
-
-    return mesh_of(scene, comm)
+    return Mesh.of(problem.mesh).plain(comm)
 
 
 def write_mesh(mesh: PlaneMesh, folder: Path) -> None:

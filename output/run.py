@@ -36,6 +36,7 @@ from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.newton import Newton
 from archord.solver.path.stepping import Step, StepFailure, StepRules, march
 from archord.solver.path.system import System
+from archord.solver.problem import Problem
 
 if TYPE_CHECKING:
     from archord.geometry.meshes.plane_mesh import PlaneMesh
@@ -64,6 +65,7 @@ def solve_scene(
     folder: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
+    problem: Problem | None = None,
     start: Start | None = None,
     timer: Timer | None = None,
     interrupt: Interrupt | None = None,
@@ -75,6 +77,7 @@ def solve_scene(
     """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`).
     Collective.
 
+    A ``problem`` from Python, of which the scene tells, is solved in the place of the scene.
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``,
     ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank, and
     ``on_iteration(load, result)`` what the present solve did so far. ``timer`` has the seconds
@@ -88,11 +91,11 @@ def solve_scene(
     begun = perf_counter() - sum(timer.seconds.values())
     with ExitStack() as stack:
         agreed(comm, lambda: bool(stack.enter_context(occupied(folder))))
-        account = without_stale_forms(lambda: account_of(scene, comm, timer))
+        account = without_stale_forms(lambda: account_of(scene, comm, timer, problem))
         system = account.system
         system.solver.newton.watch = on_iteration
         on_start(system)
-        output = _Output(folder, account, begun, start)
+        output = _Output(folder, account, begun, start, problem)
         status, message, received = "done", "", 0
         failed: dict[str, Any] = {}
         try:
@@ -151,7 +154,15 @@ class _Output:
     what they lack.
     """
 
-    def __init__(self, folder: Path, account: Account, begun: float, start: Start | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        account: Account,
+        begun: float,
+        start: Start | None,
+        problem: Problem | None,
+    ) -> None:
+        self._problem = problem
         self.folder, self.account, self.system, self._start = folder, account, account.system, start
         comm = self.system.comm
         self._on_root = partial(agreed, comm)
@@ -180,7 +191,7 @@ class _Output:
         joint. Collective."""
         system = self.system
         if not system.comm.bcast(self._start is not None):
-            mesh = given_mesh(self.account.scene, system.comm)
+            mesh = given_mesh(self._problem, system.comm)
             self._on_root(lambda: self._make(mesh))
             return None, Work()
         with system.timer("checkpoint"):

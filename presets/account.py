@@ -14,6 +14,7 @@ from archord.presets.measures import Measures, Record
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
+from archord.solver.problem import Problem
 
 if TYPE_CHECKING:  # joints do without it
     from archord.presets.general_account import GeneralAccount
@@ -22,14 +23,19 @@ Account: TypeAlias = "JointAccount | GeneralAccount"
 Column = tuple[str, Callable[[Any], float | int]]  # heading, and its value of a step
 
 
-def account_of(scene: AnyScene, comm: MPI.Comm, timer: Timer | None = None) -> Account:
-    """The problem of ``scene``, ready to be solved, and its account. Collective over ``comm``;
-    raises `InputError`."""
+def account_of(
+    scene: AnyScene,
+    comm: MPI.Comm,
+    timer: Timer | None = None,
+    given: Problem | None = None,
+) -> Account:
+    """The problem of ``scene``, or the one that was ``given`` from Python, of which the scene tells,
+    ready to be solved, and its account. Collective over ``comm``; raises `InputError`."""
     if isinstance(scene, Scene):
         return JointAccount(Joint(scene, comm, timer=timer))
     from archord.presets.general_account import GeneralAccount
 
-    return GeneralAccount(scene, comm, timer)
+    return GeneralAccount(scene, comm, timer, given)
 
 
 def record_type(scene: AnyScene) -> type:

@@ -28,14 +28,20 @@ from archord.presets.measures import (
     told_of_facets,
     work_doubts,
 )
-from archord.presets.problem import as_input_error, general_problem, require_mirrored
+from archord.presets.problem import (
+    as_input_error,
+    general_problem,
+    mesh_name,
+    require_mirrored,
+)
 from archord.report.doubts import Doubt
 from archord.report.timer import Timer
 from archord.scene.columns import part_columns, supporting
-from archord.scene.problem import LIVE, ProblemScene
+from archord.scene.problem import ProblemScene
 from archord.scene.sections import friction_doubts
 from archord.solver.path.stepping import Step
 from archord.solver.path.system import System
+from archord.solver.problem import Problem
 
 _FEW_FACETS = 3
 _FAR_TURN = 0.02  # angle at which linear rotations stretch radii by 0.02 %
@@ -56,20 +62,28 @@ class GeneralAccount:
     record: ClassVar[type] = Record
     fixed: ClassVar[tuple[str, ...]] = ("s", "weight", "X")
 
-    def __init__(self, scene: ProblemScene, comm: MPI.Comm, timer: Timer | None = None) -> None:
+    def __init__(
+        self,
+        scene: ProblemScene,
+        comm: MPI.Comm,
+        timer: Timer | None = None,
+        given: Problem | None = None,
+    ) -> None:
         timer = timer or Timer()
-        with timer("mesh"):
-            problem = general_problem(scene, comm)
+        source = mesh_name(scene) if given is None else given.mesh_name
+        with timer("mesh"), as_input_error(source):
+            problem = general_problem(scene, comm) if given is None else given.on(comm)
         self.scene, self._warnings = scene, scene.doubts
-        with as_input_error(scene):
+        self._file = scene.mesh.file if given is None else given.mesh_file
+        with as_input_error(source):
             if scene.mesh.shape is None:
                 from archord.presets.held import (
                     check,
                 )  # with scipy, which solves of presets do without
 
                 with timer("mesh"):
-                    self._warnings += check(scene, problem)
-            require_mirrored(scene, problem)
+                    self._warnings += check(problem)
+            require_mirrored(problem)
             self.system = System(problem, timer=timer)
             self.per_step = (*per_step(self.system), "slip")
             self._warnings += self.system.warnings
@@ -139,7 +153,7 @@ class GeneralAccount:
                 slip,
                 met[-1].n_arcs,
             ]
-            if part.friction:
+            if part.has_friction:
                 shear = max(float(np.abs(p.shear).max()) for p in met if p.shear is not None)
                 values += [system.contact_moment(part.name, (0.0, 0.0)), shear]
             area += float(np.mean(lengths))
@@ -158,8 +172,8 @@ class GeneralAccount:
         """Sizes of the mesh, and what was made of the scene."""
         mesh, problem = self.scene.mesh, self.system.problem
         source = {"file": mesh.file} if mesh.file else {}
-        if mesh.file and mesh.file not in LIVE:
-            source["sha256"] = sha256(Path(mesh.file).read_bytes()).hexdigest()
+        if self._file:
+            source["sha256"] = sha256(Path(self._file).read_bytes()).hexdigest()
         shares = {
             i.interaction.name: [pair.share for pair in i.pairs]
             for i in self.system.contact.interfaces

@@ -1,4 +1,4 @@
-"""Checks of a general scene on its mesh: what the mesh lacks, and whether something holds every
+"""Checks of a problem on its mesh: what the mesh lacks, and whether something holds every
 body."""
 
 from __future__ import annotations
@@ -14,8 +14,11 @@ from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.motions import free_motions
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.materials.material import Array
-from archord.scene.problem import ProblemScene
+from archord.solver.conditions import Dirichlet
 from archord.solver.contact.interaction import Interaction
+from archord.solver.contact.pair import Pair
+from archord.solver.expansion import disc_of
+from archord.solver.parts import Load, Support
 from archord.solver.path.system import System
 from archord.solver.problem import Problem
 
@@ -27,36 +30,30 @@ _BENT = 0.01  # of the length of an edge: how far it may depart from a line and 
 _ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
-def check(scene: ProblemScene, problem: Problem) -> list[str]:
-    """Warnings about the mesh of ``scene`` and ``problem``. Collective; raises ValueError on all
-    ranks for a mesh that is at fault and a body that nothing holds."""
+def check(problem: Problem) -> list[str]:
+    """Warnings about the mesh of the ``problem`` as it is stated. Collective; raises ValueError on
+    all ranks for a mesh that is at fault and a body that nothing holds."""
     mesh = problem.mesh
     cells = {body.name: body.cells for body in problem.bodies}
-    overlap = max((part.overlap + part.interference for part in scene.interaction), default=0.0)
-    in_mm = (scene.units.length, scene.units.stress) == ("mm", "MPa")
-    pairs: list[list[str | float]] = [
-        [name] for part in scene.interaction if part.law == "tied" for name in part.surfaces
-    ]
-    smooth = [part for part in scene.interaction if part.law != "tied"]
-    pairs += [[*part.surfaces, *([part.rigid.radius] if part.rigid else [])] for part in smooth]
-    warnings = check_mesh(mesh, cells, pairs, overlap, in_mm)
+    surfaces = [name for part in problem.interactions for name in _surfaces(part)]
+    owner = {name: problem.body_of(name).name for name in surfaces}
+    fits = [part.overlap + part.interference for part in problem.interactions]
+    in_mm = tuple(problem.units) == ("mm", "MPa")
+    warnings = check_mesh(mesh, cells, _pairs(problem), max(fits, default=0.0), in_mm)
     whole = gathered(mesh)
-    owner = {
-        name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces
-    }
     failure = ""
     doubts = list[str]()
     if whole is not None:
         faults = chain(
-            _shared(scene, whole), _half_loaded(scene, whole), _loose(scene, whole, cells, owner)
+            _shared(problem, whole),
+            _half_loaded(problem, whole),
+            _loose(problem, whole, cells, owner),
         )
         failure = next(faults, "")
-        doubts = [
-            *_half_held(scene, whole),
-            *_moved_in_contact(scene, whole),
-            *_stiffened(scene, whole),
-        ]
-        for name in sorted({*owner, *_moved(scene), *_spread(scene)}):
+        doubts += _half_held(problem, whole)
+        doubts += _moved_in_contact(problem, whole)
+        doubts += _stiffened(problem, whole)
+        for name in sorted({*owner, *_moved(problem), *_spread(problem)}):
             doubts += gaps(whole, name)
     failure, doubts = mesh.mesh.comm.bcast((failure, doubts))
     if failure:
@@ -64,41 +61,76 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     return warnings + doubts
 
 
-def _spread(scene: ProblemScene) -> set[str]:
+def _surfaces(part: Interaction) -> list[str]:
+    """The facet sets of an interaction."""
+    return [name for name in part.surfaces if isinstance(name, str)]
+
+
+def _is_tied(part: Interaction) -> bool:
+    """Whether the points of an interaction keep their partners."""
+    return part.law == "tied" or not getattr(part.law, "slides", True)
+
+
+def _pairs(problem: Problem) -> list[list[str | float]]:
+    """What meets, as `check_mesh` takes it: each surface of a tie alone, both of a contact, or one
+    and the radius of the disc beside it."""
+    pairs: list[list[str | float]] = []
+    for part in problem.interactions:
+        names = _surfaces(part)
+        if _is_tied(part):
+            pairs += [[name] for name in names]
+    for part in problem.interactions:
+        if not _is_tied(part):
+            disc = disc_of(part)
+            pairs.append([*_surfaces(part), *([disc.radius] if disc else [])])
+    return pairs
+
+
+def _supports(problem: Problem) -> list[Support]:
+    return [part for part in problem.supports if isinstance(part, Support)]
+
+
+def _loads(problem: Problem) -> list[Load]:
+    return [part for part in problem.loads if isinstance(part, Load)]
+
+
+def _spread(problem: Problem) -> set[str]:
     """The facet sets along which something is spread: a pressure, or the force of a distributing
     coupling."""
-    found = {load.on for load in scene.load if load.kind == "pressure"}
-    return found | {c.facets for c in scene.coupling if c.kind == "distributing"}
+    pressed = {load.on for load in _loads(problem) if load.kind == "pressure"}
+    distributing = [c for c in problem.couplings if c.kind == "distributing"]
+    return pressed | {coupling.facets for coupling in distributing}
 
 
-def _moved(scene: ProblemScene) -> dict[str, str]:
+def _moved(problem: Problem) -> dict[str, str]:
     """The sets whose nodes move as is prescribed, and what prescribes it."""
-    found = {c.facets: c.name for c in scene.coupling if c.kind == "rigid"}
-    found |= {load.on: load.name for load in scene.load if load.kind != "pressure"}
-    return found | {support.on: support.name for support in scene.support}
+    found = {c.facets: c.name for c in problem.couplings if c.kind == "rigid"}
+    found |= {load.on: load.name for load in _loads(problem) if load.kind != "pressure"}
+    return found | {support.on: support.name for support in _supports(problem)}
 
 
-def _half_loaded(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+def _half_loaded(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
     """What is said of facets inside a body along which a load is to be spread."""
-    for name in sorted(_spread(scene)):
+    for name in sorted(_spread(problem)):
         for said in facets_within(whole, name):
             yield f"{said}, where nothing can load them: give it those of the boundary alone"
 
 
-def _half_held(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+def _half_held(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
     """Warnings of facets inside a body in a set whose other facets are on the boundary."""
-    for name in sorted(_moved(scene)):
+    for name in sorted(_moved(problem)):
         for said in facets_within(whole, name):
             yield f"{said}: look whether its elements are numbered as the set takes them"
 
 
-def _stiffened(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+def _stiffened(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
     """Warnings of forces on edges that are not straight: an edge under a force moves by one
     displacement, which keeps its shape along the force."""
-    for load in scene.load:
+    for load in _loads(problem):
         if load.kind != "force" or load.on not in whole.facet_sets:
             continue
-        x = whole.x[np.unique(whole.edges[np.isin(whole.tags, whole.facet_sets[load.on])][:, :2])]
+        edges = whole.edges[np.isin(whole.tags, whole.facet_sets[load.on])]
+        x = whole.x[np.unique(edges[:, :2])]
         extents = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
         if extents[1] > _BENT * extents[0]:
             yield (
@@ -108,12 +140,12 @@ def _stiffened(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
             )
 
 
-def _moved_in_contact(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+def _moved_in_contact(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
     """Warnings of sets with a prescribed motion that have some facets of a surface in contact, and
     others."""
-    smooth = [part for part in scene.interaction if part.law != "tied"]
-    surfaces = [(part.name, name) for part in smooth for name in part.surfaces]
-    for (on, by), (part, surface) in product(_moved(scene).items(), surfaces):
+    smooth = [part for part in problem.interactions if not _is_tied(part)]
+    surfaces = [(part.name, name) for part in smooth for name in _surfaces(part)]
+    for (on, by), (part, surface) in product(_moved(problem).items(), surfaces):
         there = np.isin(whole.tags, whole.facet_sets.get(on, ()))
         touching = np.isin(whole.tags, whole.facet_sets[surface])
         both = there & touching
@@ -125,10 +157,10 @@ def _moved_in_contact(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
             )
 
 
-def _shared(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+def _shared(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
     """What is said of facets that two interactions have: what is between them would be counted
     twice."""
-    surfaces = [(part.name, name) for part in scene.interaction for name in part.surfaces]
+    surfaces = [(part.name, name) for part in problem.interactions for name in _surfaces(part)]
     for (first, one), (second, other) in combinations(surfaces, 2):
         tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
         common = whole.edges[np.isin(whole.tags, [*tags])]
@@ -142,52 +174,63 @@ def _shared(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
 
 
 def _loose(
-    scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]
+    problem: Problem, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]
 ) -> Iterator[str]:
     """What is said of bodies that neither supports nor contact hold; a turning one in contact is no
     fault."""
-    facets = {c.name: c.facets for c in scene.coupling}
-    held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
-    given: list[tuple[str, str]] = [(s.on, freedom) for s in scene.support for freedom in s.fixed]
-    given += [
-        (load.on, load.direction or "") for load in scene.load if load.displacement is not None
-    ]
-    hinges = {
-        c.name: np.array([c.point]) for c in scene.coupling if (c.name, "rotation") not in given
-    }
+    held = _held_places(problem, whole, cells)
+    links: list[tuple[str, str, Array, Array]] = []
+    for part in problem.interactions:
+        names = _surfaces(part)
+        facets = np.isin(whole.tags, whole.facet_sets[names[-1]])
+        ends = whole.x[whole.edges[facets][:, :2]]
+        middle = ends.mean(axis=1)
+        chord = ends[:, 1] - ends[:, 0]
+        chord /= np.linalg.norm(chord, axis=1)[:, None]
+        across = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
+        for direction in (across, chord) if _is_tied(part) else (across,):
+            if len(names) == 1:
+                held[owner[names[0]]].append((middle, direction))
+            else:
+                links.append((owner[names[0]], owner[names[1]], middle, direction))
+    moves = free_motions(held, links)
+    touching = set(owner.values())
+    for body, motions in moves.items():
+        free = [motion for motion in motions if motion != "rotation" or body not in touching]
+        if not free:
+            continue
+        others = [name for name, its in moves.items() if name != body and set(free) & set(its)]
+        where = ""
+        if others:
+            said = ", ".join(map(repr, others))
+            where = f" to it, or to a body that it touches: {said}"
+        yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]{where}"
+
+
+def _held_places(
+    problem: Problem, whole: PlaneMesh, cells: dict[str, str]
+) -> dict[str, list[tuple[Array, Array]]]:
+    """Where supports and displacements hold each body, and along what: places ``(k, 2)`` and
+    directions ``(k, 2)``."""
+    facets = {c.name: c.facets for c in problem.couplings}
+    given: list[tuple[str, str]] = [(s.on, f) for s in _supports(problem) for f in s.fixed]
+    displaced = [load for load in _loads(problem) if load.kind == "displacement"]
+    given += [(load.on, str(load.direction)) for load in displaced]
+    axes = {0: "x", 1: "y"}
+    given += [(s.facets, axes[s.axis]) for s in problem.supports if isinstance(s, Dirichlet)]
+    free = [c for c in problem.couplings if (c.name, "rotation") not in given]
+    hinges = {coupling.name: np.array([coupling.point]) for coupling in free}
     inside = {body: _nodes(whole, name, of_cells=True) for body, name in cells.items()}
+    held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
     for on, freedom in given:
         nodes = _nodes(whole, facets.get(on, on))
         for body, of_body in inside.items():
             here = np.intersect1d(nodes, of_body)
             if len(here) and freedom in _ALONG:
                 places = hinges.get(on, whole.x[here])
-                held[body].append((places, np.tile(_ALONG[freedom], (len(places), 1))))
-    links = []
-    for part in scene.interaction:
-        edges = whole.x[
-            whole.edges[np.isin(whole.tags, whole.facet_sets[part.surfaces[-1]])][:, :2]
-        ]
-        middle, chord = edges.mean(axis=1), edges[:, 1] - edges[:, 0]
-        chord /= np.linalg.norm(chord, axis=1)[:, None]
-        across = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
-        for direction in (across, chord) if part.law == "tied" else (across,):
-            if part.rigid:
-                held[owner[part.surfaces[-1]]].append((middle, direction))
-            else:
-                links.append((owner[part.surfaces[0]], owner[part.surfaces[1]], middle, direction))
-    moves = free_motions(held, links)
-    for body, motions in moves.items():
-        if free := [
-            motion for motion in motions if motion != "rotation" or body not in owner.values()
-        ]:
-            others = [
-                repr(other)
-                for other, its in moves.items()
-                if other != body and not {*free}.isdisjoint(its)
-            ]
-            where = f" to it, or to a body that it touches: {', '.join(others)}" if others else ""
-            yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]{where}"
+                directions = np.tile(_ALONG[freedom], (len(places), 1))
+                held[body].append((places, directions))
+    return held
 
 
 def require_facing(system: System) -> list[str]:
@@ -197,38 +240,41 @@ def require_facing(system: System) -> list[str]:
     warnings: list[str] = []
     for interface in system.contact.interfaces:
         part = interface.interaction
-        closest, apart = np.inf, ""
+        closest = np.inf
+        apart = ""
         for pair in interface.pairs:
-            gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
-            found = np.array(
-                [
-                    gap.min(initial=np.inf),
-                    np.abs(gap).min(initial=np.inf),
-                    -np.abs(gap).max(initial=0.0),
-                ]
-            )
-            system.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MIN)
-            lowest, nearest, farthest = found * [1.0, 1.0, -1.0]
+            lowest, nearest, farthest = _drawn_gap(pair, system.comm)
             size = np.ptp(pair.surface.curve.X, axis=0).max()
-            allowed, said = (
-                part.overlap + _FAR * size,
-                f"the surface {pair.surface.name!r} of {part.name!r}",
-            )
-            if nearest <= allowed and farthest > _APART * size and not pair.law.slides:
+            allowed = part.overlap + _FAR * size
+            said = f"the surface {pair.surface.name!r} of {part.name!r}"
+            is_tied = not pair.law.slides
+            if nearest <= allowed and farthest > _APART * size and is_tied:
                 drawn = f"the surfaces that {part.name!r} ties are drawn up to {farthest:.3g} apart"
                 apart = f"{drawn}: what is carried along them loses its moment about that gap"
             if lowest < -allowed:
                 raise ValueError(
                     f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other"
                 )
-            if nearest > allowed and not pair.law.slides:
+            if nearest > allowed and is_tied:
                 raise ValueError(f"{said} is nowhere near the one that it is tied to")
-            closest = min(closest, float(lowest))
+            closest = min(closest, lowest)
         if apart:
             warnings.append(apart)
         if np.isfinite(closest):
             warnings += _fit_as_drawn(part, closest)
     return warnings
+
+
+def _drawn_gap(pair: Pair, comm: MPI.Comm) -> tuple[float, float, float]:
+    """The lowest gap of the points of a ``pair`` as drawn, and the smallest and the largest size of
+    a gap. Collective."""
+    gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
+    size = np.abs(gap)
+    smallest = [gap.min(initial=np.inf), size.min(initial=np.inf), -size.max(initial=0.0)]
+    found = np.array(smallest)
+    comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MIN)
+    lowest, nearest, farthest = found
+    return float(lowest), float(nearest), -float(farthest)
 
 
 def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:

@@ -8,15 +8,10 @@ the pin's core (Persson's joint).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
 
-import basix
 import numpy as np
-import ufl
 from mpi4py import MPI
 
-from archord.geometry.basis import cell_basis
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import refinements
@@ -26,14 +21,22 @@ from archord.presets.arc import SYMMETRY
 from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
-from archord.solver.drives import LOAD_DEGREE
+from archord.solver.core_load import core_density
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Rigid, Support
+from archord.solver.problem import (
+    Body,
+    DeadLoad,
+    Dirichlet,
+    Drive,
+    Guess,
+    Interaction,
+    Problem,
+    Rigid,
+)
 
 _RATIO = 3.0  # element size over that of the next finer mesh
 _COARSEST = 0.2  # element size over R
 _STEEPEST = 1.0  # growth of the element size
-_FEWEST = 6  # integration points in a core: half the points of a triangle
 _COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 
 
@@ -50,11 +53,11 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         scene.E_star * scene.thickness if by_force else 1.0
     )  # by which a load is about a displacement
     supports = [
-        Support("axis", "symmetry", 0),
-        *(Support("block", "block held", axis) for axis in (0, 1)),
+        Dirichlet("axis", "symmetry", 0),
+        *(Dirichlet("block", "block held", axis) for axis in (0, 1)),
     ]
     if not rigid and not ring:
-        supports.append(Support("pin", "pin top", 1, -1.0))
+        supports.append(Dirichlet("pin", "pin top", 1, -1.0))
     travel = abs(g.dR) + max(map(abs, scene.targets)) / stiffness
     contact = Interaction(
         "contact",
@@ -87,7 +90,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         ],
         [contact],
         supports,
-        [Load("pin", (0.0, -1.0), core)] if ring else [],
+        [DeadLoad("pin", (0.0, -1.0), core)] if ring else [],
         drives=[Drive("", control="force")] if by_force and not ring else [],
         degree=analysis.degree,
         symmetry=SYMMETRY * scene.thickness,
@@ -122,31 +125,6 @@ def joint_mesh(
     return quarter_joint(
         comm, *sizes, edge=edge, rigid_pin=pin == "none", whole_pin=pin == "whole", **options
     )
-
-
-def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]:
-    """Density of a force, as `Load` takes it: a paraboloid within a circle."""
-    middle = ufl.as_vector(list(centre))
-    return lambda x: ufl.max_value(1 - ufl.dot(x - middle, x - middle) / radius**2, 0)
-
-
-def require_core(
-    mesh: TaggedMesh, cells: str, centre: Sequence[float], radius: float, key: str
-) -> None:
-    """Raise ValueError, which names the ``key`` of the radius, where the circle has so few
-    integration points of these ``cells`` that the force on it is not what `core_density` says.
-    Collective."""
-    owned = mesh.mesh.topology.index_map(2).size_local
-    inside = np.unique(mesh.cells_in(cells))
-    X, _ = basix.make_quadrature(mesh.mesh.basix_cell(), LOAD_DEGREE)
-    place = cell_basis(mesh.mesh, 1, inside[inside < owned], X).point
-    apart = np.linalg.norm(place - np.asarray(centre), axis=2)
-    found = mesh.mesh.comm.allreduce(int((apart < radius).sum()))
-    if found < _FEWEST:
-        raise ValueError(
-            f"{key} = {radius:g} about {tuple(centre)} has {found} integration points of the cells {cells!r}, and "
-            f"must have {_FEWEST}: choose a larger radius, smaller elements there, or a centre within these cells"
-        )
 
 
 def _coarser(scene: Scene) -> Scene:

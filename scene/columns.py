@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from archord.scene.keys import require
 
 if TYPE_CHECKING:
-    from archord.scene.parts import Coupling
+    from archord.scene.parts import CouplingSection
     from archord.scene.problem import ProblemScene
 
 _FREEDOMS = ("x", "y", "rotation")
@@ -53,7 +53,7 @@ def require_different(scene: ProblemScene) -> None:
         require(name not in motions, (section, name, "name"), said)
 
 
-def _motions(scene: ProblemScene, coupling: Coupling) -> list[str]:
+def _motions(scene: ProblemScene, coupling: CouplingSection) -> list[str]:
     """Freedoms of the ``coupling`` that are solved for by a name made of its own.
 
     They are free ones of a rigid coupling, held ones of a distributing one; a load gives its name
@@ -91,10 +91,12 @@ def _columns(scene: ProblemScene) -> Iterator[Column]:
     for interaction in scene.interaction:
         pressed = {"force x": force, "force y": force, "largest pressure": units.stress}
         placed = dict.fromkeys(("at x", "at y", "contact length", "largest slip"), length)
-        rubbed = {"moment": moment, "largest shear": units.stress} if interaction.friction else {}
+        rubbed = (
+            {"moment": moment, "largest shear": units.stress} if interaction.has_friction else {}
+        )
         for what, unit in (pressed | placed | {"arcs": ""} | rubbed).items():
             yield "interaction", interaction.name, what, unit
     for body in scene.body:
-        if body.yield_stress is not None:
+        if body.plastic:
             for what, unit in (("peeq_max", ""), ("at x", length), ("at y", length)):
                 yield "body", body.name, what, unit

@@ -1,13 +1,13 @@
-"""What is said of bad input."""
+"""What is said of bad input in scenes."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
+from archord.report.errors import InputError
 
-class InputError(ValueError):
-    """Bad input; the message holds one sentence a line."""
+__all__ = ["Fault", "InputError", "toml_value"]
 
 
 class Fault(ValueError):

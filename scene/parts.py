@@ -18,20 +18,20 @@ _OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
 
-class RigidCircle(Section):
+class DiscSection(Section):
     """A rigid disc."""
 
     centre: Pair = key("centre", "length", example=[0.0, 0.0])
     radius: Positive = key("radius", "length", example=10.0)
 
 
-class Circle(RigidCircle):
+class CircleSection(DiscSection):
     """A circle on which a set of facets lies."""
 
     facets: Name = key("facet set whose nodes are put on the circle", example="hole")
 
 
-class Mesh(Section):
+class MeshSection(Section):
     """Where the mesh comes from: a file, or the shape of a preset."""
 
     file: Name | None = key(
@@ -44,14 +44,16 @@ class Mesh(Section):
         "order of the geometry, that of the file if absent; 2 for circles", other=2
     )
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
-    circle: list[Circle] = Field(default_factory=list, description="circles that facet sets lie on")
+    circle: list[CircleSection] = Field(
+        default_factory=list, description="circles that facet sets lie on"
+    )
     shape: (
         Annotated[LugShape | ClevisShape | BushingShape | JointShape, Field(discriminator="kind")]
         | None
     ) = Field(None, description="the shape of a preset, as `archord scene --expand` prints it")
 
     @model_validator(mode="after")
-    def _one_source(self) -> Mesh:
+    def _one_source(self) -> MeshSection:
         given(self, ("file", "shape"))
         for name in ("scale", "order", "refine", "circle") if self.shape is not None else ():
             unsaid = getattr(self, name) == type(self).model_fields[name].get_default(
@@ -61,25 +63,60 @@ class Mesh(Section):
         return self
 
 
-class Body(Solid):
+class OwnSection(Section):
+    """An object of a class of one's own, given from Python: a run's scene.toml tells of it, and no
+    scene is solved with it."""
+
+    kind: Name = key("the class", example="Archard")
+    text: str = key("what Python prints of the object", example="Archard(rate=1e-8)")
+
+
+class OwnMaterial(OwnSection):
+    """A material of a class of one's own; E and nu of the body are those of its elastic moduli."""
+
+    plastic: bool = key("whether it can leave its elastic moduli", default=False)
+
+
+class OwnLaw(OwnSection):
+    """A contact law of a class of one's own."""
+
+    friction: bool = key("whether it has shear", default=False)
+
+
+class BodySection(Solid):
     """A deformable body: a set of cells, of one material."""
 
     name: PartName = key("name of the body", example="pin")
     cells: Name | None = key("its set of cells, that of its name if absent", other="plate")
+    own: OwnMaterial | None = Field(
+        None, description="of a run from Python: its own material, in words"
+    )
+
+    @property
+    def plastic(self) -> bool:
+        """Whether the body has plastic strain to tell of."""
+        return super().plastic or (self.own is not None and self.own.plastic)
+
+    def strength(self, unit: str) -> str:
+        """Where the body yields, and how it hardens, in words."""
+        return self.own.text if self.own else super().strength(unit)
 
 
-class Interaction(Section):
+class InteractionSection(Section):
     """What two surfaces do to each other, or a rigid disc to one."""
 
     name: PartName = key("name of the interaction", example="contact")
     surfaces: Surfaces = key("two facet sets, or one beside a rigid disc", example=["pin", "hole"])
-    rigid: RigidCircle | None = key(
+    rigid: DiscSection | None = key(
         "rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0}
     )
     law: Literal["frictionless", "tied"] = key(
         "contact without friction, or tied surfaces", default="frictionless"
     )
     friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
+    own: OwnLaw | None = Field(
+        None, description="of a run from Python: its own contact law, in words"
+    )
     integrated: Name | None = key(
         "the one facet set whose points carry the contact; both do if absent", other="hole"
     )
@@ -96,8 +133,13 @@ class Interaction(Section):
         default=0.0,
     )
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether the surfaces have shear to tell of."""
+        return self.friction > 0 or (self.own is not None and self.own.friction)
+
     @model_validator(mode="after")
-    def _surfaces(self) -> Interaction:
+    def _surfaces(self) -> InteractionSection:
         wanted, said = (
             (1, "one facet set beside a rigid disc") if self.rigid else (2, "two facet sets")
         )
@@ -117,7 +159,7 @@ class Interaction(Section):
         return self
 
 
-class Coupling(Section):
+class CouplingSection(Section):
     """A reference point that stands for a set of facets: supports and loads may be on it."""
 
     name: PartName = key("name of the coupling", example="reference point")
@@ -129,7 +171,7 @@ class Coupling(Section):
     )
 
 
-class Support(Section):
+class SupportSection(Section):
     """What is held."""
 
     name: PartName = key("name of the support", example="clamp")
@@ -142,7 +184,7 @@ class Support(Section):
     )
 
 
-class Load(Loading):
+class LoadSection(Loading):
     """What moves or presses: one value, or a list of values at the ends of the path's stages."""
 
     kinds = ("displacement", "force", "pressure")
@@ -163,7 +205,7 @@ class Load(Loading):
     force: Targets | None = key(
         "force on the whole or moment; a facet set with it stays straight", "force", other=1e3
     )
-    core: RigidCircle | None = key(
+    core: DiscSection | None = key(
         "circle in which a force on cells is spread, less and less outward",
         other={"centre": [0.0, 0.0], "radius": 1.0},
     )
@@ -172,7 +214,7 @@ class Load(Loading):
     )
 
     @model_validator(mode="after")
-    def _directed(self) -> Load:
+    def _directed(self) -> LoadSection:
         require(self.core is None or self.force is not None, "core", "is for a force on cells")
         directed = (self.direction is None) == (self.pressure is not None)
         said = (
@@ -187,7 +229,7 @@ class Load(Loading):
         return self
 
 
-class Path(Section):
+class PathSection(Section):
     """How the loads reach their values: in stages, one for every value of the longest list; a load
     with fewer values keeps its last one."""
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from archord.scene.columns import require_different
 from archord.scene.keys import key, require, unused
-from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, Support
+from archord.scene.parts import (
+    BodySection,
+    CouplingSection,
+    InteractionSection,
+    LoadSection,
+    MeshSection,
+    PathSection,
+    SupportSection,
+)
 from archord.scene.scene import STEPS, Checked, require_solids
 from archord.scene.sections import ProblemAnalysis, ProblemOutput, Stepping, Units, steps_of
 
@@ -23,15 +31,13 @@ _APART = {
     "support": ("coupling", "load"),
     "load": (),
 }
-GIVEN = " given from Python"
-LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 
 class MeshScene(Checked):
     """A mesh alone, with the keys of its section."""
 
     format: Literal[2] = 2
-    mesh: Mesh = Field(description="the mesh")
+    mesh: MeshSection = Field(description="the mesh")
 
 
 class ProblemScene(Checked):
@@ -40,13 +46,17 @@ class ProblemScene(Checked):
 
     format: Literal[2] = key("version of the scene format", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
-    mesh: Mesh = Field(description="the mesh")
-    body: list[Body] = Field(description="deformable bodies", min_length=1)
-    interaction: list[Interaction] = Field(default_factory=list, description="contact and ties")
-    coupling: list[Coupling] = Field(default_factory=list, description="reference points")
-    support: list[Support] = Field(default_factory=list, description="what is held")
-    load: list[Load] = Field(description="what moves or presses", min_length=1)
-    path: Path = Field(default_factory=Path, description="stages and steps of the loads")
+    mesh: MeshSection = Field(description="the mesh")
+    body: list[BodySection] = Field(description="deformable bodies", min_length=1)
+    interaction: list[InteractionSection] = Field(
+        default_factory=list, description="contact and ties"
+    )
+    coupling: list[CouplingSection] = Field(default_factory=list, description="reference points")
+    support: list[SupportSection] = Field(default_factory=list, description="what is held")
+    load: list[LoadSection] = Field(description="what moves or presses", min_length=1)
+    path: PathSection = Field(
+        default_factory=PathSection, description="stages and steps of the loads"
+    )
     analysis: ProblemAnalysis = Field(
         default_factory=ProblemAnalysis, description="model and solver"
     )
@@ -126,7 +136,7 @@ class ProblemScene(Checked):
         """Whether a stage comes before them in which interferences arise."""
         return any(i.interference or i.overlap for i in self.interaction)
 
-    def values(self, load: Load) -> tuple[float, ...]:
+    def values(self, load: LoadSection) -> tuple[float, ...]:
         """Values of ``load`` at load factors 0, 1, 2, ..., the ends of all stages."""
         given = [*load.stages, *[load.stages[-1]] * (self.n_stages - len(load.stages))]
         return (0.0,) * (1 + self.fits) + tuple(given)
@@ -160,6 +170,6 @@ class ProblemScene(Checked):
         )
 
     @property
-    def solids(self) -> dict[str, Body]:
+    def solids(self) -> dict[str, BodySection]:
         """The bodies by name."""
         return {body.name: body for body in self.body}

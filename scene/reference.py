@@ -9,7 +9,7 @@ from typing import Any, get_args, get_origin
 from archord.materials.named import metals
 from archord.report.table import Table
 from archord.scene.errors import toml_value
-from archord.scene.parts import Mesh
+from archord.scene.parts import MeshSection
 from archord.scene.problem import FORMAT, ProblemScene
 from archord.scene.scene import FORMAT as JOINT_FORMAT
 from archord.scene.scene import Scene
@@ -21,7 +21,7 @@ _JOINT: dict[str, Any] = {
 _GENERAL: dict[str, Any] = {
     name: info for name, info in ProblemScene.model_fields.items() if name != "format"
 }
-_GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
+_GENERAL["mesh.circle"] = MeshSection.model_fields["circle"]
 # sections of presets; the load is the same for all
 _LUG = {name: PRESETS["lug"].model_fields[name] for name in ("lug", "plate", "bushing")}
 _CLEVIS = {name: PRESETS["clevis"].model_fields[name] for name in ("clevis", "inner", "outer")}

@@ -100,7 +100,7 @@ class Checked(Section):
     @property
     def plastic(self: Any) -> bool:
         """Whether any body can yield."""
-        return any(solid.yield_stress is not None for solid in self.solids.values())
+        return any(solid.plastic for solid in self.solids.values())
 
 
 class Scene(Checked):

@@ -156,6 +156,11 @@ class Solid(Section):
         return self
 
     @property
+    def plastic(self) -> bool:
+        """Whether the solid can yield."""
+        return self.yield_stress is not None
+
+    @property
     def perfectly_plastic(self) -> bool:
         """Whether the yield stress is a constant."""
         return self.hardening == 0 and not self.back_stresses

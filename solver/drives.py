@@ -28,7 +28,7 @@ from archord.geometry.basis import Array
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.prescribed import Prescribed
-from archord.solver.problem import Body, Load, Mean, Problem, Rigid
+from archord.solver.problem import Body, DeadLoad, Mean, Problem, Rigid
 
 LOAD_DEGREE = 6  # of the quadrature of distributed forces
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
@@ -226,7 +226,7 @@ class Drives:
         vector.scatter_reverse(InsertMode.add)
         return vector.array[: 2 * self.n_owned].reshape(-1, 2)
 
-    def _nodal_forces(self, load: Load) -> Array:
+    def _nodal_forces(self, load: DeadLoad) -> Array:
         """Forces ``(n_owned, 2)`` on the modelled part per unit of the drive."""
         mesh, v, measure = (
             self.V.mesh,

@@ -15,7 +15,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.solver.problem import Drive, Problem, Support
+from archord.solver.problem import Dirichlet, Drive, Problem
 
 _ALIKE = 1e-9  # of the larger of two displacements: a difference that is round-off
 _AXES = "xy"
@@ -120,7 +120,7 @@ class Prescribed:
             motion.together |= (name, facets, 1 - axis) in found
         return [found[key] for key in sorted(found)]
 
-    def _rate(self, support: Support, nodes: np.ndarray) -> Array | float:
+    def _rate(self, support: Dirichlet, nodes: np.ndarray) -> Array | float:
         return support.rate(self._x[nodes]) if callable(support.rate) else support.rate
 
     def _note(self, motion: _Motion, nodes: np.ndarray) -> None:

@@ -2,8 +2,7 @@
 what loads them.
 
 Sets of cells, facets and points are named in the mesh. One number, the load factor, runs along the
-path; drives turn it into displacements of supports and rigid circles, and into forces (per unit
-thickness), in any consistent units.
+path: 1, 2, ... are the ends of its stages. Units are any consistent ones.
 """
 
 from __future__ import annotations
@@ -13,197 +12,178 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
+from mpi4py import MPI
 
-from archord.geometry.basis import Array
+from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.materials.kinematics import PLANE_STRAIN, Kinematics
+from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
+from archord.materials.named import named_material
+from archord.report.errors import InputError, in_sentences
+from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean
 from archord.solver.contact.interaction import Interaction, Rigid
+from archord.solver.parts import Body, Coupling, Load, Support
 
-__all__ = ["Body", "Drive", "Guess", "Interaction", "Load", "Mean", "Problem", "Rigid", "Support"]
-Vector = tuple[float, float]
+__all__ = ["Body", "Coupling", "DeadLoad", "Dirichlet", "Drive", "Guess", "Interaction", "Load"]
+__all__ += ["Mean", "Problem", "Rigid", "Support"]
 
-
-@dataclass(frozen=True)
-class Body:
-    """The cells of the set ``cells`` (that of the body's ``name`` if empty), of one
-    ``material``."""
-
-    name: str
-    material: Any
-    cells: str = ""
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What moves supports, rigid circles and means, or multiplies loads: by a displacement or a
-    force on the ``path``.
-
-    ``path`` holds the values at the load factors 0, 1, 2, ..., with straight lines between,
-    constant behind; without one the value is the load factor itself. Under ``control`` "force" the
-    value is the force that works on the drive's displacement, over all symmetric parts of the
-    problem, and the displacement is unknown. Loads always take a force.
-    """
-
-    name: str
-    path: Sequence[float] = ()
-    control: Literal["displacement", "force"] = "displacement"
-
-    def value(self, factor: float) -> float:
-        """The value at the load ``factor``."""
-        return float(self.values(np.array(factor)))
-
-    def values(self, factors: Array) -> Array:
-        """The values at the load ``factors``."""
-        return (
-            np.interp(factors, np.arange(len(self.path)), self.path) if len(self.path) else factors
-        )
+Parts = Sequence[Any]
+_PLANES = ("plane strain", "plane stress", "axisymmetric")
+_PARTS = {
+    "bodies": (Body,),
+    "interactions": (Interaction,),
+    "supports": (Support, Dirichlet),
+    "loads": (Load, DeadLoad),
+    "couplings": (Coupling,),
+    "means": (Mean,),
+    "drives": (Drive,),
+}
+_DIFFERENT = ("bodies", "interactions", "drives", "couplings")
 
 
-@dataclass(frozen=True)
-class Support:
-    """Component ``axis`` of the displacement of a facet set is ``rate`` times that of the
-    ``drive``.
-
-    ``rate`` is a number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``.
-    Supports of one ``name`` have one reaction, and those of one set their drives add up. Drives
-    "x", "y", "turn" of one name, at rates 1, 1, ``(Y - y, x - X)``, are a rigid reference point (X,
-    Y).
-
-    Where sets share a node, a support without a rate wins over a displacement, with a warning. It
-    must not meet a set that moves as one, under a force or along both axes, unless that keeps the
-    node at rest. All other supports of a node must move it alike. Those that hold a node together
-    have equal parts of its reaction.
-    """
-
-    name: str
-    facets: str
-    axis: int
-    rate: float | Callable[[Array], Array] = 0.0
-    drive: str = ""
-
-    @property
-    def moves(self) -> bool:
-        """Whether it depends on its drive."""
-        return callable(self.rate) or self.rate != 0
-
-
-@dataclass(frozen=True)
-class Load:
-    """Dead loads on the cells or the facets of a set, times the value of the ``drive``.
-
-    ``force`` is that over all symmetric parts of the problem, spread as ``density(x)``, a UFL
-    expression of the position, says, evenly without. ``pressure`` acts on facets, along the
-    undeformed normal into the body.
-    """
-
-    cells: str = ""
-    force: Vector = (0.0, 0.0)
-    density: Callable[[Any], Any] | None = None
-    facets: str = ""
-    pressure: float = 0.0
-    drive: str = ""
-
-
-@dataclass(frozen=True)
-class Mean:
-    """The mean motion of a facet set, as that of a reference ``point`` along ``axis`` 0, 1 or 2,
-    its rotation.
-
-    With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x -
-    c|^2`` about the centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive``
-    prescribes that motion, or the force (moment) on the point, which the facets get spread as the
-    motion's derivative says: statically equivalent. Without a point it is the centroid, as also of
-    facets that a symmetric half shows of an edge across its axis: the mirrored facets take up the
-    moment. Means of one ``name`` have one reaction. A drive has one mean at most.
-    """
-
-    name: str
-    facets: str
-    axis: int
-    point: Vector | None = None
-    drive: str = ""
-
-
-@dataclass(frozen=True)
-class Guess:
-    """Where the first solve starts: the displacement of the drive "", and by how much each body has
-    moved rigidly."""
-
-    factor: float
-    moved: Mapping[str, Vector] = field(default_factory=dict)
-
-
+@in_sentences
 @dataclass(frozen=True)
 class Problem:
-    """What is to be solved.
+    """Bodies in contact on a mesh, and what holds and loads them: what is solved.
 
-    The ``kinematics`` (plane strain, plane stress, axisymmetric) are given to the materials of all
-    bodies.
+    Parameters
+    ----------
+    mesh : str, Path, module, tuple, TaggedMesh or Mesh
+        A mesh file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a `Mesh` of one of
+        these.
+    bodies : sequence of Body
+        The deformable bodies.
+    interactions : sequence of Interaction
+        The contact of surfaces.
+    supports : sequence of Support
+        What is held. `Dirichlet` conditions may stand beside them.
+    loads : sequence of Load
+        What moves or presses. `DeadLoad` may stand beside them.
+    couplings : sequence of Coupling
+        Reference points.
+    means, drives : sequence of Mean, sequence of Drive
+        Mean motions, and the drives of conditions that are stated one by one.
+    steps : int or sequence of int
+        Output steps of each stage of the path: one number for all stages, or a number for each.
+    fit_steps : int
+        Output steps of the stage before, in which interferences arise.
+    kinematics : {"plane strain", "plane stress", "axisymmetric"}
+        How displacement becomes strain, in all bodies. Axisymmetric problems have the coordinates
+        x = r and y = z, and forces of the whole ring.
+    thickness : float
+        The thickness; forces and energies are per unit thickness without it.
+    strain : {"small", "large"}
+        Small strain, or large strain by logarithms, of all bodies.
+    symmetry : float
+        How many times the part on the mesh makes up the whole. Forces and energies are of the whole.
+    units : tuple of str
+        Names of the units of length and stress.
+    degree : int
+        The polynomial degree of displacements.
+    tolerance : float
+        Residual over reaction at which Newton's method stops.
+    max_iterations : int
+        Newton iterations before a step is cut.
+    stepping : dict
+        The control of steps between outputs, by the keys of a scene's section stepping.
+    fit, stabilise : bool
+        Whether the path begins with a stage of its own, between the load factors 0 and 1, in which
+        interferences arise; and whether weak springs hold bodies that supports do not. Both are
+        true of problems that are stated by `Load` where they are needed.
+    load_name : str
+        What messages call the load.
+    travel : float
+        The size of displacements to be expected, which limits what counts as round-off.
+    guess : callable
+        The `Guess` for the first step at a load factor.
+    from_rest : bool
+        Whether the bodies are in equilibrium before the first step. They are not in a press fit
+        without a stage of its own.
+    coarser : callable
+        Makes the same problem on a coarser mesh, for guesses.
 
-    A load on the path is the load factor, which each of the ``drives`` turns into its value. The
-    drive "" is there without being given, with the load factor for its displacement. ``load_name``
-    names the load in messages.
+    Raises
+    ------
+    InputError
+        For arguments of a wrong kind.
+    ValueError
+        For names that are not different, and drives that contradict each other.
 
-    With ``fit`` the path begins with a stage of its own: between the load factors 0 and 1
-    interferences grow from nothing. With ``stabilise`` weak springs hold bodies that supports do
-    not, which so may begin without contact.
-
-    ``symmetry`` is how many times the modelled part makes up the whole, whose forces and energies
-    are reported. ``travel`` is the size of displacements to be expected, which limits what counts
-    as round-off. Newton's method stops at a residual of ``tolerance`` over the reaction. ``guess``
-    starts the first step at a load; ``from_rest`` tells whether the bodies are in equilibrium
-    before it (they are not in a press fit without a stage of its own). ``coarser`` makes the same
-    problem on a coarser mesh, for guesses.
+    Examples
+    --------
+    >>> from archord import Body, Elastic, Interaction, Load, Problem, Support
+    >>> problem = Problem(
+    ...     "lug.msh",
+    ...     bodies=[Body("lug", material="S355"), Body("pin", Elastic(210e3, 0.3))],
+    ...     interactions=[Interaction("contact", ("bolt", "hole"), friction=0.1)],
+    ...     supports=[Support("clamp", fixed="xy")],
+    ...     loads=[Load("pull", on="flat", direction="x", displacement=[0.3, 0.0])],
+    ...     steps=[15, 5],
+    ... )
+    >>> problem.n_stages
+    2
     """
 
-    mesh: TaggedMesh
+    mesh: Any
     bodies: Sequence[Body]
     interactions: Sequence[Interaction] = ()
-    supports: Sequence[Support] = ()
-    loads: Sequence[Load] = ()
+    supports: Sequence[Any] = ()
+    loads: Sequence[Any] = ()
+    couplings: Sequence[Coupling] = ()
     means: Sequence[Mean] = ()
     drives: Sequence[Drive] = ()
-    fit: bool = False
-    stabilise: bool = False
-    degree: int = 2
+    steps: int | Sequence[int] = 20
+    fit_steps: int = 1
+    kinematics: Any = PLANE_STRAIN
+    thickness: float | None = None
+    strain: Literal["small", "large"] = "small"
     symmetry: float = 1.0
-    load_name: str = "load factor"
-    travel: float = np.inf
+    units: tuple[str, str] = ("mm", "MPa")
+    degree: int = 2
     tolerance: float = 1e-10
     max_iterations: int = 25
+    stepping: Mapping[str, Any] = field(default_factory=dict)
+    fit: bool = False
+    stabilise: bool = False
+    load_name: str = "load factor"
+    travel: float = np.inf
     guess: Callable[[float], Guess] = Guess
     from_rest: bool = True
     coarser: Callable[[], Problem] | None = None
-    kinematics: Kinematics = PLANE_STRAIN
 
     def __post_init__(self) -> None:
-        """Give the materials the kinematics; check names, which must be unique, and drives. Raises
-        ValueError."""
-        bodies = [replace(b, material=b.material.under(self.kinematics)) for b in self.bodies]
+        """Check the parts, their names, which must be unique, and the drives."""
+        if not isinstance(self.mesh, TaggedMesh):
+            object.__setattr__(self, "mesh", Mesh.of(self.mesh))
+        for kind, classes in _PARTS.items():
+            _require_parts(kind, getattr(self, kind), classes)
+        if self.strain not in ("small", "large"):
+            said = f'must be "small" or "large", not {self.strain!r}'
+            raise InputError(f"archord.Problem: strain {said}.")
+        object.__setattr__(self, "kinematics", _kinematics(self.kinematics))
+        bodies = [replace(body, material=self._live(body)) for body in self.bodies]
         object.__setattr__(self, "bodies", bodies)
-        for kind in ("bodies", "interactions", "drives"):
+        for kind in _DIFFERENT:
             names = [part.name for part in getattr(self, kind)]
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} must have different names, these are {', '.join(names)}")
         for load in self.loads:
-            if bool(load.cells) == bool(load.facets) or (
-                load.pressure and (load.cells or any(load.force))
-            ):
-                raise ValueError(
-                    "a load is a force on the cells of a set or on its facets, or a pressure on facets"
-                )
-        moves, loads, means = (
-            self.moving_drives(),
-            {x.drive for x in self.loads},
-            [x.drive for x in self.means],
-        )
+            if isinstance(load, DeadLoad):
+                load.check()
+        if not self.is_stated:
+            self._require_drives()
+
+    def _require_drives(self) -> None:
+        """Raise ValueError for drives that are missing, idle, or used in two ways."""
+        moves = self.moving_drives()
+        loads = {load.drive for load in self.loads if isinstance(load, DeadLoad)}
+        means = [mean.drive for mean in self.means]
         known = [drive.name for drive in self.all_drives]
         for name in (*moves, *loads, *means):
             if name not in known:
-                raise ValueError(
-                    f"there is no drive {name!r}; there are {', '.join(map(repr, known))}"
-                )
-            if (name in moves) + (name in loads) + means.count(name) > 1:
+                names = ", ".join(map(repr, known))
+                raise ValueError(f"there is no drive {name!r}; there are {names}")
+            uses = (name in moves) + (name in loads) + means.count(name)
+            if uses > 1:
                 raise ValueError(
                     f"the drive {name!r} must move supports and discs, multiply loads, or have one mean"
                 )
@@ -211,25 +191,80 @@ class Problem:
             if name and name not in (*moves, *loads, *means):
                 raise ValueError(f"the drive {name!r} moves nothing and multiplies no load")
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether parts are stated that `archord.solver.expansion` makes conditions of."""
+        stated = (Support, Load)
+        return bool(self.couplings) or any(
+            isinstance(part, stated) for part in (*self.supports, *self.loads)
+        )
+
+    def on(self, comm: MPI.Comm = MPI.COMM_WORLD) -> Problem:
+        """The problem with its mesh on the ranks of ``comm``, unless it is on ranks already.
+        Collective; raises ValueError for what is no mesh."""
+        if not isinstance(self.mesh, Mesh):
+            return self
+        return replace(self, mesh=self.mesh.on(comm))
+
+    def _live(self, body: Body) -> Any:
+        """The material of the ``body`` under the problem's kinematics."""
+        material = body.material
+        if isinstance(material, str):
+            try:
+                material = named_material(material, self.units[1])
+            except ValueError as error:
+                said = f'body "{body.name}".material = "{body.material}" {error}'
+                raise InputError(f"archord.Problem: {said}.") from None
+        material = material.under(self.kinematics)
+        if self.strain == "small" or material.finite:
+            return material
+        from archord.materials.finite import LargeStrain
+
+        return LargeStrain(material)
+
+    @property
+    def mesh_file(self) -> str:
+        """The file of the mesh, "" for a mesh from Python."""
+        return self.mesh.file if isinstance(self.mesh, Mesh) else ""
+
+    @property
+    def mesh_name(self) -> str:
+        """What messages call the mesh."""
+        return self.mesh.name if isinstance(self.mesh, Mesh) else "the mesh"
+
+    @property
+    def n_stages(self) -> int:
+        """How many stages the loads have."""
+        stages = [len(load.stages) for load in self.loads if isinstance(load, Load)]
+        return max(stages, default=1)
+
+    @property
+    def fits(self) -> bool:
+        """Whether a stage comes before them in which interferences arise."""
+        return self.fit or any(i.interference or i.overlap for i in self.interactions)
+
+    def values(self, load: Load) -> tuple[float, ...]:
+        """The values of ``load`` at the load factors 0, 1, 2, ..., the ends of all stages."""
+        stages = load.stages
+        last = (stages[-1],) * (self.n_stages - len(stages))
+        return (0.0,) * (1 + self.fits) + stages + last
+
     def moving_drives(self) -> set[str]:
         """Names of the drives that move supports or rigid discs."""
-        discs = [
-            given for i in self.interactions for given in i.surfaces if isinstance(given, Rigid)
-        ]
-        return {s.drive for s in self.supports if s.moves} | {
-            name for disc in discs for name in disc.moved_by()
-        }
+        surfaces = [given for i in self.interactions for given in i.surfaces]
+        discs = [given for given in surfaces if isinstance(given, Rigid)]
+        by_discs = {name for disc in discs for name in disc.moved_by()}
+        moving = [s for s in self.supports if isinstance(s, Dirichlet) and s.moves]
+        return {s.drive for s in moving} | by_discs
 
     @property
     def all_drives(self) -> list[Drive]:
-        """The ``drives``, and the one of the load factor where it is used and not given, or
+        """The ``drives``, and the drive of the load factor where it is used and not given, or
         alone."""
-        used = (
-            self.moving_drives()
-            | {load.drive for load in self.loads}
-            | {mean.drive for mean in self.means}
-        )
-        alone = not self.drives or ("" in used and all(drive.name for drive in self.drives))
+        loads = {load.drive for load in self.loads if isinstance(load, DeadLoad)}
+        used = self.moving_drives() | loads | {mean.drive for mean in self.means}
+        has_names = all(drive.name for drive in self.drives)
+        alone = not self.drives or ("" in used and has_names)
         return [*self.drives, *([Drive("")] if alone else [])]
 
     @property
@@ -243,22 +278,41 @@ class Problem:
 
     def cells_of(self, body: Body) -> np.ndarray:
         """Cells ``(n,)`` of the body on this rank, ghosts included."""
-        return self.mesh.cells_in(body.cells or body.name)
+        return self.mesh.cells_in(body.cells)
 
     def tag(self, body: Body) -> int:
         """The body's number: the lowest tag of its cells."""
-        return min(self.mesh.cell_tags(body.cells or body.name))
+        return min(self.mesh.cell_tags(body.cells))
 
     def body_of(self, facets: str) -> Body:
         """The body that a facet set belongs to. Collective; raises ValueError if it is not one."""
-        tags = self.mesh.tags_behind(facets)
-        found = [
-            body for body in self.bodies if tags & set(self.mesh.cell_tags(body.cells or body.name))
-        ]
+        behind = self.mesh.tags_behind(facets)
+        tags = {body.name: set(self.mesh.cell_tags(body.cells)) for body in self.bodies}
+        found = [body for body in self.bodies if behind & tags[body.name]]
         if not found:
             raise ValueError(f"the facet set {facets!r} is of no body: give that body, too")
-        if len(found) > 1 or not tags <= set(self.mesh.cell_tags(found[0].cells or found[0].name)):
+        if len(found) > 1 or not behind <= tags[found[0].name]:
             raise ValueError(
-                f"the facet set {facets!r} belongs to {len(tags)} cell sets, a surface to one body"
+                f"the facet set {facets!r} belongs to {len(behind)} cell sets, a surface to one body"
             )
         return found[0]
+
+
+def _require_parts(kind: str, given: Any, classes: tuple[type, ...]) -> None:
+    """Raise `InputError` unless ``given`` is a list of parts of these ``classes``."""
+    names = " or ".join(cls.__name__ for cls in classes)
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise InputError(f"archord.Problem: {kind} must be a list of {names}, not {given!r}.")
+    for part in given:
+        if not isinstance(part, classes):
+            raise InputError(f"archord.Problem: {kind} must be of the class {names}, not {part!r}.")
+
+
+def _kinematics(given: str | Kinematics) -> Kinematics:
+    """The kinematics of this name. Raises `InputError`."""
+    if isinstance(given, Kinematics):
+        return given
+    if given not in _PLANES:
+        known = ", ".join(f'"{name}"' for name in _PLANES)
+        raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
+    return kinematics(given.removeprefix("plane "))

@@ -15,15 +15,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError, RigidCircle
+from archord.report.errors import in_sentences, require_of
 from archord.solver.contact.law import ContactLaw
-from archord.solver.contact.named import contact_law
+from archord.solver.contact.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -48,27 +49,53 @@ class Rigid:
         return {name: rate for name, rate in rates.items() if any(rate)}
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Interaction:
-    """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid
-    disc.
+    """Contact of two surfaces, or of a rigid disc and a surface.
 
-    ``law`` is "frictionless", "coulomb", "tied" or a `ContactLaw`; ``friction`` is Coulomb's
-    coefficient, and makes a law without friction Coulomb's.
-    Under ``kinematics`` "current" the closest points are those of the deformed curves, under
-    "reference" those of the undeformed ones, with the normal of the first surface for both, and the
-    gap is linear in the displacement; a law whose points do not slide has no other.
-    ``gamma_factor`` is Nitsche's gamma over the trace constant of each contact cell. ``integrated``
-    names the one facet set whose points carry the contact, both do if empty. The matrix gets room
-    from the start for pairs that ``slide`` as far as this.
+    Parameters
+    ----------
+    name : str
+        The name of the interaction.
+    surfaces : tuple of str
+        Two facet sets, of one body each. The first may be a rigid disc, a `RigidCircle`.
+    law : str or ContactLaw
+        The contact law: a name, "frictionless", "tied" or "coulomb", or an object that keeps the
+        protocol of `archord.solver.contact.law.ContactLaw`.
+    friction : float
+        Coulomb's coefficient of friction, of the laws "frictionless" and "coulomb".
+    kinematics : {"current", "reference"}
+        Closest points on the deformed curves; or on the undeformed ones, with the normal of the
+        first surface for both, and a gap that is linear in the displacement. A law whose points do
+        not slide has the second.
+    gamma_factor : float
+        Nitsche's gamma over the trace constant of each contact cell.
+    integrated : str
+        The one facet set whose points carry the contact. Both do by default.
+    slide : float
+        How far pairs slide that the matrix gets room for from the start.
+    interference : float
+        Of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are pushed
+        together. The gap gets ``-interference s``, and ``s`` grows to 1 in a stage of its own.
+    overlap : float
+        Of a press fit that the mesh shows: how deep the surfaces are drawn into each other. The gap
+        gets ``overlap (1 - s)`` in the same stage.
 
-    The gap of the law is that between the surfaces, less ``interference``, which their mesh does
-    not show; ``overlap`` is what it shows. Both grow in a stage of the fit, to ``s``: the gap gets
-    ``overlap (1 - s) - interference s``.
+    Raises
+    ------
+    InputError
+        For surfaces that are not two, a law that is none, and values out of range.
+
+    Examples
+    --------
+    >>> from archord import Interaction
+    >>> Interaction("contact", ("bolt", "hole"), law="coulomb", friction=0.1).friction
+    0.1
     """
 
     name: str
-    surfaces: tuple[str | Rigid, str]
+    surfaces: tuple[Any, str]
     law: str | ContactLaw = "frictionless"
     friction: float = 0.0
     kinematics: Literal["current", "reference"] = "current"
@@ -77,6 +104,22 @@ class Interaction:
     slide: float = 0.0
     interference: float = 0.0
     overlap: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the parts; raise `InputError`."""
+        require_of(self, isinstance(self.name, str) and self.name != "", "name", "must be a name")
+        kinds = (str, Rigid, RigidCircle)
+        two = not isinstance(self.surfaces, str) and len(self.surfaces) == 2
+        known = two and isinstance(self.surfaces[0], kinds) and isinstance(self.surfaces[1], str)
+        said = "must be two facet sets, or a rigid disc and one"
+        require_of(self, known, "surfaces", said)
+        require_of(self, self.surfaces[0] != self.surfaces[1], "surfaces", "must be different")
+        named = isinstance(self.law, str) and self.law in NAMES
+        is_law = ContactLaw in type(self.law).__mro__
+        said = f"must be a contact law, or one of {', '.join(map(repr, NAMES))}"
+        require_of(self, named or is_law, "law", said)
+        require_of(self, self.interference >= 0, "interference", "must not be negative")
+        require_of(self, self.overlap >= 0, "overlap", "must not be negative")
 
 
 class Interface:

@@ -20,6 +20,7 @@ from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium import Equilibrium
+from archord.solver.expansion import expanded
 from archord.solver.path.load_path import Companion, LoadPath, Position
 from archord.solver.path.newton import NewtonSolver
 from archord.solver.path.recovery import Recovery
@@ -49,6 +50,7 @@ class System:
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
+        problem = expanded(problem.on())
         self.problem, self.timer, self.comm = problem, timer or Timer(), problem.mesh.mesh.comm
         with self.timer("setup"):
             mesh = problem.mesh.mesh

@@ -12,7 +12,7 @@ from archord.output.fields import FieldWriter, collect_fields, collect_mesh
 from archord.postprocess.fields import read_fields
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Problem
 from tests.solver.parts import quarter_annulus
 
 A, B, E, NU = 1.0, 2.0, 1.0, 0.3
@@ -20,8 +20,8 @@ A, B, E, NU = 1.0, 2.0, 1.0, 0.3
 
 def ring(size, comm=MPI.COMM_SELF, **options):
     """A quarter of a thick-walled cylinder whose inner wall moves outward by 1."""
-    supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
-    supports += [Support("x", "x", 1), Support("y", "y", 0)]
+    supports = [Dirichlet("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
+    supports += [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
     mesh = quarter_annulus(comm, A, B, size, **options)
     return System(Problem(mesh, [Body("ring", Elastic(E, NU, "strain"))], supports=supports))
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematics import kinematics
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.solver.parts import NU, YIELD_STRESS, E, blocks, solve
 
 
@@ -61,9 +61,9 @@ def test_blocks_pressed_together_follow_the_closed_form(plane):
     pressure = bulk * strain + 2 / 3 * s if plane == "strain" else s
     material, walls = J2Material(E, NU, plane, VOCE), ("left", "right")[: 1 + (plane == "strain")]
     supports = [
-        Support("base", "base", 1),
-        Support("lid", "lid", 1, -2.0),
-        *(Support(w, w, 0) for w in walls),
+        Dirichlet("base", "base", 1),
+        Dirichlet("lid", "lid", 1, -2.0),
+        *(Dirichlet(w, w, 0) for w in walls),
     ]
     contact = Interaction("contact", ("upper bottom", "lower top"), kinematics="reference")
     bodies = [Body("lower", material), Body("upper", material)]

@@ -3,6 +3,7 @@ again."""
 
 import json
 import shutil
+import signal
 
 import basix.ufl
 import numpy as np
@@ -16,8 +17,7 @@ from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.formats.read import read_mesh, tagged
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
-from archord.output.restart import plan_restart
-from archord.output.run import solve_scene
+from archord.progress import Progress
 
 CURVED = np.array(
     [[0, 0], [1, 0], [0, 1], [0.55, 0.6], [0, 0.5], [0.5, 0], [1, 1], [0.45, 1], [1, 0.55]],
@@ -44,22 +44,14 @@ def square(comm):
     )
 
 
-def problem(mesh, **sections):
+def problem(mesh, **changes):
+    lead = archord.J2Material(1000.0, 0.3, "strain", archord.LinearHardening(5.0, 10.0))
     return archord.Problem(
         mesh,
-        bodies=[
-            {
-                "name": "plate",
-                "cells": "1",
-                "E": 1000.0,
-                "nu": 0.3,
-                "yield_stress": 5.0,
-                "hardening": 10.0,
-            }
-        ],
-        supports=[{"name": "clamp", "on": "3", "fixed": ["x", "y"]}],
-        loads=[{"name": "pull", "on": "8", "direction": "x", "displacement": [0.02, 0.0]}],
-        **({"path": {"steps": [3, 1]}, "analysis": {"plane": "strain"}} | sections),
+        bodies=[archord.Body("plate", lead, cells="1")],
+        supports=[archord.Support("clamp", on="3")],
+        loads=[archord.Load("pull", on="8", direction="x", displacement=[0.02, 0.0])],
+        **({"steps": [3, 1]} | changes),
     )
 
 
@@ -72,9 +64,7 @@ def forces(folder):
 def test_the_run_goes_on_and_is_solved_again_from_its_folder(comm, tmp_path, keys):
     """To the same numbers, also elsewhere, and into the folder itself."""
     folder = comm.bcast(tmp_path)
-    scene = problem(square(comm))
-    scene = scene.model_copy(update={"mesh": scene.mesh.model_copy(update=keys)})
-    first = archord.solve(scene, folder / "first", comm=comm)
+    first = archord.solve(problem(archord.Mesh(square(comm), **keys)), folder / "first", comm=comm)
     said = (first.folder / "scene.toml").read_text()
     assert 'file = "mesh.npz"' in said
     expected = forces(first.folder)
@@ -93,27 +83,36 @@ def test_the_run_goes_on_and_is_solved_again_from_its_folder(comm, tmp_path, key
     assert (folder / "moved" / "scene.toml").read_text() == said
 
 
-def test_the_run_is_extended_and_restarted(tmp_path):
-    """A run moved after two of its steps goes on as if nothing had been."""
-    whole = forces(archord.solve(problem(square(MPI.COMM_SELF)), tmp_path / "whole").folder)
-    short = problem(square(MPI.COMM_SELF), path={"steps": [3, 1]})
-    stopped = False
+def interrupted(problem, folder, monkeypatch, step):
+    """A run of ``problem`` that Ctrl-C ends after this ``step``."""
 
-    def stop(m):
-        nonlocal stopped
-        if m.step == 2 and not stopped:
-            stopped = True
-            raise KeyboardInterrupt
+    def stop(self, m):
+        if m.step == step:
+            signal.raise_signal(signal.SIGINT)
 
-    (tmp_path / "short").mkdir()
-    with pytest.raises(KeyboardInterrupt):
-        solve_scene(short, tmp_path / "short", MPI.COMM_SELF, on_step=stop)
+    with monkeypatch.context() as patch:
+        patch.setattr(Progress, "step", stop)
+        with pytest.raises(KeyboardInterrupt):
+            archord.solve(problem, folder)
+
+
+def test_the_run_is_extended_and_restarted(tmp_path, monkeypatch):
+    """A run moved after two of its steps goes on as if nothing had been, with the problem and with
+    what its folder tells of it."""
+    stated = problem(square(MPI.COMM_SELF))
+    whole = forces(archord.solve(stated, tmp_path / "whole").folder)
+    interrupted(stated, tmp_path / "short", monkeypatch, 2)
     shutil.move(tmp_path / "short", tmp_path / "moved")
-    plan = plan_restart(tmp_path / "moved")
-    assert plan.start is not None
-    solve_scene(plan.scene, tmp_path / "moved", MPI.COMM_SELF, start=plan.start)
-    assert forces(tmp_path / "moved") == pytest.approx(whole, rel=1e-10)
-    assert json.loads((tmp_path / "moved" / "run.json").read_text())["status"] == "done"
+    shutil.copytree(tmp_path / "moved", tmp_path / "words")
+    problem_again = problem(square(MPI.COMM_SELF))
+    words = archord.load_scene(tmp_path / "words" / "scene.toml")
+    for folder, given in (("moved", problem_again), ("words", words)):
+        run = archord.solve(given, tmp_path / folder, restart=True)
+        assert forces(run.folder) == pytest.approx(whole, rel=1e-10)
+        assert run.summary["restarts"][0]["after_step"] == 2
+        assert run.status == "done"
+    with pytest.raises(archord.InputError, match="only"):
+        archord.solve(problem(square(MPI.COMM_SELF), tolerance=1e-6), run.folder, restart=True)
 
 
 def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):

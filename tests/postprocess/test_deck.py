@@ -21,7 +21,7 @@ from archord.postprocess.decks.deck import contact_stiffness, deck, system_of
 from archord.postprocess.decks.mesh import deck_mesh
 from archord.scene.file import resolved
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Support
+from archord.solver.problem import Body, DeadLoad, Dirichlet, Drive, Interaction, Mean, Problem
 
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
@@ -238,14 +238,14 @@ def press_fit(drawn):
         "fit", ("sleeve 1 outside", "bore"), **{"overlap" if drawn else "interference": 0.02}
     )
     supports = [
-        Support("held", "outer edge", 0),
-        Support("held", "outer edge", 1),
-        Support("axis", "axis", 1),
+        Dirichlet("held", "outer edge", 0),
+        Dirichlet("held", "outer edge", 1),
+        Dirichlet("axis", "axis", 1),
     ]
     drives = [Drive("press", (0.0, 0.0, 100.0), "force")]
     problem = Problem(
         joint, bodies, [Interaction("inside", ("pin", "sleeve 1 inside")), fit],
-        [*supports, Support("press", "flat", 0, 1.0, "press")],
+        [*supports, Dirichlet("press", "flat", 0, 1.0, "press")],
         drives=drives, fit=True, stabilise=True, symmetry=2.0,
     )  # fmt: skip
     system = System(problem)
@@ -288,12 +288,16 @@ def test_nodal_forces_on_quadrilaterals():
             gmsh.model.addPhysicalGroup(1, [line], name=name)
         gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
 
-    wall = [Support("wall", "left", axis) for axis in (0, 1)]
+    wall = [Dirichlet("wall", "left", axis) for axis in (0, 1)]
     problem = Problem(
-        gmsh_to_mesh(MPI.COMM_SELF, build, quads=True), [Body("bar", Elastic(2e5, 0.3, "strain"))], (), wall,
-        [Load("bar", (1.0, 0.0), drive="weight")], [Mean("end", "right", 1, (4.0, 0.5), "end")],
-        [Drive("weight", (0.0, 8.0, 0.0)), Drive("end", (0.0, 3.0, 0.0), "force")], symmetry=2.0,
-    )  # fmt: skip
+        gmsh_to_mesh(MPI.COMM_SELF, build, quads=True),
+        [Body("bar", Elastic(2e5, 0.3))],
+        supports=wall,
+        loads=[DeadLoad("bar", (1.0, 0.0), drive="weight")],
+        means=[Mean("end", "right", 1, (4.0, 0.5), "end")],
+        drives=[Drive("weight", (0.0, 8.0, 0.0)), Drive("end", (0.0, 3.0, 0.0), "force")],
+        symmetry=2.0,
+    )
     system = System(problem)
     mesh = deck_mesh(system)
     found = read(deck(system, mesh, [1.0, 2.0]))

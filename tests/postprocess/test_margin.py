@@ -18,7 +18,7 @@ from archord.postprocess.margin import (
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
-from archord.scene.parts import Body
+from archord.scene.parts import BodySection
 from archord.scene.shapes import LugShape
 from tests.output.run_files import solved
 
@@ -65,7 +65,7 @@ def test_hand_formulas_are_those_of_the_sections():
 def test_strengths_are_those_of_the_tension_test_behind_the_curve():
     """0.2 % proof and largest engineering stress; of metals with a plateau the yield strength; of
     named ones the listed strengths."""
-    power = Body(
+    power = BodySection(
         name="lug", **STEEL, yield_stress=200.0, hardening={"offset": 0.002, "exponent": 0.2}
     )
     assert tensile_strength(power) == pytest.approx(
@@ -76,10 +76,10 @@ def test_strengths_are_those_of_the_tension_test_behind_the_curve():
         ("CuSn12-C", 150, 300),
         ("Ti-6Al-4V", 827, 896),
     ):
-        metal = Body(name="lug", material=name)
+        metal = BodySection(name="lug", material=name)
         assert proof_strength(metal) == pytest.approx(proof, rel=1e-3)
         assert tensile_strength(metal) == pytest.approx(tensile, rel=2e-3)
-    flat = Body(name="lug", **STEEL, yield_stress=200.0)
+    flat = BodySection(name="lug", **STEEL, yield_stress=200.0)
     assert (proof_strength(flat), tensile_strength(flat)) == (200.0, 200.0)
 
 

@@ -32,15 +32,15 @@ def solved(folder, size, displacement, analysis=None, lug=None, **shape):
     lug_shape |= {"element_size": size, "growth": 0.3, **shape}
     steel = {"E": 210000.0, "nu": 0.3}
     half = shape.get("half", True)
-    scene = archord.Problem(
-        {"shape": lug_shape},
-        bodies=[{"name": "pin"} | steel, {"name": "lug"} | (lug or steel)],
-        interactions=[{"name": "contact", "surfaces": ["pin", "hole"]}],
-        supports=[
+    scene = archord.ProblemScene(
+        mesh={"shape": lug_shape},
+        body=[{"name": "pin"} | steel, {"name": "lug"} | (lug or steel)],
+        interaction=[{"name": "contact", "surfaces": ["pin", "hole"]}],
+        support=[
             {"name": "axis", "on": "axis", "fixed": ["y"]},
             {"name": "clamp", "on": "clamp", "fixed": ["x", "y"]},
         ],
-        loads=[{"name": "pull", "on": "flat", "direction": "x", "displacement": displacement}],
+        load=[{"name": "pull", "on": "flat", "direction": "x", "displacement": displacement}],
         path={"steps": 1},
         analysis={"symmetry": 2 if half else 1} | (analysis or {}),
         output={"points": True},
@@ -269,18 +269,15 @@ def test_a_plate_without_contact_is_shown_and_exported_too(tmp_path, capsys):
         for tag, name in enumerate(("bottom", "right", "top", "left"), 1):
             gmsh.model.addPhysicalGroup(1, [tag], name=name)
         gmsh.option.setNumber("Mesh.MeshSizeMax", 4)
-        scene = archord.Problem(
+        problem = archord.Problem(
             gmsh,
-            bodies=[{"name": "plate", "E": 1000.0, "nu": 0.3}],
-            supports=[
-                {"name": side, "on": side, "fixed": [f]}
-                for side, f in (("left", "x"), ("bottom", "y"))
-            ],
-            loads=[{"name": "pull", "on": "right", "direction": "x", "displacement": 0.02}],
-            path={"steps": 1},
-            analysis={"plane": "stress"},
+            bodies=[archord.Body("plate", archord.Elastic(1000.0, 0.3))],
+            supports=[archord.Support("left", fixed="x"), archord.Support("bottom", fixed="y")],
+            loads=[archord.Load("pull", on="right", direction="x", displacement=0.02)],
+            steps=1,
+            kinematics="plane stress",
         )
-        run = archord.solve(scene, tmp_path / "run")
+        run = archord.solve(problem, tmp_path / "run")
     finally:
         gmsh.finalize()
     assert run.columns["pull force"] == pytest.approx([10.0], rel=1e-9)

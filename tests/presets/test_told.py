@@ -9,11 +9,12 @@ from mpi4py import MPI
 import archord
 from archord.output.run import solve_scene
 from archord.presets.general_account import GeneralAccount
+from archord.presets.words import words_of
 from archord.scene.errors import InputError
 from archord.scene.file import parse_scene
 from tests.solver.parts import blocks
 
-BODIES = [{"name": name, "E": 1000.0, "nu": 0.3} for name in ("lower", "upper")]
+BODIES = [archord.Body(name, archord.Elastic(1000.0, 0.3)) for name in ("lower", "upper")]
 
 
 def ring(**load):
@@ -79,24 +80,32 @@ def problem(interactions, gap=0.0, **changes):
     data = {
         "bodies": BODIES,
         "interactions": interactions,
-        "supports": [{"name": "base", "on": "base", "fixed": ["x", "y"]}],
-        "loads": [{"name": "pull", "on": "lid", "direction": "y", "displacement": 0.01}],
-        "path": {"steps": 1},
+        "supports": [archord.Support("base")],
+        "loads": [archord.Load("pull", on="lid", direction="y", displacement=0.01)],
+        "steps": 1,
     }
     return archord.Problem(replace(mesh, facet_sets=sets), **(data | changes))
 
 
-def told_first(scene):
-    return GeneralAccount(scene, MPI.COMM_SELF).warnings()
+def told_first(problem):
+    words = words_of(problem, "mesh.npz")
+    return GeneralAccount(words, MPI.COMM_SELF, given=problem).warnings()
 
 
-TIE = {"name": "tie", "law": "tied", "surfaces": ["lower top", "upper bottom"]}
-CONTACT = {"name": "contact", "surfaces": ["lower top", "upper bottom"]}
+def told_of(problem, folder):
+    """The warnings of a run of ``problem`` that comes to its end."""
+    run = archord.solve(problem, folder)
+    assert run.status == "done"
+    return run.summary["warnings"]
+
+
+TIE = archord.Interaction("tie", ("lower top", "upper bottom"), law="tied")
+CONTACT = archord.Interaction("contact", ("lower top", "upper bottom"))
 
 
 def test_a_facet_belongs_to_one_interaction():
     """Two on the same facets counted contact twice: forces rose by 2 %, without a word."""
-    twice = [CONTACT, {"name": "second", "surfaces": ["again", "other"]}]
+    twice = [CONTACT, archord.Interaction("second", ("again", "other"))]
     said = r"'lower top' of the interaction 'contact' and 'again' of 'second' have 4 facets in common, .* \(0.125, 0\)"
     with pytest.raises(InputError, match=said):
         told_first(problem(twice))
@@ -111,17 +120,18 @@ def test_a_tie_over_a_gap_is_told(gap, warned):
 
 def test_tied_surfaces_that_are_pulled_are_no_open_contact(tmp_path):
     """A tie in tension "never touched", and one that is bent had "few facets in contact"."""
-    bent = {"name": "push", "on": "right", "pressure": 1.0}
-    assert told(problem([TIE]), tmp_path / "pulled") == []
-    assert told(problem([TIE], loads=[bent]), tmp_path / "bent") == []
+    bent = archord.Load("push", on="right", pressure=1.0)
+    assert told_of(problem([TIE]), tmp_path / "pulled") == []
+    assert told_of(problem([TIE], loads=[bent]), tmp_path / "bent") == []
 
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
 def test_partners_of_the_beginning_are_told_of_where_surfaces_slide_far(tmp_path, kinematics):
     """At two facets' slip P was that of surfaces which still cover each other: four times too
     much."""
-    press = {"name": "press", "on": "lid", "direction": "y", "displacement": -0.01}
-    slide = {"name": "slide", "on": "lid", "direction": "x", "displacement": [0.0, 0.4]}
-    scene = problem([CONTACT], loads=[press, slide], analysis={"kinematics": kinematics})
-    said = [text for text in told(scene, tmp_path / "run") if "partners" in text]
+    press = archord.Load("press", on="lid", direction="y", displacement=-0.01)
+    slide = archord.Load("slide", on="lid", direction="x", displacement=[0.0, 0.4])
+    contact = replace(CONTACT, kinematics=kinematics)
+    stated = problem([contact], loads=[press, slide])
+    said = [text for text in told_of(stated, tmp_path / "run") if "partners" in text]
     assert len(said) == 2 * (kinematics == "reference")

@@ -10,7 +10,7 @@ from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Problem
 from tests.solver.parts import (
     INNER,
     OUTER,
@@ -45,8 +45,8 @@ class Cylinder:
     def __init__(self, size: float, quads: bool, hardening: float = 0.0) -> None:
         mesh = quarter_annulus(MPI.COMM_SELF, A, B, size, quads=quads)
         body = Body("ring", J2Material(E, NU, "strain", LinearHardening(SIGY, hardening)))
-        supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
-        supports += [Support("x", "x", 1), Support("y", "y", 0)]
+        supports = [Dirichlet("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
+        supports += [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
         system = System(Problem(mesh, [body], supports=supports))
         self.cells, self.V, self.bulk = mesh.cells, system.V, system.bulk
         self.problem, self.solver = system.equilibrium, system.solver

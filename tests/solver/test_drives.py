@@ -16,14 +16,14 @@ from archord.solver.path.stepping import StepFailure, StepRules
 from archord.solver.path.system import System
 from archord.solver.problem import (
     Body,
+    DeadLoad,
+    Dirichlet,
     Drive,
     Guess,
     Interaction,
-    Load,
     Mean,
     Problem,
     Rigid,
-    Support,
 )
 from tests.solver.parts import (
     ELASTIC,
@@ -38,16 +38,16 @@ from tests.solver.parts import (
 
 BAR, LENGTH = Elastic(E, 0.0, "strain"), 4.0
 END = (LENGTH, -0.5)
-WALL = [Support("wall", "left", axis) for axis in (0, 1)]
+WALL = [Dirichlet("wall", "left", axis) for axis in (0, 1)]
 NAMES = ("x", "y", "turn")
 
 
-def reference_point(name: str, facets: str, point=END) -> list[Support]:
+def reference_point(name: str, facets: str, point=END) -> list[Dirichlet]:
     """A rigid reference point with the drives "x", "y" and "turn"."""
     x, y = point
     turns = (lambda p: y - p[:, 1], lambda p: p[:, 0] - x)
-    moves = [Support(name, facets, axis, 1.0, NAMES[axis]) for axis in (0, 1)]
-    return moves + [Support(name, facets, axis, turns[axis], "turn") for axis in (0, 1)]
+    moves = [Dirichlet(name, facets, axis, 1.0, NAMES[axis]) for axis in (0, 1)]
+    return moves + [Dirichlet(name, facets, axis, turns[axis], "turn") for axis in (0, 1)]
 
 
 def coupling(name: str, facets: str, point, drives=NAMES) -> list[Mean]:
@@ -244,8 +244,8 @@ def test_pressure_in_a_thick_cylinder_is_lames():
     """Plane strain, by a pressure inside, whose displacement is the volume that it sweeps."""
     a, b, p = 1.0, 2.0, 0.01
     mesh = quarter_annulus(MPI.COMM_SELF, a, b, 0.1)
-    supports = [Support("x", "x", 1), Support("y", "y", 0)]
-    loads = [Load(facets="inner", pressure=1.0, drive="pressure")]
+    supports = [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
+    loads = [DeadLoad(facets="inner", pressure=1.0, drive="pressure")]
     problem = Problem(
         mesh,
         [Body("ring", ELASTIC)],
@@ -269,7 +269,7 @@ def test_pressure_in_a_thick_cylinder_is_lames():
 
 def test_a_force_on_facets_is_spread_evenly():
     """Along a straight edge of a bar without Poisson's ratio: uniform tension."""
-    loads = [Load(facets="right", force=(1.0, 0.0))]
+    loads = [DeadLoad(facets="right", force=(1.0, 0.0))]
     system = solve(bar(loads=loads), [1e-3])
     assert system.drive_displacement("") == pytest.approx(1e-3 * LENGTH / E, rel=1e-9)
     np.testing.assert_allclose(system.equilibrium.displacement()[:, 1], 0, atol=1e-12)
@@ -315,7 +315,7 @@ def fitted(interference, overlap, **options) -> System:
     fit = Interaction(
         "fit", ("bush outer", "housing inner"), interference=interference, overlap=overlap
     )
-    supports = [Support("x", "x", 1), Support("y", "y", 0)]
+    supports = [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
     mesh = rings(10.05, 14.0, 14.0 - overlap, 30.0, 1.2)
     return solve(
         Problem(mesh, bodies, [fit], supports, fit=True, symmetry=4.0, **options), [0.5, 1.0]
@@ -389,7 +389,7 @@ def test_every_disc_follows_its_own_drive():
         Interaction(f"{y}", (disc, f))
         for y, disc, f in zip((0, 1), discs, ("lower top", "lid"), strict=True)
     ]
-    supports = [Support("base", f, axis) for f in ("base", "upper bottom") for axis in (0, 1)]
+    supports = [Dirichlet("base", f, axis) for f in ("base", "upper bottom") for axis in (0, 1)]
     mesh = blocks(MPI.COMM_SELF, 6, 6)
     paths = [Drive("", (0, 0.05), "force"), Drive("other", (0, 0.0))]
     start = Guess(1e-3)
@@ -409,8 +409,8 @@ def test_a_force_that_nothing_resists_is_told_with_its_drive():
     """A block that two forces push, of which one finds no resistance."""
     supports = [
         *reference_point("lid", "lid", (0.5, 1.0)),
-        Support("base", "base", 1),
-        Support("base", "base", 0),
+        Dirichlet("base", "base", 1),
+        Dirichlet("base", "base", 0),
     ]
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     paths = drives("force", x=(0, 0.01), y=(0, -0.02), turn=(0, 0))

@@ -13,7 +13,7 @@ from archord.presets.joint import Joint
 from archord.scene.scene import Scene
 from archord.solver.contact.named import LAWS, contact_law
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
 from tests.solver.parts import blocks, solve
 
 pytestmark = pytest.mark.mpi
@@ -23,15 +23,15 @@ STEEL = Elastic(E, NU, "strain")
 MU = 0.3
 
 
-def lid(*names: str, control: str = "force", **paths) -> tuple[list[Support], list[Drive]]:
+def lid(*names: str, control: str = "force", **paths) -> tuple[list[Dirichlet], list[Drive]]:
     """The edge "lid", moved straight by drives of these ``names`` ("x", "y"): ``paths`` of forces
     or displacements."""
-    supports = [Support(name, "lid", "xy".index(name), 1.0, name) for name in names]
+    supports = [Dirichlet(name, "lid", "xy".index(name), 1.0, name) for name in names]
     return supports, [Drive(name, paths[name], control) for name in names]
 
 
-def held(name: str) -> list[Support]:
-    return [Support(name, name, axis) for axis in (0, 1)]
+def held(name: str) -> list[Dirichlet]:
+    return [Dirichlet(name, name, axis) for axis in (0, 1)]
 
 
 def wedge(comm: MPI.Comm, slope: float, n: int):
@@ -118,8 +118,8 @@ def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
     r, mu = 10.0, 0.2
     mesh = rings(MPI.COMM_WORLD, (6.0, r, 18.0), 1.5)
     turn = [
-        Support("bore", "inside", 0, lambda x: -x[:, 1], "turn"),
-        Support("bore", "inside", 1, lambda x: x[:, 0], "turn"),
+        Dirichlet("bore", "inside", 0, lambda x: -x[:, 1], "turn"),
+        Dirichlet("bore", "inside", 1, lambda x: x[:, 0], "turn"),
     ]
     fit = Interaction("fit", ("pin", "hole"), friction=mu, interference=0.01, kinematics=kinematics)
     bodies = [Body("inner", STEEL), Body("outer", STEEL)]

@@ -19,7 +19,7 @@ from archord.presets.joint import Joint, joint_problem
 from archord.scene.scene import Scene
 from archord.solver.bulk import Bulk
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
 from tests.solver.parts import (
     ELASTIC,
     PERFECT,
@@ -49,8 +49,10 @@ def test_a_rigid_plastic_cylinder_is_blown_up(modulus, pressures):
     body = Body(
         "ring", LargeStrain(J2Material(2.1e8, 0.3, "strain", LinearHardening(355.0, modulus)))
     )
-    supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k] / 10.0, "out") for k in range(2)]
-    supports += [Support("x", "x", 1), Support("y", "y", 0)]
+    supports = [
+        Dirichlet("wall", "inner", k, lambda x, k=k: x[:, k] / 10.0, "out") for k in range(2)
+    ]
+    supports += [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
     system = System(Problem(mesh, [body], supports=supports, drives=[Drive("out", [0.0, 2.0])]))
     found = []
     for radius, steps in ((10.5, 5), (11.0, 5), (12.0, 10)):
@@ -67,9 +69,9 @@ def test_a_deep_notch_has_its_limit_load(finest):
     that lock rises without an end (Nagtegaal, Parks and Rice 1974)."""
     metal = LargeStrain(J2Material(2.1e8, 0.3, "strain", LinearHardening(355.0)))
     supports = [
-        Support("ligament", "ligament", 1),
-        Support("axis", "axis", 0),
-        Support("lid", "lid", 1, 1.0),
+        Dirichlet("ligament", "ligament", 1),
+        Dirichlet("axis", "axis", 0),
+        Dirichlet("lid", "lid", 1, 1.0),
     ]
     system = System(
         Problem(notched_bar(MPI.COMM_SELF, 9.0, finest), [Body("bar", metal)], supports=supports)
@@ -219,9 +221,9 @@ def test_energy_balances_where_metal_flows_far():
     metal = LargeStrain(J2Material(210000.0, 0.3, "strain", LinearHardening(300.0, 500.0)))
     contact = Interaction("contact", ("upper bottom", "lower top"))
     supports = [
-        Support("base", "base", 1),
-        Support("press", "lid", 1, -1.0),
-        Support("left", "left", 0),
+        Dirichlet("base", "base", 1),
+        Dirichlet("press", "lid", 1, -1.0),
+        Dirichlet("left", "left", 0),
     ]
     mesh = blocks(MPI.COMM_WORLD, 3, 4)
     system = System(

@@ -10,12 +10,12 @@ import pytest
 from mpi4py import MPI
 
 from archord.solver.path.system import System
-from archord.solver.problem import Drive, Mean, Support
+from archord.solver.problem import Dirichlet, Drive, Mean
 from tests.solver.parts import solve
 from tests.solver.test_drives import WALL, bar, drives, reference_point
 
 PULL = {"pull": (0.0, 0.01)}
-END = Support("end", "right", 0, 1.0, "pull")
+END = Dirichlet("end", "right", 0, 1.0, "pull")
 
 
 def found(supports, comm=MPI.COMM_SELF, **options):
@@ -31,7 +31,7 @@ def found(supports, comm=MPI.COMM_SELF, **options):
 def test_what_a_support_fixes_stays_whatever_moves_the_rest():
     """Also in a body that is moved as a whole; what moves it has the force that the support
     answers."""
-    supports = [*WALL, Support("body", "bar", 0, 1.0, "pull")]
+    supports = [*WALL, Dirichlet("body", "bar", 0, 1.0, "pull")]
     for order in permutations(supports):
         problem = bar(MPI.COMM_WORLD, order, drives=drives("displacement", **PULL))
         system = solve(problem, [1.0])
@@ -46,14 +46,14 @@ def test_what_a_support_fixes_stays_whatever_moves_the_rest():
         )
 
 
-MOVED = [Support("top", "top", 1, 1.0, "press"), END]
+MOVED = [Dirichlet("top", "top", 1, 1.0, "press"), END]
 LEGAL = {
     "a displacement ends at a clamp": [*WALL, *MOVED],
-    "supports agree": [*WALL, Support("foot", "bottom", 0), MOVED[1]],
+    "supports agree": [*WALL, Dirichlet("foot", "bottom", 0), MOVED[1]],
     "a displacement that is zero where a support is": [
-        *WALL, Support("shear", "bottom", 0, lambda x: x[:, 0], "pull"), MOVED[0]
+        *WALL, Dirichlet("shear", "bottom", 0, lambda x: x[:, 0], "pull"), MOVED[0]
     ],
-    "two sets that move alike": [*WALL, MOVED[1], Support("foot", "bottom", 0, 1.0, "pull too")],
+    "two sets that move alike": [*WALL, MOVED[1], Dirichlet("foot", "bottom", 0, 1.0, "pull too")],
 }  # fmt: skip
 
 
@@ -77,10 +77,10 @@ def test_the_order_of_supports_changes_nothing(case):
 def test_sets_that_move_alike_move_as_one_set_and_have_its_force_together():
     """The work of each is its own: forces at shared nodes are theirs in equal parts."""
     alone = found(
-        [*WALL, Support("body", "bar", 0, 1.0, "pull")], drives=drives("displacement", **PULL)
+        [*WALL, Dirichlet("body", "bar", 0, 1.0, "pull")], drives=drives("displacement", **PULL)
     )
     paths = {"pull": (0.0, 0.01), "pull too": (0.0, 0.01, 0.01)}
-    both = [Support("body", "bar", 0, 1.0, "pull"), Support("too", "bar", 0, 1.0, "pull too")]
+    both = [Dirichlet("body", "bar", 0, 1.0, "pull"), Dirichlet("too", "bar", 0, 1.0, "pull too")]
     shared = found([*WALL, *both], drives=drives("displacement", **paths))
     assert shared["pull"] == pytest.approx([0.01, alone["pull"][1] / 2], rel=1e-9)
     assert shared["pull too"] == pytest.approx(shared["pull"], rel=1e-12)
@@ -89,7 +89,7 @@ def test_sets_that_move_alike_move_as_one_set_and_have_its_force_together():
 
 def test_supports_that_fix_one_node_have_equal_parts_of_its_reaction():
     fixed = found([*WALL, END], drives=drives("displacement", **PULL))
-    twice = [*WALL, *(Support("too", "left", axis) for axis in (0, 1)), END]
+    twice = [*WALL, *(Dirichlet("too", "left", axis) for axis in (0, 1)), END]
     halves = found(twice, drives=drives("displacement", **PULL))
     assert halves["pull"] == pytest.approx(fixed["pull"], rel=1e-12)
     for name in ("wall", "too"):
@@ -99,9 +99,9 @@ def test_supports_that_fix_one_node_have_equal_parts_of_its_reaction():
 def test_a_rigid_point_may_meet_a_support_that_leaves_it_rigid():
     """It turns about the held corner (4, 0) of the roof; about another point it would lift the
     corner."""
-    roof = Support("roof", "top", 1)
+    roof = Dirichlet("roof", "top", 1)
     for X, fits in ((4.0, True), (3.0, False)):
-        guide = [Support("end", "right", axis) for axis in (0, 1)]
+        guide = [Dirichlet("end", "right", axis) for axis in (0, 1)]
         turns = [s for s in reference_point("end", "right", (X, 0.0)) if s.drive == "turn"]
         problem = bar(
             supports=[*WALL, roof, *guide, *turns], drives=drives("force", turn=(0.0, 1e-3))
@@ -117,7 +117,7 @@ def test_a_rigid_point_may_meet_a_support_that_leaves_it_rigid():
 
 def moves(name, facets, axis=0, rate=1.0):
     """A set moved by the drive of its own ``name``."""
-    return Support(name, facets, axis, rate, name)
+    return Dirichlet(name, facets, axis, rate, name)
 
 
 ALIKE = r"'end' .on 'right'. and 'foot' .on 'bottom'. move their common node at .4, -1. differently in x: leave it"
@@ -129,7 +129,7 @@ REFUSED = {
     "a rigid point beside a clamp": (RIGID.format("x"), reference_point("lid", "top"), "displacement"),
     "two rigid points": (
         "'foot' .on 'bottom'. and 'lid' .on 'right'. move their common node at .4, -1. differently in x",
-        [*reference_point("lid", "right"), *(Support("foot", "bottom", k, 1.0, f"foot {k}") for k in (0, 1))],
+        [*reference_point("lid", "right"), *(Dirichlet("foot", "bottom", k, 1.0, f"foot {k}") for k in (0, 1))],
         "force",
     ),
     "nothing is left to move": (

@@ -14,7 +14,7 @@ from archord.materials.kinematics import PLANE_STRESS, kinematics
 from archord.solver.path.load_path import LoadPath
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Support
+from archord.solver.problem import Body, DeadLoad, Dirichlet, Drive, Guess, Interaction, Problem
 from tests.solver.parts import ELASTIC, HARDENING, NU, PERFECT, E, blocks, coordinates, solve
 
 DEPTH = 0.02
@@ -22,9 +22,9 @@ ON_EACH_OTHER = Interaction("joint", ("upper bottom", "lower top"))
 
 
 BETWEEN_WALLS = [
-    Support("base", "base", 1),
-    Support("lid", "lid", 1, -1.0),
-    *(Support("walls", side, 0) for side in ("left", "right")),
+    Dirichlet("base", "base", 1),
+    Dirichlet("lid", "lid", 1, -1.0),
+    *(Dirichlet("walls", side, 0) for side in ("left", "right")),
 ]
 
 
@@ -92,10 +92,12 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
     mesh = blocks(MPI.COMM_SELF, 3, 3)
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     supports = [
-        Support(s, s, axis)
+        Dirichlet(s, s, axis)
         for s, axis in (("base", 1), ("left", 0), ("right", 0), ("upper bottom", 1))
     ]
-    problem = Problem(mesh, bodies, (), supports, [Load("lower", (0.0, -1.0))], symmetry=symmetry)
+    problem = Problem(
+        mesh, bodies, (), supports, [DeadLoad("lower", (0.0, -1.0))], symmetry=symmetry
+    )
     system, weight = solve(problem, [0.01]), 0.01
     modulus, y = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)), coordinates(system.V)[:, 1]
     u = system.equilibrium.displacement()
@@ -112,10 +114,10 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
 
 def test_a_load_is_spread_as_its_density_says():
     """Its first moment is that of the density, its sum the force."""
-    mesh, load = blocks(MPI.COMM_SELF, 3, 3), Load("upper", (3.0, 4.0), lambda x: x[0] * x[1])
+    mesh, load = blocks(MPI.COMM_SELF, 3, 3), DeadLoad("upper", (3.0, 4.0), lambda x: x[0] * x[1])
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     equilibrium = System(
-        Problem(mesh, bodies, (), [Support("base", "base", 1)], [load])
+        Problem(mesh, bodies, (), [Dirichlet("base", "base", 1)], [load])
     ).equilibrium
     assert equilibrium.drives.applied[0].sum(axis=0) == pytest.approx([3.0, 4.0], rel=1e-12)
     x = coordinates(equilibrium.V)
@@ -127,7 +129,7 @@ def test_a_load_is_spread_as_its_density_says():
 def test_a_guess_moves_bodies_rigidly():
     mesh, bodies = blocks(MPI.COMM_SELF, 2, 3), [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     problem = Problem(mesh, bodies, guess=lambda load: Guess(2 * load, {"upper": (load, -load)}))
-    system = System(replace(problem, supports=[Support("base", "base", 1)]))
+    system = System(replace(problem, supports=[Dirichlet("base", "base", 1)]))
     state, y = system.first_guess(0.5), coordinates(system.V)[:, 1]
     assert state[-1] == 1.0
     np.testing.assert_array_equal(
@@ -173,7 +175,7 @@ class Stiffening(Elastic):
 REFUSED = {
     "must be symmetric": {"bodies": [Body("lower", Lopsided(E, NU, "strain"))]},
     "different names": {"bodies": [Body("lower", ELASTIC), Body("lower", ELASTIC, "upper")]},
-    "no facet, point or cell set 'top'": {"supports": [Support("base", "top", 1)]},
+    "no facet, point or cell set 'top'": {"supports": [Dirichlet("base", "top", 1)]},
     "no cell set 'middle'": {"bodies": [Body("middle", ELASTIC)]},
     "'left' belongs to 2 cell sets": {
         "interactions": [Interaction("joint", ("left", "lower top"))]
@@ -182,12 +184,12 @@ REFUSED = {
         "interactions": [Interaction("joint", ("upper bottom", "lower top"), integrated="lid")]
     },
     "must move supports": {
-        "supports": [Support("base", "base", 1, 1.0)],
-        "loads": [Load("lower", (0.0, -1.0))],
+        "supports": [Dirichlet("base", "base", 1, 1.0)],
+        "loads": [DeadLoad("lower", (0.0, -1.0))],
     },
-    "no drive 'up'": {"loads": [Load("lower", (0.0, -1.0), drive="up")]},
+    "no drive 'up'": {"loads": [DeadLoad("lower", (0.0, -1.0), drive="up")]},
     "'up' moves nothing": {"drives": [Drive("up")]},
-    "a force on the cells of a set or on its facets": {"loads": [Load("lower", pressure=1.0)]},
+    "a force on the cells of a set or on its facets": {"loads": [DeadLoad("lower", pressure=1.0)]},
     "'joint' is tied": {
         "interactions": [Interaction("joint", ("upper bottom", "lower top"), "tied", overlap=0.1)]
     },
@@ -201,7 +203,7 @@ REFUSED = {
 @pytest.mark.parametrize("said", REFUSED)
 def test_a_problem_that_contradicts_itself_is_refused(said):
     bodies = [Body("lower", ELASTIC), Body("upper", Elastic(E, NU, "strain"))]
-    parts = {"bodies": bodies, "supports": [Support("base", "base", 1)]} | REFUSED[said]
+    parts = {"bodies": bodies, "supports": [Dirichlet("base", "base", 1)]} | REFUSED[said]
     with pytest.raises(ValueError, match=said):
         System(Problem(blocks(MPI.COMM_SELF, 2, 3), **parts))
 

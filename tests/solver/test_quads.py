@@ -26,12 +26,16 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.output.fields import FieldWriter, collect_fields, collect_mesh
 from archord.solver.path.mesh_order import MeshOrder
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.output.vtk_reader import VtkFile, only
 from tests.solver.parts import ELASTIC, NU, PERFECT, E, blocks, coordinates, quarter_annulus, solve
 
 DEPTH = 0.01
-PRESSED = [Support("base", "base", 1), Support("lid", "lid", 1, -1.0), Support("left", "left", 0)]
+PRESSED = [
+    Dirichlet("base", "base", 1),
+    Dirichlet("lid", "lid", 1, -1.0),
+    Dirichlet("left", "left", 0),
+]
 every_order = pytest.mark.parametrize("order", [1, 2, 3])
 every_degree = pytest.mark.parametrize("degree", [2, 3])
 every_cell = pytest.mark.parametrize("quads", [False, True], ids=["triangles", "quads"])
@@ -90,8 +94,8 @@ def test_lames_cylinder_converges(degree, quads):
     errors = []
     for size in (0.5, 0.0625):
         mesh = quarter_annulus(MPI.COMM_SELF, 1.0, 2.0, size, quads=quads, order=degree)
-        supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k]) for k in range(2)]
-        supports += [Support("x", "x", 1), Support("y", "y", 0)]
+        supports = [Dirichlet("wall", "inner", k, lambda x, k=k: x[:, k]) for k in range(2)]
+        supports += [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
         system = solve(
             Problem(mesh, [Body("ring", ELASTIC)], supports=supports, degree=degree), [DEPTH]
         )
@@ -127,8 +131,8 @@ def test_fully_plastic_cells_do_not_lock(quads):
     ground = Body("ground", J2Material(1.0, 0.3, "strain", LinearHardening(0.001)))
     fixed = [("base", 0), ("base", 1), ("right", 0), ("left", 0), ("punch", 0)]
     supports = [
-        *(Support(name, name, axis) for name, axis in fixed),
-        Support("punch", "punch", 1, -1.0),
+        *(Dirichlet(name, name, axis) for name, axis in fixed),
+        Dirichlet("punch", "punch", 1, -1.0),
     ]
     system = solve(
         Problem(gmsh_to_mesh(MPI.COMM_SELF, punch, quads=quads), [ground], supports=supports),

@@ -14,7 +14,16 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Rigid, Support
+from archord.solver.problem import (
+    Body,
+    DeadLoad,
+    Dirichlet,
+    Drive,
+    Interaction,
+    Mean,
+    Problem,
+    Rigid,
+)
 from tests.solver.parts import ELASTIC, E, blocks, solve
 
 STEEL = Elastic(210000.0, 0.3, "strain")
@@ -39,8 +48,8 @@ def sleeves(comm=MPI.COMM_SELF, material=STEEL) -> Problem:
     mesh = bushing(comm, 10.0, [(10.05, 12.0), (12.03, 14.0), (14.04, 30.0)], 1.5, 0.4)
     between = {"a": ("pin", "sleeve 1 inside"), "b": ("sleeve 1 outside", "sleeve 2 inside")}
     between["c"] = ("sleeve 2 outside", "bore")
-    supports = [Support("axis", "axis", 1), Support("flat", "flat", 0, 1.0)]
-    supports += [Support("edge", "outer edge", axis) for axis in (0, 1)]
+    supports = [Dirichlet("axis", "axis", 1), Dirichlet("flat", "flat", 0, 1.0)]
+    supports += [Dirichlet("edge", "outer edge", axis) for axis in (0, 1)]
     bodies = [
         Body(name, STEEL if name == "pin" else material)
         for name in ("pin", "sleeve 1", "sleeve 2", "housing")
@@ -84,14 +93,14 @@ def test_a_pin_under_a_force_finds_its_hole(half):
     """Concentric with clearance at first: nothing resists the force but springs. The whole pin may
     turn, too."""
     mesh = lug(MPI.COMM_SELF, 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4, half=half, pin="whole")
-    supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [
-        Support("axis", "axis", 1)
+    supports = [Dirichlet("clamp", "clamp", axis) for axis in (0, 1)] + [
+        Dirichlet("axis", "axis", 1)
     ] * half
     bodies, contact = (
         [Body("pin", STEEL), Body("lug", STEEL)],
         Interaction("contact", ("pin", "hole")),
     )
-    loads, drives = [Load("pin", (-1.0, 0.0), drive="pull")], [Drive("pull", (0, 4000.0))]
+    loads, drives = [DeadLoad("pin", (-1.0, 0.0), drive="pull")], [Drive("pull", (0, 4000.0))]
     problem = Problem(
         mesh, bodies, [contact], supports, loads, drives=drives, symmetry=1.0 + half, stabilise=True
     )
@@ -107,7 +116,7 @@ def test_a_disc_under_a_force_finds_its_body():
     disc = Rigid(RigidCircle(np.array([0.5, 4.0]), 2.0), {"down": (0.0, -1.0), "aside": (1.0, 0.0)})
     paths = [Drive("down", (0, 0.1), "force"), Drive("aside", (0, 0.0))]
     supports = [
-        Support("base", facets, axis) for facets in ("base", "upper bottom") for axis in (0, 1)
+        Dirichlet("base", facets, axis) for facets in ("base", "upper bottom") for axis in (0, 1)
     ]
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     contact = [Interaction("contact", (disc, "lid"))]
@@ -129,10 +138,10 @@ def test_bodies_that_supports_hold_get_no_springs():
         return System(problem).equilibrium.springs
 
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
-    held = [Support("base", facets, axis) for facets in ("base", "lid") for axis in (0, 1)]
+    held = [Dirichlet("base", facets, axis) for facets in ("base", "lid") for axis in (0, 1)]
     assert springs(supports=held) is None
     assert springs(supports=held[:3]) is not None
-    pushed = [*held[:2], Support("lid", "lid", 0), Support("lid", "lid", 1, 1.0, "push")]
+    pushed = [*held[:2], Dirichlet("lid", "lid", 0), Dirichlet("lid", "lid", 1, 1.0, "push")]
     assert springs(supports=pushed, drives=[Drive("push", (0, 1.0))]) is None
     assert springs(supports=pushed, drives=[Drive("push", (0, 1.0), "force")]) is not None
 
@@ -142,8 +151,8 @@ def test_a_mean_motion_of_half_an_edge_is_that_of_the_whole():
     found = []
     for half in (True, False):
         mesh = lug(MPI.COMM_SELF, 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4, half=half)
-        supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [
-            Support("axis", "axis", 1)
+        supports = [Dirichlet("clamp", "clamp", axis) for axis in (0, 1)] + [
+            Dirichlet("axis", "axis", 1)
         ] * half
         bodies, contact = (
             [Body("pin", STEEL), Body("lug", STEEL)],

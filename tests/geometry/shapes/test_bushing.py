@@ -9,7 +9,7 @@ from mpi4py import MPI
 from archord.geometry.shapes.bushing import bushing
 from archord.materials.elasticity import Elastic
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.geometry.shapes.measures import area, facet_nodes
 
 R, BORE, OUTER, SLEEVE = 10.0, 13.98, 30.0, (10.05, 14.0)
@@ -110,8 +110,8 @@ def test_a_press_fit_follows_lame():
     pressure = (SLEEVE[1] - BORE) / unit
     assert pressure == pytest.approx(47.526, abs=1e-3)
     joint = made(size=0.5)
-    supports = [Support("outer edge", "outer edge", axis) for axis in (0, 1)]
-    supports += [Support("flat", "flat", 0, 1.0), Support("axis", "axis", 1)]
+    supports = [Dirichlet("outer edge", "outer edge", axis) for axis in (0, 1)]
+    supports += [Dirichlet("flat", "flat", 0, 1.0), Dirichlet("axis", "axis", 1)]
     bodies = [Body("pin", steel), Body("sleeve 1", bronze), Body("housing", aluminium)]
     contacts = [
         Interaction("play", ("pin", "sleeve 1 inside")),

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from archord.geometry.shapes.lug import lug
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.geometry.shapes.measures import area, facet_nodes, length
 from tests.solver.parts import ELASTIC
 
@@ -99,10 +99,10 @@ def test_a_narrow_ligament_has_three_elements_across(width, edge):
 
 def solved(**options):
     joint, half = made(**options), options.get("half", True)
-    supports = [Support("clamp", "clamp", axis) for axis in (0, 1)]
+    supports = [Dirichlet("clamp", "clamp", axis) for axis in (0, 1)]
     supports += [
-        Support("flat", "flat", 0, 1.0),
-        Support("centre", "axis" if half else "centre", 1),
+        Dirichlet("flat", "flat", 0, 1.0),
+        Dirichlet("centre", "axis" if half else "centre", 1),
     ]
     contact = Interaction("contact", ("pin", "hole"))
     bodies = [Body(name, ELASTIC) for name in ("pin", "lug")]

@@ -12,7 +12,7 @@ from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.solver.parts import DR, ELASTIC, R, solve
 
 RADII = {"bore": 0.4 * R, "pin": R, "hole": R + DR, "outer": 2 * R}
@@ -79,9 +79,9 @@ def press(
     """The bush's bore moved by ``PUSH``, down and turned by ``angle``; the system and the force
     along that way."""
     way = np.array([np.sin(angle), -np.cos(angle)])
-    supports = [Support("outer", "outer", axis) for axis in range(2)]
-    supports += [Support("bore", "bore", axis, way[axis]) for axis in range(2)]
-    supports += [Support("cuts", "cuts", 0)] if symmetry > 1 else []
+    supports = [Dirichlet("outer", "outer", axis) for axis in range(2)]
+    supports += [Dirichlet("bore", "bore", axis, way[axis]) for axis in range(2)]
+    supports += [Dirichlet("cuts", "cuts", 0)] if symmetry > 1 else []
     bodies = [Body("bush", ELASTIC), Body("ring", ELASTIC)]
     contact = Interaction("contact", ("pin", "hole"), **contact)
     system = solve(

@@ -13,7 +13,7 @@ from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface
 from archord.solver.contact.law import STICK, ContactLaw, Response
 from archord.solver.contact.surface import RigidSurface, Surface
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.geometry.shapes.measures import Facets
 from tests.solver.contact.test_tangent import matrix
 from tests.solver.parts import (
@@ -31,9 +31,9 @@ from tests.solver.parts import (
 
 DEPTH = 0.01
 PRESSED = [
-    Support("base", "base", 1),
-    Support("lid", "lid", 1, -1.0),
-    Support("left", "left", 0),
+    Dirichlet("base", "base", 1),
+    Dirichlet("lid", "lid", 1, -1.0),
+    Dirichlet("left", "left", 0),
 ]  # free to widen
 LOW, HIGH = ("lower top", "middle bottom"), ("middle top", "upper bottom")
 
@@ -123,17 +123,17 @@ def test_a_law_from_outside_pulls_and_slides(kinematics):
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     mesh = blocks(MPI.COMM_SELF, 4, 7)
     supports = [
-        Support("base", "base", 1),
-        Support("lid", "lid", 1, 1.0),
-        Support("left", "left", 0),
+        Dirichlet("base", "base", 1),
+        Dirichlet("lid", "lid", 1, 1.0),
+        Dirichlet("left", "left", 0),
     ]
     system = solve(Problem(mesh, bodies, [interaction], supports), [DEPTH])
     tension = contact_modulus(E, NU, "strain") * DEPTH / 2
     np.testing.assert_allclose(system.reaction("lid"), [0, tension], atol=1e-9 * tension)
     for pair in system.contact.pairs:
         np.testing.assert_allclose(pair.pressure, -tension, rtol=1e-8)
-    supports = [Support("base", "base", k) for k in (0, 1)]
-    supports += [Support("lid", "lid", k, 1.0 - k) for k in (0, 1)]
+    supports = [Dirichlet("base", "base", k) for k in (0, 1)]
+    supports += [Dirichlet("lid", "lid", k, 1.0 - k) for k in (0, 1)]
     u = solve(Problem(mesh, bodies, [interaction], supports), [DEPTH]).equilibrium.displacement()
     assert np.abs(u[coordinates(system.V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH
 
@@ -147,7 +147,7 @@ def test_every_rigid_disc_moves_by_itself():
     disc = RigidSurface(RigidCircle(np.array([2.5, R]), R), (0.1, -2.0))
     sides = {"pin": [pin, parts.sides[0]], "disc": [disc, edge]}
     interfaces = [
-        Interface(Interaction(name, ("", "")), surfaces) for name, surfaces in sides.items()
+        Interface(Interaction(name, ("disc", "hole")), surfaces) for name, surfaces in sides.items()
     ]
     both, u, depth, h = (
         Contact(parts.V, interfaces),

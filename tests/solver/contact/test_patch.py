@@ -12,7 +12,7 @@ from mpi4py import MPI
 from archord.materials.elasticity import contact_modulus
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.problem import Body, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.solver.parts import ELASTIC, NU, E, blocks, coordinates, solve
 
 DEPTH = 0.01
@@ -22,9 +22,9 @@ every_integration = pytest.mark.parametrize(
     "integrated", ["", "upper bottom", "lower top"], ids=["both", "upper", "lower"]
 )
 PRESSED = [
-    Support("base", "base", 1),
-    Support("lid", "lid", 1, -1.0),
-    Support("left", "left", 0),
+    Dirichlet("base", "base", 1),
+    Dirichlet("lid", "lid", 1, -1.0),
+    Dirichlet("left", "left", 0),
 ]  # free to widen
 
 
@@ -110,7 +110,7 @@ def test_a_tied_line_passes_shear_and_tension(n_lower, n_upper, integrated):
     not seen."""
     A = np.array([[0.3, 0.8], [-0.2, 1.0]])
     supports = [
-        Support("around", facets, axis, lambda x, axis=axis: x @ A[axis])
+        Dirichlet("around", facets, axis, lambda x, axis=axis: x @ A[axis])
         for facets in ("base", "lid", "left", "right")
         for axis in range(2)
     ]
@@ -123,8 +123,8 @@ def test_a_tied_line_passes_shear_and_tension(n_lower, n_upper, integrated):
 @pytest.mark.parametrize("rates", [(0.0, 1.0), (1.0, 0.0)], ids=["pulled", "pushed aside"])
 def test_frictionless_blocks_carry_no_shear_and_no_tension(rates):
     """A lid pulled up leaves the lower block at rest; one pushed aside drags nothing along."""
-    supports = [Support("base", "base", k) for k in range(2)] + [
-        Support("lid", "lid", k, rates[k]) for k in range(2)
+    supports = [Dirichlet("base", "base", k) for k in range(2)] + [
+        Dirichlet("lid", "lid", k, rates[k]) for k in range(2)
     ]
     blocks = Blocks(4, 4, supports=supports)
     assert np.abs(blocks.u[coordinates(blocks.V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH

@@ -1,0 +1,121 @@
+"""Where the mesh of a problem comes from: a file, or a mesh that Python has; and how it is changed
+before it is used."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from archord.report.errors import InputError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from archord.geometry.meshes.plane_mesh import PlaneMesh
+    from archord.geometry.meshes.tagged_mesh import TaggedMesh
+
+_KINDS = "a mesh file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
+_LONGEST = 40  # characters of a value in a message
+Disc = tuple[tuple[float, float], float]  # centre and radius
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh for a problem.
+
+    Parameters
+    ----------
+    source : str, Path, module, tuple or TaggedMesh
+        A file (.msh of gmsh, .inp of Abaqus and CalculiX, .xdmf of dolfinx, .npz of archord); the
+        module gmsh with a model, meshed or not; a dolfinx mesh with its tags, as (mesh, cells,
+        facets); or what `gmsh_to_mesh` returns.
+    scale : float
+        The factor on the coordinates: 1000 takes metres to millimetres.
+    order : {1, 2, 3}
+        The order of the geometry, by default the order of the source.
+    refine : int
+        How often every cell is cut in four.
+    circles : dict
+        The circles ((x, y), radius) on which the nodes of facet sets are put, by the sets.
+
+    Raises
+    ------
+    InputError
+        For a source that is none of these.
+
+    Examples
+    --------
+    >>> from archord import Mesh
+    >>> Mesh("lug.msh", scale=1000.0, circles={"hole": ((0.0, 0.0), 10.0)}).file
+    'lug.msh'
+    """
+
+    source: Any
+    scale: float = 1.0
+    order: int | None = None
+    refine: int = 0
+    circles: dict[str, Disc] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the source; raise `InputError`."""
+        source = self.source
+        known = isinstance(source, (str, Path, tuple, ModuleType))
+        if not known and not hasattr(source, "facet_sets"):
+            text = json.dumps(source, default=repr)[:_LONGEST]
+            raise InputError(f"archord.Mesh: the source must be {_KINDS}, not {text}.")
+
+    @classmethod
+    def of(cls, given: Any) -> Mesh:
+        """The mesh ``given`` as a source, or as a `Mesh` already."""
+        return given if isinstance(given, cls) else cls(given)
+
+    @property
+    def file(self) -> str:
+        """The file, "" where there is none."""
+        return str(self.source) if isinstance(self.source, (str, Path)) else ""
+
+    @property
+    def name(self) -> str:
+        """What messages call the mesh."""
+        return self.file or "the mesh"
+
+    def on(self, comm: MPI.Comm) -> TaggedMesh:
+        """The mesh on the ranks of ``comm``. Collective; raises ValueError."""
+        from archord.geometry.meshes.formats.read import read_mesh
+        from archord.geometry.meshes.refine import Circle
+
+        circles = [
+            Circle(facets, (centre[0], centre[1]), radius)
+            for facets, (centre, radius) in (self.circles or {}).items()
+        ]
+        return read_mesh(
+            self._tagged(),
+            comm,
+            circles=circles,
+            scale=self.scale,
+            order=self.order,
+            refine=self.refine,
+        )
+
+    def plain(self, comm: MPI.Comm) -> PlaneMesh | None:
+        """The mesh before it is scaled and refined: on rank 0, None elsewhere. Collective."""
+        from archord.geometry.meshes.formats.read import plane_mesh_of
+
+        return plane_mesh_of(self._tagged(), comm, self.order)
+
+    def _tagged(self) -> Any:
+        from archord.geometry.meshes.formats.read import tagged
+
+        return tagged(*self.source) if isinstance(self.source, tuple) else self.source
+
+
+def circles_in(sections: Sequence[Any]) -> dict[str, Disc]:
+    """The circles of the sections of a scene, by the facet sets that lie on them."""
+    return {
+        section.facets: ((section.centre[0], section.centre[1]), section.radius)
+        for section in sections
+    }

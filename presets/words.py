@@ -1,0 +1,192 @@
+"""A problem from Python in the words of a general scene: what a run folder tells of it."""
+
+from __future__ import annotations
+
+import re
+from functools import singledispatch
+from typing import Any
+
+from archord.geometry.meshes.formats.source import Mesh
+from archord.materials.elasticity import Elastic
+from archord.materials.finite import LargeStrain
+from archord.materials.hardening import (
+    LinearHardening,
+    SwiftHardening,
+    TabularHardening,
+    VoceHardening,
+)
+from archord.materials.j2 import J2Material
+from archord.materials.kinematic import KinematicMaterial
+from archord.scene.errors import InputError
+from archord.scene.problem import ProblemScene
+from archord.solver.contact.interaction import Interaction
+from archord.solver.expansion import disc_of
+from archord.solver.parts import Body, Load, Support
+from archord.solver.problem import Problem
+
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
+_LARGEST_NU = 0.499999
+
+
+def words_of(problem: Problem, mesh_file: str, fields: str | bool = "nodes") -> ProblemScene:
+    """The scene that tells of ``problem``, whose mesh is, or will be, the file ``mesh_file``.
+
+    Materials and laws of one's own classes are told by class and representation. Raises
+    `InputError` for what a scene refuses, and for conditions that it has no words for.
+    """
+    make: Any = ProblemScene
+    return make("archord.Problem", None, **_sections(problem, mesh_file, fields))
+
+
+def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str, Any]:
+    for part in (*problem.supports, *problem.loads, *problem.means, *problem.drives):
+        if not isinstance(part, (Support, Load)):
+            kind = type(part).__name__
+            raise InputError(
+                f"archord.solve: a problem with a {kind} has no run folder; state it by Support, Load and Coupling, or "
+                "solve it by System."
+            )
+    return {
+        "units": dict(zip(("length", "stress"), problem.units, strict=True)),
+        "mesh": _mesh(problem.mesh, mesh_file),
+        "body": [_body(body) for body in problem.bodies],
+        "interaction": [_interaction(part) for part in problem.interactions],
+        "coupling": [vars(coupling) for coupling in problem.couplings],
+        "support": [vars(support) for support in problem.supports],
+        "load": [_load(load) for load in problem.loads if isinstance(load, Load)],
+        "path": {"steps": problem.steps, "fit_steps": problem.fit_steps},
+        "analysis": _analysis(problem),
+        "stepping": dict(problem.stepping),
+        "output": {"fields": fields},
+    }
+
+
+def _mesh(mesh: Any, file: str) -> dict[str, Any]:
+    if not isinstance(mesh, Mesh):
+        return {"file": file}
+    circles = [
+        {"facets": facets, "centre": list(centre), "radius": radius}
+        for facets, (centre, radius) in (mesh.circles or {}).items()
+    ]
+    changes = {"scale": mesh.scale, "order": mesh.order, "refine": mesh.refine, "circle": circles}
+    return {"file": mesh.file or file} | changes
+
+
+def _body(body: Body) -> dict[str, Any]:
+    return {"name": body.name, "cells": body.cells} | material_words(body.material)
+
+
+def material_words(material: Any) -> dict[str, Any]:
+    """The keys of a body's section for ``material``: those of a scene, or a description of a class
+    of one's own, with E and nu of its elastic moduli."""
+    kind = type(material)
+    if kind is LargeStrain:
+        return material_words(material.inner)
+    elastic = {"E": getattr(material, "E", 0.0), "nu": getattr(material, "nu", 0.0)}
+    if kind is Elastic:
+        return elastic
+    if kind in (J2Material, KinematicMaterial):
+        hardening = _hardening(material.hardening)
+        if hardening is not None:
+            back = getattr(material, "back_stresses", None)
+            return elastic | hardening | {"back_stresses": back and [list(pair) for pair in back]}
+    return _moduli(material) | {"own": _own(material) | {"plastic": bool(material.yields)}}
+
+
+@singledispatch
+def _hardening(law: Any) -> dict[str, Any] | None:
+    """The keys of a body's section for a hardening law, None for a class of one's own."""
+    return None
+
+
+@_hardening.register
+def _(law: LinearHardening) -> dict[str, Any]:
+    return {"yield_stress": law.yield_stress, "hardening": law.modulus}
+
+
+@_hardening.register
+def _(law: TabularHardening) -> dict[str, Any]:
+    return {"hardening": [list(point) for point in law.points]}
+
+
+@_hardening.register
+def _(law: VoceHardening) -> dict[str, Any]:
+    parameters = {"saturation": law.saturation, "rate": law.rate}
+    return {"yield_stress": law.yield_stress, "hardening": parameters}
+
+
+@_hardening.register
+def _(law: SwiftHardening) -> dict[str, Any]:
+    yield_stress = law.strength * law.offset**law.exponent
+    parameters = {"offset": law.offset, "exponent": law.exponent}
+    return {"yield_stress": yield_stress, "hardening": parameters}
+
+
+def _moduli(material: Any) -> dict[str, float]:
+    """E and nu of the elastic moduli of ``material``, as if it were isotropic."""
+    tangent = material.elastic_tangent
+    along = float(tangent[0, 0])
+    across = float(tangent[0, 1])
+    is_thin = getattr(material, "plane", "strain") == "stress"
+    nu = across / along if is_thin else across / (along + across)
+    nu = min(max(nu, 0.0), _LARGEST_NU)
+    E = along * (1 - nu**2) if is_thin else along * (1 + nu) * (1 - 2 * nu) / (1 - nu)
+    return {"E": E, "nu": nu}
+
+
+def _own(part: Any) -> dict[str, Any]:
+    """An object of a class of one's own in words, the same ones in every process."""
+    text = _ADDRESS.sub("", repr(part))
+    return {"kind": type(part).__qualname__, "text": " ".join(text.split())}
+
+
+def _interaction(part: Interaction) -> dict[str, Any]:
+    disc = disc_of(part)
+    words: dict[str, Any] = {
+        "name": part.name,
+        "surfaces": [name for name in part.surfaces if isinstance(name, str)],
+        "friction": part.friction,
+        "integrated": part.integrated or None,
+        "interference": part.interference,
+        "overlap": part.overlap,
+    }
+    if disc is not None:
+        words["rigid"] = {"centre": disc.centre, "radius": disc.radius}
+    return words | _law(part.law)
+
+
+def _law(law: Any) -> dict[str, Any]:
+    """The keys of an interaction's section for a contact law."""
+    if isinstance(law, str):
+        return {"law": law}
+    return {"own": _own(law) | {"friction": bool(law.has_friction)}}
+
+
+def _load(load: Load) -> dict[str, Any]:
+    words: dict[str, Any] = {"name": load.name, "on": load.on, "direction": load.direction}
+    words[load.kind] = getattr(load, load.kind)
+    if load.core is not None:
+        centre, radius = load.core
+        words["core"] = {"centre": list(centre), "radius": radius}
+    return words
+
+
+def _analysis(problem: Problem) -> dict[str, Any]:
+    is_large = any(isinstance(body.material, LargeStrain) for body in problem.bodies)
+    symmetry = int(problem.symmetry) if problem.symmetry % 1 == 0 else problem.symmetry
+    words = {
+        "plane": problem.kinematics.name,
+        "strain": "large" if is_large else problem.strain,
+        "degree": problem.degree,
+        "thickness": problem.thickness,
+        "tolerance": problem.tolerance,
+        "max_iterations": problem.max_iterations,
+        "symmetry": symmetry,
+    }
+    for key, attribute in (("kinematics", "kinematics"), ("gamma_factor", "gamma_factor")):
+        given = {getattr(part, attribute) for part in problem.interactions}
+        if len(given) > 1:
+            raise InputError(f"archord.Problem: interactions must have one {key}, not {given}.")
+        if given:
+            words[key] = given.pop()
+    return words

@@ -1,0 +1,61 @@
+"""What is said of bad input, in sentences."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+from typing import Any
+
+_LONGEST = 40  # characters of a value in a message
+
+
+class InputError(ValueError):
+    """Bad input: the message has one sentence a line.
+
+    Each sentence names the file or the part, the key, its value and what is allowed. The command
+    line prints the message and ends with exit code 2.
+
+    Examples
+    --------
+    >>> import archord
+    >>> try:
+    ...     archord.Support("clamp", fixed="z")
+    ... except archord.InputError as error:
+    ...     print(error)
+    archord.Support: support "clamp".fixed = "z" must be directions among x, y and rotation.
+    """
+
+
+def in_sentences(cls: type) -> Any:
+    """Let a call of ``cls`` with wrong arguments raise `InputError`, a sentence."""
+    build = cls.__init__  # type: ignore[misc]
+    signature = inspect.signature(build)
+    known = ", ".join([*signature.parameters][1:])
+
+    @functools.wraps(build)
+    def checked(self: Any, *values: Any, **keys: Any) -> None:
+        try:
+            signature.bind(self, *values, **keys)
+        except TypeError as error:
+            said = f"{error}; its arguments are {known}"
+            raise InputError(f"archord.{cls.__name__}: {said}.") from None
+        build(self, *values, **keys)
+
+    cls.__init__ = checked  # type: ignore[misc]
+    return cls
+
+
+def shown(value: Any) -> str:
+    """``value`` as a message shows it."""
+    text = json.dumps(value, default=repr)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def require_of(part: Any, holds: bool, key: str, said: str) -> None:
+    """Raise `InputError` unless it ``holds`` what is ``said`` of the ``key`` of ``part``."""
+    if not holds:
+        kind = type(part).__name__
+        place = f'{kind.lower()} "{part.name}".{key}'
+        value = shown(getattr(part, key))
+        raise InputError(f"archord.{kind}: {place} = {value} {said}.")

@@ -1,0 +1,282 @@
+"""What a user states of a problem, as the boundary conditions that the solver applies: supports,
+loads, couplings and moved discs become Dirichlet conditions, dead loads, means and drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.geometry.curve import RigidCircle
+from archord.geometry.meshes.tagged_mesh import unknown
+from archord.solver.conditions import Control, DeadLoad, Dirichlet, Drive, Guess, Mean
+from archord.solver.contact.interaction import Interaction, Rigid
+from archord.solver.core_load import core_density, require_core
+from archord.solver.parts import Coupling, Load, Support
+from archord.solver.problem import Problem
+
+_STRETCHED = 10.0  # sizes of the mesh that large strain may displace by
+_AXES = {"x": 0, "y": 1, "rotation": 2}
+_ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+Rate = float | Callable[[Array], Array]
+
+
+def expanded(problem: Problem) -> Problem:
+    """The ``problem``, whose mesh is on ranks, with boundary conditions alone. Collective; raises
+    ValueError for sets that the mesh lacks, and for a problem that contradicts itself."""
+    return _Expansion(problem).problem() if problem.is_stated else problem
+
+
+class _Expansion:
+    """The conditions of a ``problem``, by the names of sets of its mesh, of couplings and of discs.
+
+    loaded: the name of the load of each place and direction
+    held: the places and directions that supports fix
+    drives, supports, means, loads: the conditions, those that the problem states itself first
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.stated = problem
+        self.mesh = problem.mesh
+        self.edges = [*self.mesh.facet_sets, *self.mesh.point_sets]
+        self.couplings = [coupling.name for coupling in problem.couplings]
+        self.discs = [i.name for i in problem.interactions if disc_of(i) is not None]
+        self.given_supports = [part for part in problem.supports if isinstance(part, Support)]
+        self.given_loads = [part for part in problem.loads if isinstance(part, Load)]
+        self.loaded = {(load.on, str(load.direction)): load.name for load in self.given_loads}
+        self.held = {(part.on, freedom) for part in self.given_supports for freedom in part.fixed}
+        self.drives = list(problem.drives)
+        self.supports = [part for part in problem.supports if isinstance(part, Dirichlet)]
+        self.loads = [part for part in problem.loads if isinstance(part, DeadLoad)]
+        self.means = list(problem.means)
+
+    def problem(self) -> Problem:
+        """The problem with all conditions. Raises ValueError."""
+        stated = self.stated
+        self._require_known()
+        self._require_near()
+        for support in self.given_supports:
+            self._support(support)
+        for load in self.given_loads:
+            self._load(load)
+        for coupling in stated.couplings:
+            if coupling.kind == "rigid":
+                self._rigid_point(coupling)
+            else:
+                self._mean_point(coupling)
+        self._require_one_support()
+        changes: dict[str, Any] = {
+            "supports": self.supports,
+            "loads": self.loads,
+            "couplings": (),
+            "means": self.means,
+            "drives": self.drives,
+            "symmetry": stated.symmetry * (stated.thickness or 1.0),
+            "thickness": None,
+        }
+        slide = 0.0
+        if self.given_loads:
+            travel = self._travel()
+            slide = travel if np.isfinite(travel) else 0.0
+            changes |= {"fit": stated.fits, "stabilise": True, "travel": travel}
+            changes["guess"] = self._guess()
+        interactions = [self._interaction(part, slide) for part in stated.interactions]
+        return replace(stated, interactions=interactions, **changes)
+
+    def _require_known(self) -> None:
+        """Raise ValueError for a place that is no set, coupling or disc."""
+        known = [*self.edges, *self.mesh.cell_sets, *self.couplings, *self.discs]
+        places = [support.on for support in self.given_supports]
+        places += [load.on for load in self.given_loads]
+        for on in places:
+            if on not in known:
+                raise ValueError(unknown("set or coupling", on, known))
+
+    def _require_one_support(self) -> None:
+        """Raise ValueError where two names prescribe how one set moves along one axis."""
+        given: dict[tuple[str, int], str] = {}
+        for s in self.supports:
+            other = given.setdefault((s.facets, s.axis), s.name)
+            if other != s.name:
+                raise ValueError(
+                    f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in {'xy'[s.axis]}"
+                )
+
+    def _travel(self) -> float:
+        """The largest displacement that loads and fits prescribe, infinite under a force."""
+        by_force = any(load.kind != "displacement" for load in self.given_loads)
+        if by_force or self.stated.drives:
+            return np.inf
+        lengths = [abs(value) for load in self.given_loads for value in load.stages]
+        fits = [i.interference + i.overlap for i in self.stated.interactions]
+        return sum(lengths) + max(fits, default=0.0)
+
+    def _require_near(self) -> None:
+        """Raise ValueError for a displacement beyond the size of the mesh, as if in other units.
+        Large strain is stretched some times as far. Collective."""
+        lowest, highest = self._box()
+        size = float((highest - lowest).max())
+        is_large = any(getattr(body.material, "finite", False) for body in self.stated.bodies)
+        most = _STRETCHED * size if is_large else size
+        for load in self.given_loads:
+            if load.kind != "displacement" or load.direction == "rotation":
+                continue
+            farthest = max(load.stages, key=abs)
+            if abs(farthest) > most:
+                raise ValueError(
+                    f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh is {size:.4g} "
+                    f"large: a displacement of at most {most:.4g} is solved; look whether both have the same unit"
+                )
+        self._require_near_turns(lowest, highest, most)
+
+    def _box(self) -> tuple[Array, Array]:
+        """The lowest and the highest x and y of the mesh and the discs' centres. Collective."""
+        comm = self.mesh.mesh.comm
+        discs = [disc_of(part) for part in self.stated.interactions]
+        centres = [disc.centre for disc in discs if disc is not None]
+        x = self.mesh.mesh.geometry.x[:, :2]
+        x = np.concatenate([x, np.reshape(centres, (-1, 2))])
+        ends = np.concatenate([x.max(axis=0, initial=-np.inf), -x.min(axis=0, initial=np.inf)])
+        comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
+        return -ends[2:], ends[:2]
+
+    def _require_near_turns(self, lowest: Array, highest: Array, most: float) -> None:
+        """Raise ValueError for a coupling that turns about a held point so far away that all the
+        mesh, in the box from ``lowest`` to ``highest``, moves by more than ``most``."""
+        points = {coupling.name: np.array(coupling.point) for coupling in self.stated.couplings}
+        displaced = [load for load in self.given_loads if load.kind == "displacement"]
+        held = self.held | {(load.on, str(load.direction)) for load in displaced}
+        for load in displaced:
+            if load.direction != "rotation" or load.on not in points:
+                continue
+            point = points[load.on]
+            beside = np.maximum(point - highest, lowest - point)
+            x, y = np.maximum(beside, 0.0)
+            arms = [arm for axis, arm in (("x", y), ("y", x)) if (load.on, axis) in held]
+            moved = max(map(abs, load.stages)) * max(arms, default=0.0)
+            if moved > most:
+                raise ValueError(
+                    f"the load {load.name!r} turns {load.on!r} about a point so far away that it moves by {moved:.4g}, "
+                    f"but a displacement of at most {most:.4g} is solved; are they in the same unit?"
+                )
+
+    def _support(self, support: Support) -> None:
+        """What holds a set; couplings take their supports themselves."""
+        if support.on in self.couplings:
+            return
+        if "rotation" in support.fixed:
+            raise ValueError(
+                f"the support {support.name!r} fixes the rotation of {support.on!r}, which is no coupling: "
+                'a set is held in "x" and "y"'
+            )
+        for freedom in support.fixed:
+            self.supports.append(Dirichlet(support.name, support.on, _AXES[freedom]))
+
+    def _load(self, load: Load) -> None:
+        """A pressure; a force spread over cells; or what moves a set, a reference point or a
+        disc."""
+        places = [*self.edges, *self.couplings, *self.discs]
+        on_cells = load.kind == "force" and load.on not in places
+        spread = on_cells or load.core is not None
+        control: Control = "force" if load.kind == "force" and not spread else "displacement"
+        self.drives.append(Drive(load.name, self.stated.values(load), control))
+        if load.kind == "pressure":
+            self.loads.append(DeadLoad(facets=load.on, pressure=1.0, drive=load.name))
+            return
+        if load.direction == "rotation" and load.on not in self.couplings:
+            raise ValueError(
+                f"the load {load.name!r} turns {load.on!r}, which is no coupling: only couplings have a rotation"
+            )
+        if spread:
+            self._spread(load)
+        elif load.on not in [*self.couplings, *self.discs]:
+            axis = _AXES[str(load.direction)]
+            self.supports.append(Dirichlet(load.name, load.on, axis, 1.0, load.name))
+
+    def _spread(self, load: Load) -> None:
+        """A force on cells, evenly or in a core."""
+        force = _ALONG[str(load.direction)]
+        density = None
+        if load.core is not None:
+            centre, radius = load.core
+            require_core(self.mesh, load.on, centre, radius, f"load {load.name!r}: core.radius")
+            density = core_density(centre, radius)
+        self.loads.append(DeadLoad(cells=load.on, force=force, density=density, drive=load.name))
+
+    def _drive(self, coupling: str, freedom: str, control: Control) -> str:
+        """The load of a reference point in one of its freedoms, or a drive of its own whose
+        ``control`` is 0."""
+        if (coupling, freedom) in self.loaded:
+            return self.loaded[coupling, freedom]
+        drive = Drive(f"{coupling} {freedom}", (0.0, 0.0), control)
+        self.drives.append(drive)
+        return drive.name
+
+    def _rigid_point(self, coupling: Coupling) -> None:
+        X, Y = coupling.point
+        rates: dict[str, list[tuple[int, Rate]]] = {
+            "x": [(0, 1.0)],
+            "y": [(1, 1.0)],
+            "rotation": [(0, lambda x: Y - x[:, 1]), (1, lambda x: x[:, 0] - X)],
+        }
+        for axis in (0, 1):
+            self.supports.append(Dirichlet(coupling.name, coupling.facets, axis))
+        for freedom in _AXES:
+            if (coupling.name, freedom) in self.held:
+                continue
+            drive = self._drive(coupling.name, freedom, "force")
+            for axis, rate in rates[freedom]:
+                self.supports.append(Dirichlet(coupling.name, coupling.facets, axis, rate, drive))
+
+    def _mean_point(self, coupling: Coupling) -> None:
+        # with its mirror image an edge moves along the symmetry line alone
+        mirrored = self.stated.symmetry > 1
+        point = None if mirrored else coupling.point
+        for freedom, axis in _AXES.items():
+            if (coupling.name, freedom) not in self.held | self.loaded.keys():
+                continue
+            if mirrored and freedom == "rotation":
+                raise ValueError(
+                    f"the coupling {coupling.name!r} of a part with mirror images cannot turn"
+                )
+            drive = self._drive(coupling.name, freedom, "displacement")
+            self.means.append(Mean(coupling.name, coupling.facets, axis, point, drive))
+
+    def _interaction(self, part: Interaction, slide: float) -> Interaction:
+        disc = part.surfaces[0]
+        if isinstance(disc, RigidCircle):
+            loads = [load for load in self.given_loads if load.on == part.name]
+            rates = {load.name: _ALONG[str(load.direction)] for load in loads}
+            part = replace(part, surfaces=(Rigid(disc, rates), part.surfaces[1]))
+        return replace(part, slide=part.slide or slide)
+
+    def _guess(self) -> Callable[[float], Guess]:
+        """Bodies moved rigidly as their edges are displaced. Collective."""
+        stated = self.stated
+        driven: list[tuple[Load, str]] = []
+        for load in self.given_loads:
+            if load.kind == "displacement" and load.on in self.mesh.facet_sets:
+                driven.append((load, stated.body_of(load.on).name))
+
+        def guess(factor: float) -> Guess:
+            moved: dict[str, tuple[float, float]] = {}
+            for load, body in driven:
+                values = stated.values(load)
+                value = float(np.interp(factor, range(len(values)), values))
+                x, y = moved.get(body, (0.0, 0.0))
+                moved[body] = (x + value, y) if load.direction == "x" else (x, y + value)
+            return Guess(factor, moved)
+
+        return guess
+
+
+def disc_of(part: Any) -> RigidCircle | None:
+    """The rigid disc of an interaction, None where both surfaces are of bodies."""
+    first = part.surfaces[0]
+    if isinstance(first, Rigid):
+        return first.circle
+    return first if isinstance(first, RigidCircle) else None

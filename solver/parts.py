@@ -1,0 +1,250 @@
+"""The parts of a problem as a user states them: bodies, supports, loads and couplings, by names of
+sets of the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from archord.materials.material import Material
+from archord.report.errors import InputError, in_sentences, require_of
+
+Freedom = Literal["x", "y", "rotation"]
+Values = float | Sequence[float]
+FREEDOMS = get_args(Freedom)
+_KINDS = ("displacement", "force", "pressure")
+
+
+def _require_name(part: Any, key: str = "name") -> None:
+    name = getattr(part, key)
+    require_of(part, isinstance(name, str) and bool(name), key, "must be a name")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number)) and bool(np.isfinite(value))
+
+
+def _is_pair(value: Any) -> bool:
+    return np.shape(value) == (2,) and all(map(_is_number, value))
+
+
+@in_sentences
+@dataclass(frozen=True)
+class Body:
+    """A deformable body: a set of cells, of one material.
+
+    Parameters
+    ----------
+    name : str
+        The name of the body, and of its set of cells unless ``cells`` says otherwise.
+    material : str or Material
+        A metal by its name (docs/materials.md), in the problem's unit of stress; or an object of
+        the class `Elastic`, `J2Material`, `KinematicMaterial`, or of your own, made from
+        `Material`.
+    cells : str
+        The set of cells in the mesh.
+
+    Raises
+    ------
+    InputError
+        For a name that is no text, or a material that is neither a name nor a material.
+
+    Examples
+    --------
+    >>> from archord import Body, Elastic
+    >>> Body("pin", material="S355").material
+    'S355'
+    >>> Body("block", Elastic(210e3, 0.3)).cells
+    'block'
+    """
+
+    name: str
+    material: Any
+    cells: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the parts; raise `InputError`."""
+        _require_name(self)
+        is_material = Material in type(self.material).__mro__
+        said = "must be the name of a metal, or a material: an object of a class made from Material"
+        require_of(self, isinstance(self.material, str) or is_material, "material", said)
+        object.__setattr__(self, "cells", self.cells or self.name)
+        _require_name(self, "cells")
+
+
+@in_sentences
+@dataclass(frozen=True)
+class Support:
+    """What is held.
+
+    Parameters
+    ----------
+    name : str
+        The name of the support, and of what it holds unless ``on`` says otherwise.
+    on : str
+        A coupling, or a set of facets, points or cells: the first that has the name.
+    fixed : str or sequence of str
+        The directions held: "x", "y", "xy", or a list with "rotation", which couplings alone have.
+
+    Raises
+    ------
+    InputError
+        For a name that is no text, or a direction that is none.
+
+    Examples
+    --------
+    >>> from archord import Support
+    >>> Support("clamp", fixed="xy").fixed
+    ('x', 'y')
+    >>> Support("symmetry", on="axis", fixed="y").on
+    'axis'
+    """
+
+    name: str
+    on: str = ""
+    fixed: str | Sequence[str] = "xy"
+
+    def __post_init__(self) -> None:
+        """Check the parts; raise `InputError`."""
+        _require_name(self)
+        object.__setattr__(self, "on", self.on or self.name)
+        _require_name(self, "on")
+        fixed = self.fixed
+        if fixed in ("x", "y", "xy"):
+            fixed = tuple(fixed)
+        elif isinstance(fixed, str):
+            fixed = (fixed,)
+        known = len(fixed) > 0 and all(freedom in FREEDOMS for freedom in fixed)
+        require_of(self, known, "fixed", "must be directions among x, y and rotation")
+        object.__setattr__(self, "fixed", tuple(fixed))
+
+
+@in_sentences
+@dataclass(frozen=True)
+class Load:
+    """What moves or presses: one value, or a list of values at the ends of the stages of the path.
+
+    Parameters
+    ----------
+    name : str
+        The name of the load, and of what it acts on unless ``on`` says otherwise.
+    on : str
+        The interaction of a rigid disc, a coupling, or a set of facets, points or cells: the first
+        that has the name.
+    direction : {"x", "y", "rotation"}
+        The direction of a displacement or a force; "rotation" is of couplings alone.
+    displacement : float or sequence of float
+        The displacement, or the angle in radians.
+    force : float or sequence of float
+        The force on the whole, or the moment. A facet set under a force stays straight.
+    pressure : float or sequence of float
+        The pressure on a facet set, on its undeformed area, along the normal into the body.
+    core : tuple
+        The circle ((x, y), radius) in which a force on cells is spread, less and less outward.
+
+    Raises
+    ------
+    InputError
+        Unless there is one of displacement, force and pressure, with a direction if it needs one.
+
+    Examples
+    --------
+    >>> from archord import Load
+    >>> Load("pull", on="flat", direction="x", displacement=0.3).stages
+    (0.3,)
+    >>> Load("oil", on="bore", pressure=[10.0, 0.0]).kind
+    'pressure'
+    """
+
+    name: str
+    on: str = ""
+    direction: str | None = None
+    displacement: Values | None = None
+    force: Values | None = None
+    pressure: Values | None = None
+    core: tuple[tuple[float, float], float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the parts; raise `InputError`."""
+        _require_name(self)
+        object.__setattr__(self, "on", self.on or self.name)
+        _require_name(self, "on")
+        given = [kind for kind in _KINDS if getattr(self, kind) is not None]
+        if not given:
+            said = "displacement is missing (or force, pressure)"
+            raise InputError(f'archord.Load: load "{self.name}".{said}.')
+        others = " and ".join(given[1:])
+        said = f"must not be given together with {others}"
+        require_of(self, len(given) == 1, given[0], said)
+        values = np.ravel(getattr(self, self.kind))
+        numbers = len(values) > 0 and all(map(_is_number, values))
+        require_of(self, numbers, self.kind, "must be a number, or a list of numbers")
+        wanted = (None,) if self.kind == "pressure" else FREEDOMS
+        said = (
+            'must be "x", "y" or "rotation", and None for a pressure, which acts along the normal'
+        )
+        require_of(self, self.direction in wanted, "direction", said)
+        said = "is a circle ((x, y), radius), for a force on cells"
+        is_circle = self.core is None or (
+            len(self.core) == 2 and _is_pair(self.core[0]) and _is_number(self.core[1])
+        )
+        alone = self.core is None or self.kind == "force"
+        require_of(self, is_circle and alone, "core", said)
+
+    @property
+    def kind(self) -> str:
+        """What is given: "displacement", "force" or "pressure"."""
+        return next(kind for kind in _KINDS if getattr(self, kind) is not None)
+
+    @property
+    def stages(self) -> tuple[float, ...]:
+        """The values at the ends of the stages of the path."""
+        return tuple(map(float, np.ravel(getattr(self, self.kind))))
+
+
+@in_sentences
+@dataclass(frozen=True)
+class Coupling:
+    """A reference point that stands for a set of facets: supports and loads may be on it.
+
+    Parameters
+    ----------
+    name : str
+        The name of the coupling, and of its set of facets unless ``facets`` says otherwise.
+    facets : str
+        The set of facets.
+    point : tuple of float
+        The reference point (x, y).
+    kind : {"rigid", "distributing"}
+        Facets of a rigid coupling move as one body. Facets of a distributing one do so only on
+        average, and forces are spread over them.
+
+    Raises
+    ------
+    InputError
+        For a name that is no text, a point that is none, or another kind.
+
+    Examples
+    --------
+    >>> from archord import Coupling
+    >>> Coupling("crank", facets="bore", point=(0.0, 5.0)).kind
+    'rigid'
+    """
+
+    name: str
+    facets: str = ""
+    point: tuple[float, float] = (0.0, 0.0)
+    kind: Literal["rigid", "distributing"] = "rigid"
+
+    def __post_init__(self) -> None:
+        """Check the parts; raise `InputError`."""
+        _require_name(self)
+        object.__setattr__(self, "facets", self.facets or self.name)
+        _require_name(self, "facets")
+        require_of(self, _is_pair(self.point), "point", "must be two numbers, x and y")
+        known = self.kind in ("rigid", "distributing")
+        require_of(self, known, "kind", 'must be "rigid" or "distributing"')
+        object.__setattr__(self, "point", tuple(map(float, self.point)))
