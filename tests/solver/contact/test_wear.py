@@ -23,7 +23,7 @@ from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.stepping import march
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Drive, Interaction, Problem, Support
+from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
 from tests.solver.contact.test_tangent import assert_tangent_is_derivative
 from tests.solver.parts import DR, blocks, commit, joint_parts
 from tests.solver.test_friction import rings
@@ -125,9 +125,9 @@ def rubbed(comm: MPI.Comm, law: ContactLaw) -> System:
         "rub", ("upper bottom", "lower top"), law=law, kinematics="reference", gamma_factor=2.0
     )
     supports = [
-        *(Support("base", "base", axis) for axis in (0, 1)),
-        Support("lid x", "lid", 0, 1.0, "slide"),
-        Support("lid y", "lid", 1, 1.0, "press"),
+        *(Dirichlet("base", "base", axis) for axis in (0, 1)),
+        Dirichlet("lid x", "lid", 0, 1.0, "slide"),
+        Dirichlet("lid y", "lid", 1, 1.0, "press"),
     ]
     drives = [Drive("slide", STROKE), Drive("press", [0, -1, -1, -1], "force")]
     bodies = [Body(name, steel) for name in ("lower", "upper")]
@@ -164,10 +164,10 @@ def turned(comm: MPI.Comm, k: float, steps: int) -> tuple[list[float], list[floa
     volume, from before the first turn on."""
     steel = Elastic(210e3, 0.3, "strain")
     turn = [
-        Support("bore", "inside", 0, lambda x: -x[:, 1], "turn"),
-        Support("bore", "inside", 1, lambda x: x[:, 0], "turn"),
+        Dirichlet("bore", "inside", 0, lambda x: -x[:, 1], "turn"),
+        Dirichlet("bore", "inside", 1, lambda x: x[:, 0], "turn"),
     ]
-    held = [Support("outside", "outside", axis) for axis in (0, 1)]
+    held = [Dirichlet("outside", "outside", axis) for axis in (0, 1)]
     fit = Interaction("fit", ("pin", "hole"), law=Wear(k), interference=0.01)
     bodies = [Body("inner", steel), Body("outer", steel)]
     problem = Problem(
