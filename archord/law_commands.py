@@ -9,8 +9,9 @@ import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +22,13 @@ from archord.options import argument, file, flag, overrides
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
+    from archord.postprocess.laws.fitted_law import FittedLaw
     from archord.postprocess.laws.general.joint import LawJoint
+    from archord.postprocess.laws.general.joint_curve import JointCurve
     from archord.postprocess.laws.law import Law
     from archord.scene.scene import Scene
 
+_Text = tuple[Path, Callable[[], str]]  # a file, and what makes its text
 _LINE = 400  # points of a line of the picture
 # Options of `archord law` by those beside which they say nothing.
 _IDLE = {
@@ -203,7 +207,6 @@ def _export(
     inputs: list[Path],
     force: bool,
 ) -> int:
-    from archord.postprocess.laws.exports.export import export_curve
     from archord.postprocess.laws.general.general_law import general_law
     from archord.postprocess.laws.law import LawRangeWarning
     from archord.postprocess.laws.laws import LAWS
@@ -218,7 +221,7 @@ def _export(
     if units:
         law = dataclasses.replace(law, length_unit=units["length"], force_unit=units["force"])
     law = dataclasses.replace(law, force=law.force * thickness, pin_length=thickness, about=about)
-    print(*_write([(file, export_curve(law, file)) for file in exports], inputs, force), sep="\n")
+    print(*_write(_exports(law, exports), inputs, force), sep="\n")
     _warn(*(str(warning.message) for warning in caught))
     return 0
 
@@ -371,7 +374,14 @@ def _keys(scene: Scene, name: str) -> list[str]:
 )
 @file("--json", "write law and fits", parameter="json_file")
 @file("--picture", "draw data, law and residuals")
-@file("--python", "write force and stiffness over delta as a module that needs only math")
+@click.option(
+    "--export",
+    "--python",
+    "exports",
+    type=Path,
+    multiple=True,
+    help="write the fitted law: .py .h .mo .m .json",
+)
 @click.option(
     "--table",
     "tables",
@@ -389,7 +399,7 @@ def fit(
     load_range: tuple[float, float] | None,
     json_file: Path | None,
     picture: Path | None,
-    python: Path | None,
+    exports: tuple[Path, ...],
     tables: tuple[Path, ...],
     of: str | None,
     force: bool,
@@ -406,16 +416,16 @@ def fit(
     from archord.postprocess.run import Run
 
     if tables or of:
-        if not tables or len(folders) > 1 or any((load_range, json_file, picture, python)):
+        if not tables or len(folders) > 1 or any((load_range, json_file, picture, exports)):
             raise InputError(
                 "--table: takes one run, and but for --of and --force no other option."
             )
         return _write_table(folders[0], tables, of, force)
     deltas, first = load_range or (0.0, math.inf), folders[0]
     if any(map(is_sweep, folders)):
-        if len(folders) > 1 or json_file or python or picture:
+        if len(folders) > 1 or json_file or exports or picture:
             raise InputError(
-                f"{first}: a sweep is fitted alone; --json, --python and --picture are for runs."
+                f"{first}: a sweep is fitted alone; --json, --export and --picture are for runs."
             )
         return _fit_sweep(first, deltas)
     calibration = calibrate([Run(folder).curve.loading() for folder in folders], deltas)
@@ -423,11 +433,8 @@ def fit(
     if picture:
         check_target(picture, inputs, force=True)
         files.append(fit_report.draw_fit(calibration, picture))
-    files += _write(
-        [(json_file, fit_report.as_json(calibration)), (python, calibration.law().to_python())],
-        inputs,
-        force,
-    )
+    texts = [(json_file, lambda: fit_report.as_json(calibration))] if json_file else []
+    files += _write(texts + _exports(calibration.law(), exports), inputs, force)
     print(
         fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files, sep="\n"
     )
@@ -437,15 +444,11 @@ def fit(
 
 def _write_table(folder: Path, targets: tuple[Path, ...], of: str | None, force: bool) -> int:
     from archord.output.folder import FILES
-    from archord.postprocess.laws.exports.export import export_curve
     from archord.postprocess.laws.run_table import run_table
     from archord.postprocess.run import Run
 
     curve = run_table(Run(folder), of)
-    texts: list[tuple[Path | None, str]] = [
-        (target, export_curve(curve, target)) for target in targets
-    ]
-    files = _write(texts, [folder / name for name in FILES], force)
+    files = _write(_exports(curve, targets), [folder / name for name in FILES], force)
     print(*(f"{name}: {value}" for name, value in curve.about.items()), *files, sep="\n")
     return 0
 
@@ -454,25 +457,29 @@ def _fit_sweep(sweep: Path, deltas: tuple[float, float]) -> int:
     from archord.studies.sweep_fit import fit_sweep
 
     found = fit_sweep(sweep, deltas)
-    print(
-        found,
-        *_write([(sweep / "fit.csv", found.as_csv())], [sweep / "sweep.toml"], force=True),
-        sep="\n",
-    )
+    table = sweep / "fit.csv"
+    print(found, *_write([(table, found.as_csv)], [sweep / "sweep.toml"], force=True), sep="\n")
     return 0
 
 
-def _write(texts: list[tuple[Path | None, str]], inputs: list[Path], force: bool) -> list[Path]:
+def _exports(law: JointCurve | FittedLaw, targets: Iterable[Path]) -> list[_Text]:
+    """The files ``targets`` with a law, for `_write`."""
+    from archord.postprocess.laws.exports.export import export_law
+
+    return [(target, partial(export_law, law, target)) for target in targets]
+
+
+def _write(texts: list[_Text], inputs: list[Path], force: bool) -> list[Path]:
     """Write the files that are named, and return them. Raises `InputError` before for one of the
     ``inputs`` among them, for two of one name, and, without ``force``, for files that are there."""
     from archord.output.user_file import check_target, writing
 
-    named = [(target, text) for target, text in texts if target]
-    for target, _ in named:
+    targets = [target for target, _ in texts]
+    for target in targets:
         check_target(target, inputs, force=force)
-    if len({target.resolve() for target, _ in named}) < len(named):
-        raise InputError(f"{named[0][0]}: is named for two files; choose different ones.")
-    for target, text in named:
+    if len({target.resolve() for target in targets}) < len(targets):
+        raise InputError(f"{targets[0]}: is named for two files; choose different ones.")
+    for target, text in [(target, text()) for target, text in texts]:
         with writing(target) as new:
             new.write_text(text, encoding="utf-8", newline="")
-    return [target for target, _ in named]
+    return targets

@@ -27,7 +27,7 @@ from matplotlib.patches import Circle
 from scipy.integrate import cumulative_trapezoid
 
 import archord
-from archord.postprocess.laws.exports.export import export_curve
+from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
@@ -181,7 +181,7 @@ def study(curve, steps=STEPS, turns=TURNS):
     """The crank turned with a law, exported: columns of `simulate`, force, energies, and numbers by
     name."""
     exec(
-        export_curve(curve, Path("joint.py")), module := {"__name__": "joint"}
+        export_law(curve, Path("joint.py")), module := {"__name__": "joint"}
     )  # `archord law --export` writes it
     columns, whole, inside, calls = simulate(
         module["force"], curve.displacement([START]).item(), steps, turns

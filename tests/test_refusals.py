@@ -47,8 +47,8 @@ RUN, OTHER = "{coarse}", "{elastic}"
             f"{RUN}/history.csv: cannot be written: it belongs to ",
         ),
         (
-            ["fit", RUN, "--json", "x", "--python", "./x"],
-            "x: is named for two files; choose different ones.",
+            ["fit", RUN, "--json", "x.json", "--export", "./x.json"],
+            "x.json: is named for two files; choose different ones.",
         ),
         (
             ["fit", RUN, "--json", "/dev/full"],

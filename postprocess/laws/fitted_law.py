@@ -1,13 +1,8 @@
-"""The law calibrated on runs of a joint: P(delta) for use elsewhere, as an object, as JSON and as
-plain Python."""
+"""The law calibrated on runs of a joint: P(delta) for use elsewhere, as an object and as JSON."""
 
 from __future__ import annotations
 
-import json
-import tomllib
 import warnings
-from pathlib import Path
-from string import Template
 from typing import Annotated
 
 import numpy as np
@@ -91,29 +86,30 @@ class FittedLaw(BaseModel):
         data = json_of(text)
         return cls.model_validate(data.get("law", data) if isinstance(data, dict) else data)
 
-    def to_python(self) -> str:
-        """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs
-        only ``math``."""
+    @property
+    def about(self) -> dict[str, str]:
+        """What the law is of, how it was found, and how good it is, in words."""
         low, high = self.fitted_range
-        numbers = self.model_dump(include={"k", "c", "sigY", "E_star", "R", "dR"})
-        values = {
-            name: "math.inf" if value is None else repr(value) for name, value in numbers.items()
-        } | {
-            "note": "plastic-Winkler law" if self.c is not None else "Winkler law",
-            "k_error": f"{self.k_error:.2g}",
-            "c_comment": "no yield"
-            if self.c is None
-            else f"standard error {self.c_error or 0.0:.2g}",
-            "range": f"{low:g} to {high:g}",
-            "end": repr(high * self.dR),
-            "units": json.dumps(f"{self.length_unit}; force per unit thickness: {self.force_unit}"),
-            "sources": json.dumps(", ".join(self.fitted_to)),
-            "plane": self.plane,
-            "quality": "unknown"
-            if self.rms is None
-            else f"{self.rms:.2%} rms, {self.largest or 0.0:+.2%} at worst",
+        law = "Winkler law" if self.c is None else "plastic-Winkler law"
+        about = {
+            "title": f"{law} of a pin joint, calibrated by archord fit",
+            "k": f"{self.k!r}, foundation stiffness, standard error {self.k_error:.2g}",
+            "E*": f"{self.E_star!r}, contact modulus",
+            "R": f"{self.R!r}, radius of the pin",
+            "dR": f"{self.dR!r}, clearance",
         }
-        template = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))[
-            "module"
-        ]
-        return Template(template).substitute(values)
+        if self.c is not None:
+            error = self.c_error or 0.0
+            about["c"] = (
+                f"{self.c!r}, plateau pressure over yield stress, standard error {error:.2g}"
+            )
+            about["sigY"] = f"{self.sigY!r}, yield stress"
+        quality = "unknown"
+        if self.rms is not None:
+            quality = f"{self.rms:.2%} rms, {self.largest or 0.0:+.2%} at worst"
+        return about | {
+            "plane": self.plane,
+            "fitted to": ", ".join(self.fitted_to),
+            "range": f"delta from {low:g} to {high:g} clearances dR",
+            "error against the runs that it was fitted to": quality,
+        }

@@ -19,6 +19,8 @@ Table = tuple[float, ...]
 WITH_TOUCH = True  # the logarithmic law below the first node
 WITH_WAY_BACK = True  # a way back below first loading, after yielding
 WITH_TOE = True  # which ends more softly than it begins
+WITH_CHORD = False  # a formula for first loading instead of tables
+WITH_PLATEAU = False  # which has a largest pressure
 
 LAST = 1  # index of the last node
 RANGE = 1.0  # displacement up to which the tables reach
@@ -32,15 +34,15 @@ BACK: Table = (0.0, 1.0)  # force of the curve that unloading follows
 BACK_SLOPE: Table = (1.0, 1.0)
 RATIO: Table = (1.0, 1.0)  # its scale, by the deepest displacement
 RATIO_SLOPE: Table = (0.0, 0.0)
-TOE: Table = (
-    0.0,
-    0.0,
-)  # how far before the end of the way back it bends, by the deepest displacement
+TOE: Table = (0.0, 0.0)  # how far before its end the way back bends, by the deepest displacement
 TOUCH: Table = (2.0, 0.0, 0.0)  # a, b, c of the logarithmic law
 PEAK: Table = (1.0, 1.0)  # largest pressure over the root of the force
 PEAK_SLOPE: Table = (0.0, 0.0)
 ANGLE: Table = (1.0, 1.0)  # semi-angle over the root of the force
 ANGLE_SLOPE: Table = (0.0, 0.0)
+RADIUS = 1.0  # radius of the pin
+FOUNDATION = 1.0  # largest pressure over displacement of the formula
+PLATEAU = 1.0  # its largest pressure
 WIDEST = 1.5  # semi-angle that no contact exceeds
 ERROR: Table = (0.0, 0.0)  # expected error on first loading, over the force
 BACK_ERROR: Table = (0.0, 0.0)  # on the way back, over the largest force
@@ -152,6 +154,27 @@ def curve(f: Table, df: Table, delta: float) -> tuple[float, float]:
     return P, stiffness
 
 
+def chord(delta: float) -> tuple[float, float]:
+    """Force and stiffness of a parabola of pressure over the chord, cut off at the plateau (Hu et
+    al., eqs 9 to 12)."""
+    P = 0.0
+    stiffness = 0.0
+    if delta > 0:
+        length = RADIUS * math.sqrt(2 * delta / (LENGTH + delta))
+        longer = LENGTH / (2 * (LENGTH + delta))
+        peak = FOUNDATION * delta
+        P = 4.0 / 3 * peak * length
+        stiffness = 4.0 / 3 * FOUNDATION * length * (1 + longer)
+        if WITH_PLATEAU:
+            if peak > PLATEAU:
+                u = PLATEAU / peak
+                s = math.sqrt(1 - u)
+                flank = u * (2 + s) / (3 * (1 + s) * (1 + s))
+                P = 2 * PLATEAU * length * (s + flank)
+                stiffness = 2 * PLATEAU * length / delta * (flank + (flank + s) * longer)
+    return P, stiffness
+
+
 def touch_displacement(P: float) -> float:
     """The displacement at which the line contact has the force P > 0: Newton's method."""
     y = P / FORCE
@@ -236,7 +259,10 @@ def force(delta: float, deepest: float = 0.0) -> tuple[float, float]:
     """Force P and stiffness dP/d(delta), nan beyond the tables, after the joint has been as deep as
     deepest."""
     warn_outside(max(delta, deepest))
-    P, stiffness = curve(LOAD, LOAD_SLOPE, delta)
+    if WITH_CHORD:
+        P, stiffness = chord(delta)
+    else:
+        P, stiffness = curve(LOAD, LOAD_SLOPE, delta)
     if WITH_WAY_BACK:
         if delta < deepest:
             below, slope = way_back(delta, deepest)

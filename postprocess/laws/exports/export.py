@@ -1,9 +1,10 @@
-"""A joint's law as one file for another program: tables in the joint's units, and the functions
-that read them.
+"""A joint's law as one file for another program: its numbers in the joint's units, and the
+functions that use them.
 
-The functions are those of ``algorithm.py`` in every language, less what the law has no need of: the
-way back of a joint that does not yield, the logarithmic law of first touch, pressure and angle
-where they are unknown.
+There are two kinds of laws: tables (`JointCurve`), of the general law or of a run, and the formula
+that is fitted to runs (`FittedLaw`). The functions are those of ``algorithm.py`` in every language,
+less what the law has no need of: the way back of a joint that does not yield, the logarithmic law
+of first touch, pressure and angle where they are unknown.
 """
 
 from __future__ import annotations
@@ -32,20 +33,73 @@ from archord.postprocess.laws.exports.translate import (
     in_python,
     select,
 )
+from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.postprocess.laws.law import ROUND_OFF
 
-Tables = dict[
-    str, Any
-]  # int, float, str or list[float] by the names of algorithm.py, and of `_UNITS`
+# int, float, str or list[float] by the names of algorithm.py, and the units
+Tables = dict[str, Any]
 
-_UNITS = ("length_unit", "force_unit", "pin_length")
-_STATE = """The force P and dP/d(delta) follow from the displacement delta and from one number that the joint remembers:
-deepest, the largest delta of all accepted steps, 0 at first. Trial steps leave it as it is. Beyond RANGE, the end of
-the tables, the force goes on straight, which is a guess; stiffness, expected error, pressure, angle and residual
-clearance are nan there, and all are nan of nan."""
-_ELASTIC = (
-    "The joint does not yield: it comes back along its first loading, and deepest changes nothing."
-)
+_STATE = """The force P and dP/d(delta) follow from the displacement delta and from one number that
+the joint remembers: deepest, the largest delta of all accepted steps, 0 at first. Trial steps leave
+it as it is. Beyond RANGE, the end of the tables, the force goes on straight, which is a guess;
+stiffness, expected error, pressure, angle and residual clearance are nan there, and all are nan of
+nan."""
+_ELASTIC = """The joint does not yield: it comes back along its first loading, and deepest changes
+nothing."""
+_FORMULA = """The force P and dP/d(delta) follow from the displacement delta by a formula of first
+loading: deepest, the largest delta of all accepted steps, changes nothing, as the law knows no way
+back. Beyond RANGE, up to which the law was fitted, the formula goes on, which is a guess; the
+stiffness is nan there, and both are nan of nan."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """What a law has to say in any language."""
+
+    about: dict[str, Any]  # what it is the law of, from the title on
+    rule: str  # how it is used, in words
+    functions: list[str]  # of algorithm.py, which users call
+    flags: dict[str, bool]  # of algorithm.py
+    numbers: Tables
+    length_unit: str
+    force_unit: str
+    pin_length: float  # length of the pin that carries the force
+
+    @classmethod
+    def of(cls, law: JointCurve | FittedLaw) -> Program:
+        """The program of ``law``."""
+        return _of_formula(law) if isinstance(law, FittedLaw) else _of_tables(law)
+
+    @property
+    def units(self) -> str:
+        """The units of the law, and the length of the pin that its forces are of."""
+        of = "per unit length of the pin"
+        rule = "multiply them by the pin's length"
+        if self.pin_length != 1:
+            of = f"total, of a pin of length {self.pin_length:g} ({self.length_unit})"
+            rule = "do not multiply them by the length"
+        return (
+            f"UNITS: displacements in {self.length_unit}; force P in {self.force_unit}, {of}: "
+            "P, stiffness and expected error are for a pin of length "
+            f"PIN_LENGTH = {self.pin_length:g}; {rule}."
+        )
+
+    @property
+    def header(self) -> str:
+        """What the file is, where it comes from and how it is used, fit for a comment of any
+        language."""
+        title, *about = self.about.items()
+        lines = [title[1], ""]
+        for key, value in about:
+            said = f"{key}: {value if isinstance(value, str) else json.dumps(value)}"
+            lines.append(textwrap.fill(said, 110, subsequent_indent="    "))
+        for paragraph in (self.units, self.rule):
+            lines += ["", textwrap.fill(" ".join(paragraph.split()), 110)]
+        text = "\n".join(lines)
+        for mark, instead in (("\\", "/"), ('"""', "'''"), ("*/", "* /"), ("/*", "/ *")):
+            text = text.replace(mark, instead)
+        return text
 
 
 @dataclass(frozen=True)
@@ -131,10 +185,11 @@ _SPOKEN = {
     "modelica": "Modelica",
     "octave": "Matlab and Octave",
 }
+_UNKNOWN_END = 1e300  # of the range of a law that does not tell it
 _LONGEST = 63  # characters of a name in Matlab, and those that C99 tells apart
 
 
-def export_curve(curve: JointCurve, target: Path) -> str:
+def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
     """The text of the file ``target`` with the law of one joint, in the language that its suffix
     names: .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), .json. Its stem becomes the name of
     the law, but in JSON.
@@ -146,36 +201,32 @@ def export_curve(curve: JointCurve, target: Path) -> str:
         raise ValueError(
             f"{target.name}: a law is exported to files that end in {', '.join(_FORMS)} or .json"
         )
+    program = Program.of(law)
     if target.suffix == ".json":
-        return replace(curve, about=curve.about | {"forces": _units(curve)}).to_json()
-    name, form = target.stem, _FORMS[target.suffix]
+        if isinstance(law, FittedLaw):
+            return law.model_dump_json(indent=1) + "\n"
+        return replace(law, about=law.about | {"forces": program.units}).to_json()
+    name = target.stem
+    form = _FORMS[target.suffix]
     _check_name(target, form.template)
-    tables = _tables(curve)
-    wanted = ["force", "deeper", "residual", "expected_error"]
-    wanted += [
-        f
-        for f, key in (("peak_pressure", "PEAK"), ("contact_angle", "ANGLE"))
-        if np.isfinite(tables[key]).all()
-    ]
-    flags = {
-        "WITH_TOUCH": curve.touch.size > 0,
-        "WITH_WAY_BACK": curve.yields,
-        "WITH_TOE": bool(curve.toe.any()),
-    }
-    functions, used = select(wanted, flags)
-    tables = {key: values for key, values in tables.items() if key in {*used, "RANGE", "REACH"}}
-    _check(tables)
-    tables |= {name.upper(): getattr(curve, name) for name in _UNITS}
-    title = str(curve.about.get("title", "law of a pin joint"))
+    functions, used = select(program.functions, program.flags)
+    used |= {"RANGE", "REACH"}
+    numbers = {key: values for key, values in program.numbers.items() if key in used}
+    _check(numbers)
+    for key in ("length_unit", "force_unit", "pin_length"):
+        numbers[key.upper()] = getattr(program, key)
+    title = program.about["title"]
     return Template(_TEMPLATES[form.template].lstrip()).substitute(
         name=name,
         title=title.replace("\\", "/").replace('"', "'"),
-        header=_header(title, curve),
-        about=form.text(curve.about),
-        tables="\n".join(_table(form, name, key, values) for key, values in tables.items()),
+        header=program.header,
+        about=form.text(program.about),
+        tables="\n".join(_table(form, name, key, values) for key, values in numbers.items()),
         functions="\n\n".join(form.function(node, name) for node in functions),
         handles="\n".join(
-            f"    the_law.{function} = @{function};" for function in wanted if function != "deeper"
+            f"    the_law.{function} = @{function};"
+            for function in program.functions
+            if function != "deeper"
         ),
     )
 
@@ -198,8 +249,8 @@ def _check_name(target: Path, language: str) -> None:
         )
 
 
-def _tables(curve: JointCurve) -> Tables:
-    """All numbers of the law, in the units of the joint."""
+def _of_tables(curve: JointCurve) -> Program:
+    """The program of tables, in the units of the joint."""
     length = float(curve.length)
     force = float(curve.force)
     pressure = float(curve.pressure)
@@ -229,7 +280,49 @@ def _tables(curve: JointCurve) -> Tables:
         "FORCE": force,
         "WIDEST": float(curve.widest),
     }
-    return numbers | {key: values.tolist() for key, values in arrays.items()}
+    functions = ["force", "deeper", "residual", "expected_error"]
+    if np.isfinite(curve.peak).all():
+        functions.append("peak_pressure")
+    if np.isfinite(curve.angle).all():
+        functions.append("contact_angle")
+    return Program(
+        about={"title": "law of a pin joint"} | curve.about,
+        rule=_STATE if curve.yields else f"{_STATE} {_ELASTIC}",
+        functions=functions,
+        flags={
+            "WITH_TOUCH": curve.touch.size > 0,
+            "WITH_WAY_BACK": curve.yields,
+            "WITH_TOE": bool(curve.toe.any()),
+            "WITH_CHORD": False,
+        },
+        numbers=numbers | {key: values.tolist() for key, values in arrays.items()},
+        length_unit=curve.length_unit,
+        force_unit=curve.force_unit,
+        pin_length=curve.pin_length,
+    )
+
+
+def _of_formula(law: FittedLaw) -> Program:
+    """The program of the formula that was fitted to runs."""
+    plastic = law.c is not None and law.sigY is not None
+    end = law.fitted_range[1] * law.dR or _UNKNOWN_END
+    return Program(
+        about=law.about,
+        rule=_FORMULA,
+        functions=["force", "deeper"],
+        flags={"WITH_CHORD": True, "WITH_PLATEAU": plastic, "WITH_WAY_BACK": False},
+        numbers={
+            "RANGE": end,
+            "REACH": end * (1 + ROUND_OFF),
+            "LENGTH": law.dR,
+            "RADIUS": law.R,
+            "FOUNDATION": law.k * law.E_star / law.R,
+            "PLATEAU": (law.c or 0.0) * (law.sigY or 0.0),
+        },
+        length_unit=law.length_unit,
+        force_unit=law.force_unit,
+        pin_length=1.0,
+    )
 
 
 def _check(tables: Tables) -> None:
@@ -250,32 +343,3 @@ def _table(form: _Form, name: str, key: str, values: Any) -> str:
         return form.words.format(name=name, key=key, value=form.text(values))
     kind = form.whole if isinstance(values, int) else form.number
     return kind.format(name=name, key=key, value=repr(values))
-
-
-def _units(curve: JointCurve) -> str:
-    """The units of the law, and the length of the pin that its forces are of."""
-    if curve.pin_length == 1:
-        of, rule = "per unit length of the pin", "multiply them by the pin's length"
-    else:
-        of = f"total, of a pin of length {curve.pin_length:g} ({curve.length_unit})"
-        rule = "do not multiply them by the length"
-    said = f"UNITS: displacements in {curve.length_unit}; force P in {curve.force_unit}, {of}: P, stiffness and expected"
-    return f"{said} error are for a pin of length PIN_LENGTH = {curve.pin_length:g}; {rule}."
-
-
-def _header(title: str, curve: JointCurve) -> str:
-    """What the file is, where it comes from and how it is used, fit for a comment of any
-    language."""
-    about = {key: value for key, value in curve.about.items() if key != "title"}
-    lines = [
-        f"{key}: {value if isinstance(value, str) else json.dumps(value)}"
-        for key, value in about.items()
-    ]
-    lines = [textwrap.fill(line, 110, subsequent_indent="    ") for line in lines]
-    rule = " ".join((_STATE if curve.yields else f"{_STATE} {_ELASTIC}").split())
-    text = "\n".join(
-        [title, "", *lines, "", textwrap.fill(_units(curve), 110), "", textwrap.fill(rule, 110)]
-    )
-    for mark, instead in (("\\", "/"), ('"""', "'''"), ("*/", "* /"), ("/*", "/ *")):
-        text = text.replace(mark, instead)
-    return text

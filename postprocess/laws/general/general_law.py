@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model

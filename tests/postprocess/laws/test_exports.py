@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.laws.exports.export import export_curve
+from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
@@ -145,7 +145,7 @@ def load(path: Path):
 
 
 def write(curve: JointCurve, target: Path) -> Path:
-    target.write_text(export_curve(curve, target), encoding="utf-8")
+    target.write_text(export_law(curve, target), encoding="utf-8")
     return target
 
 
@@ -209,14 +209,14 @@ def test_octave_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
 def test_every_line_is_a_statement_or_a_comment(curve: JointCurve, tmp_path: Path) -> None:
     """In Octave's functions, whatever the length of the docstrings that became comments; and
     Modelica's descriptions end on the line on which they begin."""
-    functions = export_curve(curve, tmp_path / "law.m").split("\nfunction [doubt] = beyond")[1]
+    functions = export_law(curve, tmp_path / "law.m").split("\nfunction [doubt] = beyond")[1]
     statement = re.compile(
         r"function .*\)|persistent T|break;|(if|while|for) [^;]*|else|end|warn_outside\(.*\);"
         r"|[\[\]\w, ]+ = .*;|%.*|"
     )
     for line in functions.splitlines()[1:]:
         assert statement.fullmatch(line.strip()), line
-    for line in export_curve(curve, tmp_path / "law.mo").splitlines():
+    for line in export_law(curve, tmp_path / "law.mo").splitlines():
         if line.strip().startswith("function "):
             assert re.fullmatch(r'  function \w+ ".*"', line)
 
@@ -224,7 +224,7 @@ def test_every_line_is_a_statement_or_a_comment(curve: JointCurve, tmp_path: Pat
 def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
     """To 1e-12, on 10 000 random pairs, its statements read as Python's: no Modelica compiler is at
     hand. All blocks end, and no function is called that is not there."""
-    package = export_curve(curve, tmp_path / "Law.mo")
+    package = export_law(curve, tmp_path / "Law.mo")
     assert package.startswith("package Law ")
     assert package.endswith("end Law;\n")
     pairs = inputs(curve)
@@ -271,10 +271,10 @@ def test_a_joint_that_does_not_yield_needs_no_way_back(tmp_path: Path) -> None:
     """Its exports leave it out, and it is loading whatever the deepest displacement."""
     curve = curves()["elastic"]
     for suffix in (".py", ".h", ".mo", ".m"):
-        text = export_curve(curve, tmp_path / f"law{suffix}")
+        text = export_law(curve, tmp_path / f"law{suffix}")
         assert "way_back" not in text
         assert "RATIO" not in text
-        assert len(text) < 0.7 * len(export_curve(curves()["yielding"], tmp_path / f"law{suffix}"))
+        assert len(text) < 0.7 * len(export_law(curves()["yielding"], tmp_path / f"law{suffix}"))
     assert curve.at([0.02], [0.1]) == curve.at([0.02])
 
 
@@ -282,9 +282,9 @@ def test_what_is_unknown_is_left_out(tmp_path: Path) -> None:
     """No pressure and angle, no functions that say them; JSON has null for them, and gives the
     table back."""
     curve = replace(yielding_curve(), peak=np.full(61, np.nan), angle=np.full(61, np.nan))
-    assert "peak_pressure" not in (text := export_curve(curve, tmp_path / "law.h"))
+    assert "peak_pressure" not in (text := export_law(curve, tmp_path / "law.h"))
     assert "contact_angle" not in text
-    text = export_curve(curve, tmp_path / "law.json")
+    text = export_law(curve, tmp_path / "law.json")
     again = JointCurve.from_json(text)
     assert "NaN" not in text
     np.testing.assert_array_equal(again.at([0.5], [1.0]), curve.at([0.5], [1.0]))
@@ -295,14 +295,14 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
     curve = yielding_curve()
     for name in ("law.for", "law"):
         with pytest.raises(ValueError, match=r"\.py, \.h, \.mo, \.m or \.json"):
-            export_curve(curve, tmp_path / name)
+            export_law(curve, tmp_path / name)
     names = "lug-pin.h 2.py force.m class.py math.py print.py math.h time.h string.h namespace.h restrict.h Bolzen_ä.py"
     names += " model.mo end.mo Real.mo Modelica.mo sqrt.mo max.m function.m endif.m parfor.m plot.m the_law.m _x.h"
     for name in [*names.split(), f"{'x' * 64}.m", "a b.h"]:
         with pytest.raises(
             ValueError, match=f"^{re.escape(name)}: .* cannot name a law: .*; choose another name"
         ):
-            export_curve(curve, tmp_path / name)
+            export_law(curve, tmp_path / name)
     for name in (
         "function.json",
         "model.h",
@@ -312,11 +312,11 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
         "Class.py",
         "real.mo",
     ):
-        assert export_curve(curve, tmp_path / name)
+        assert export_law(curve, tmp_path / name)
     with pytest.raises(ValueError, match="gaps in its tables cannot be exported: LOAD"):
-        export_curve(replace(curve, y=np.full(61, np.nan)), tmp_path / "law.h")
+        export_law(replace(curve, y=np.full(61, np.nan)), tmp_path / "law.h")
     with pytest.raises(ValueError, match="does not rise"):
-        export_curve(replace(curve, back=0 * curve.back), tmp_path / "law.h")
+        export_law(replace(curve, back=0 * curve.back), tmp_path / "law.h")
 
 
 def test_what_octave_has_cannot_name_a_law(tmp_path: Path) -> None:
@@ -327,13 +327,13 @@ def test_what_octave_has_cannot_name_a_law(tmp_path: Path) -> None:
     done = subprocess.run(
         ["octave-cli", "--norc", "--eval", keywords], capture_output=True, text=True, check=True
     )
-    program = re.sub("%.*", "", export_curve(curves()["yielding"], tmp_path / "lug.m"))
+    program = re.sub("%.*", "", export_law(curves()["yielding"], tmp_path / "lug.m"))
     called = re.findall(r"[^@\w.]([a-z_]\w*)\(", program)
     assert {"sqrt", "min", "warning"} <= {*called}
     variables = {"f", "df", "lug", "table", "d"}
     for name in {*done.stdout.split(), *called} - variables:
         with pytest.raises(ValueError, match="cannot name a law"):
-            export_curve(curves()["yielding"], tmp_path / f"{name}.m")
+            export_law(curves()["yielding"], tmp_path / f"{name}.m")
 
 
 def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys
     printed = capsys.readouterr().out
     assert said in printed
     assert re.search(
-        r"left out: .*: pin.whole = true does not fit: k and c of a sweep are those of half a pin",
+        r"left out: .*: pin.whole = true does not fit: k and c of a sweep are for half a pin",
         printed,
     )
     small, wide = read_rows(tmp_path / "out" / "fit.csv")[0].k
@@ -96,7 +96,7 @@ def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys
         (["{out}", "{out}"], "a sweep is fitted alone"),
         (
             ["{out}", "--picture", "x.png"],
-            "a sweep is fitted alone; --json, --python and --picture are for runs.",
+            "a sweep is fitted alone; --json, --export and --picture are for runs.",
         ),
         (["{out}", "--range", "3", "4"], "holds no case that can be fitted"),
         (["nothing.csv"], "nothing.csv: is not a run folder"),

@@ -2,15 +2,19 @@
 
 import ast
 import json
+import shutil
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.law import LawRangeWarning
+from tests.postprocess.laws.modelica import functions_of
 
 ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
 PLASTIC = FittedLaw(
@@ -40,24 +44,37 @@ def test_a_file_of_version_0_1_is_read():
 @BOTH
 def test_the_python_module_needs_only_math_and_gives_the_same(law, tmp_path):
     """In an interpreter without site packages, to the last digits, whatever runs are called."""
-    source = law.to_python()
-    imports = [
-        node
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Import | ast.ImportFrom)
-    ]
-    assert [alias.name for node in imports for alias in node.names] == ["math"]
+    source = export_law(law, tmp_path / "joint.py")
+    tops = [node for node in ast.parse(source).body if isinstance(node, ast.Import)]
+    assert [alias.name for node in tops for alias in node.names] == ["math"]
     (tmp_path / "joint.py").write_text(source)
-    code = (
-        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from joint import force, stiffness\n"
-    )
-    code += f"print([[f(d) for d in {DELTA.tolist()}] for f in (force, stiffness)])"
+    inside = DELTA[:-1]
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from joint import force\n"
+    code += f"print([force(d) for d in {inside.tolist()}])"
     command = [sys.executable, "-I", "-S", "-c", code]
-    force, stiffness = ast.literal_eval(
-        subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    )
-    np.testing.assert_allclose(force, law.force(DELTA), rtol=1e-14, atol=0)
-    np.testing.assert_allclose(stiffness, law.stiffness(DELTA), rtol=1e-13, atol=0)
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    force, stiffness = np.transpose(ast.literal_eval(done.stdout))
+    np.testing.assert_allclose(force, law.force(inside), rtol=1e-14, atol=0)
+    np.testing.assert_allclose(stiffness, law.stiffness(inside), rtol=1e-13, atol=0)
+
+
+@BOTH
+def test_c_and_modelica_give_the_same(law, tmp_path):
+    """Modelica's statements read as Python's; C as strict C99 without a warning."""
+    inside = DELTA[:-1].tolist()
+    force = functions_of(export_law(law, tmp_path / "Joint.mo"))["force"]
+    np.testing.assert_allclose([force(d, 0.0)[0] for d in inside], law.force(inside), rtol=1e-14)
+    if not (compiler := shutil.which("gcc")):
+        pytest.skip("no C compiler is here")
+    (tmp_path / "joint.h").write_text(export_law(law, tmp_path / "joint.h"))
+    calls = "".join(f'printf("%.17g ", joint_force({d!r}, 0.0, &slope));' for d in inside)
+    main = '#include <stdio.h>\n#include "joint.h"\nint main(void) { double slope; %s return 0; }'
+    (tmp_path / "main.c").write_text(main % calls)
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([compiler, *strict, "main.c", "-o", "main", "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
+    said = [float(word) for word in done.stdout.split()]
+    np.testing.assert_allclose(said, law.force(inside), rtol=1e-14)
 
 
 @BOTH
@@ -76,30 +93,34 @@ def test_stiffness_is_the_slope_and_displacement_the_inverse(law):
 
 
 def test_beyond_what_it_was_fitted_to_it_warns():
-    """The module has that displacement; nan gives nan in both."""
-    space = {}
-    exec(ELASTIC.to_python(), space)
-    assert space["RANGE"] == 2.0 * ELASTIC.dR
-    with pytest.warns(
-        LawRangeWarning, match=r"delta = 3 dR is beyond the 2 dR that the law was fitted to"
-    ):
-        ELASTIC.force([0.01, 0.15])
+    """The module has that displacement, and warns, too; nan gives nan in both."""
+    module = {"__name__": "joint"}
+    exec(export_law(ELASTIC, Path("joint.py")), module)
+    assert module["RANGE"] == 2.0 * ELASTIC.dR
+    said = r"delta = 3 dR is beyond the 2 dR that the law was fitted to"
+    with pytest.warns(LawRangeWarning, match=said):
+        beyond = ELASTIC.force([0.01, 0.15])[1]
+    with pytest.warns(UserWarning, match="beyond"):
+        P, stiffness = module["force"](0.15)
+    assert pytest.approx(beyond, rel=1e-14) == P
+    assert np.isnan(stiffness)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert (ELASTIC.force([0.0, 0.01, 0.1]) >= 0).all()
         assert ELASTIC.displacement(1e5) > 0
         for law in (ELASTIC, PLASTIC):
-            exec(law.to_python(), space)
+            exec(export_law(law, Path("joint.py")), module)
             said = [law.force(np.nan), law.stiffness(np.nan), law.displacement(np.nan)]
-            assert np.isnan([*said, space["force"](np.nan), space["stiffness"](np.nan)]).all()
+            assert np.isnan([*said, *module["force"](np.nan)]).all()
 
 
-def test_the_module_says_how_good_it_is():
-    assert (
-        "against the runs that it was fitted to: 13.26% rms, -35.00% at worst."
-        in PLASTIC.to_python()
-    )
-    assert "fitted to: unknown." in ELASTIC.to_python()
+def test_every_export_says_how_good_it_is():
+    for suffix in ("py", "h", "mo", "m"):
+        text = export_law(PLASTIC, Path(f"joint.{suffix}"))
+        good = "error against the runs that it was fitted to: 13.26% rms, -35.00% at worst"
+        assert good in " ".join(text.split())
+        assert "fitted to: unknown" in export_law(ELASTIC, Path(f"joint.{suffix}"))
+    assert FittedLaw.from_json(export_law(PLASTIC, Path("joint.json"))) == PLASTIC
 
 
 def test_the_plastic_law_has_a_largest_force():
