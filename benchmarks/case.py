@@ -120,16 +120,16 @@ def varied(scene: Scene, **sections: dict) -> Scene:
 def _overridden(data: dict[str, Any], sections: dict[str, dict]) -> dict[str, Any]:
     """``data`` with the keys of ``sections``, without those that are None; a rigid pin has no
     other."""
-    merged = data | {
-        name: keys if keys.get("rigid") else data.get(name, {}) | keys
-        for name, keys in sections.items()
-    }
-    return {
-        name: {key: value for key, value in keys.items() if value is not None}
-        if isinstance(keys, dict)
-        else keys
-        for name, keys in merged.items()
-    }
+    merged = dict(data)
+    for name, keys in sections.items():
+        merged[name] = keys if keys.get("rigid") else data.get(name, {}) | keys
+    return {name: _without_none(keys) for name, keys in merged.items()}
+
+
+def _without_none(keys: Any) -> Any:
+    if not isinstance(keys, dict):
+        return keys
+    return {key: value for key, value in keys.items() if value is not None}
 
 
 def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
@@ -137,7 +137,9 @@ def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
     the columns."""
     if not isinstance(scene, Scene):
         return last.values
-    E_star, R, P = scene.E_star, scene.joint.radius, last.P / scene.thickness
+    E_star = scene.E_star
+    R = scene.joint.radius
+    P = last.P / scene.thickness
     return {
         "P/(E* R)": P / (E_star * R),
         "p0/E*": last.p0 / E_star,
@@ -155,9 +157,8 @@ def slug(name: str) -> str:
 def matches(pattern: str, *names: str) -> bool:
     """Whether ``pattern`` (with * and ?) is one of ``names``, or part of one, in any case of
     letters."""
-    return any(
-        pattern.lower() in name.lower() or fnmatch(name.lower(), pattern.lower()) for name in names
-    )
+    lower = pattern.lower()
+    return any(lower in name.lower() or fnmatch(name.lower(), lower) for name in names)
 
 
 def side_by_side(

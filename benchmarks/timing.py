@@ -24,8 +24,14 @@ from time import perf_counter
 from typing import Any
 
 LIMIT = 600.0  # seconds
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS",
-           "CCX_NPROC_EQUATION_SOLVER")  # fmt: skip
+THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "CCX_NPROC_EQUATION_SOLVER",
+)
 
 
 class Failure(RuntimeError):
@@ -84,6 +90,12 @@ class Timing:
 Said = Callable[[str], None]
 
 
+def solving(scene: str, output: str, *options: str) -> tuple[str, ...]:
+    """The command with which a user solves a ``scene`` into the folder ``output``."""
+    command = (sys.executable, "-m", "archord", "solve", scene, "-o", output, "--force", "-q")
+    return command + options
+
+
 def time_all(
     processes: Sequence[Process], repeats: int, said: Said = lambda sentence: None
 ) -> list[Timing]:
@@ -107,17 +119,18 @@ def time_all(
         if not any(timing.runs for timing in timings):
             raise
         for timing in timings:
-            timing.failure = timing.failure or (
-                "" if timing.runs else "interrupted before its first run"
-            )
+            if not (timing.failure or timing.runs):
+                timing.failure = "interrupted before its first run"
     return timings
 
 
 def _add(timing: Timing, repeat: int, said: Said) -> None:
     try:
         run = run_once(timing.process)
-        timing.runs += [run] if repeat else []
-        text = f"{run.seconds:.2f} s, {f'run {repeat}' if repeat else 'not counted'}"
+        if repeat:
+            timing.runs.append(run)
+        counted = f"run {repeat}" if repeat else "not counted"
+        text = f"{run.seconds:.2f} s, {counted}"
     except Failure as failure:
         text = timing.failure = str(failure)
     said(f"{timing.process.name}: {text}")
@@ -138,12 +151,10 @@ def run_once(process: Process) -> Run:
     if found["late"]:
         raise Failure(f"more than the {process.limit:g} s allowed")
     if found["exit"]:
-        texts = [
-            (folder / name).read_text(errors="replace") for name in ("stderr.txt", "stdout.txt")
-        ]
-        raise Failure(
-            _last_line(texts[0]) or _last_line(texts[1]) or f"ended with code {found['exit']}"
-        )
+        for name in ("stderr.txt", "stdout.txt"):
+            if said := _last_line((folder / name).read_text(errors="replace")):
+                raise Failure(said)
+        raise Failure(f"ended with code {found['exit']}")
     return Run(found["seconds"], found["cpu"], found["memory"], process.read())
 
 
@@ -172,7 +183,8 @@ def main(limit: float, command: list[str]) -> None:
                 process.wait()
                 signal.setitimer(signal.ITIMER_REAL, 0)
         finally:
-            seconds, late = perf_counter() - start, process.poll() is None
+            seconds = perf_counter() - start
+            late = process.poll() is None
             if late:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()

@@ -23,7 +23,8 @@ from archord.scene.scene import Scene
 
 def _solve(scene: Scene) -> tuple[list[Measures], str]:
     """The steps of ``scene``, and their cost in words."""
-    start, dofs = perf_counter(), []
+    start = perf_counter()
+    dofs = []
     with tempfile.TemporaryDirectory() as folder:
         steps = (
             Case("joint", scene)
@@ -76,7 +77,8 @@ def main() -> None:
     compare("plastic P/(E* R), 4 %R, large strain", 0.00670539, "CalculiX, 4 %R", steps[-1].P, cost)
     small = {"clearance": 0.5, "growth": 0.5, "block_size": 6.0}
     steps, cost = _solve(paper_joint(0.006, 1, joint=small, load={"displacement": 0.006}))
-    m, radius = steps[-1], 3.0
+    m = steps[-1]
+    radius = 3.0
     compare("small contact: p0/E*", math.sqrt(m.P / math.pi / radius), "Hertz", m.p0, cost)
     half_width = math.sqrt(4 * m.P * radius / math.pi)
     compare("small contact: half-width/R", half_width, "Hertz", m.contact_area / 2, "")
@@ -97,7 +99,8 @@ def main() -> None:
         for m in (steps[-1] for steps in runs)
     )
     print(
-        f"Forces at pin, contact and block differ by at most {force:.0e} of P in any step; work differs from"
+        f"Forces at pin, contact and block differ by at most {force:.0e} of P in any step; work "
+        "differs from"
     )
     print(f"stored and dissipated energy by at most {energy:.1e} of the work.")
 

@@ -53,7 +53,8 @@ def run(
     largest value, and a sentence for every estimate or error that is larger than what was asked.
     Raises `RuntimeError` if a run fails.
     """
-    rows, faults = list[dict[str, object]](), []
+    rows = list[dict[str, object]]()
+    faults = []
     for case in cases:
         known = reference(case, folder, said)
         for wanted in asked or (PLASTIC if case.scene.plastic else ELASTIC):
@@ -66,21 +67,18 @@ def run(
                 faults.append(f"{case.name}: {wanted:g} was not reached")
             elif error > wanted:
                 faults.append(f"{case.name}: the error is {error:.1e}, {wanted:g} was asked")
-            rows.append(
-                {
-                    "joint": case.name,
-                    "asked": f"{wanted:g}",
-                    "estimated": f"{found.estimated or nan:.1e}",
-                    "true": f"{error:.1e}",
-                    "of the mesh": f"{found.mesh_error or nan:.1e}",
-                    "of the steps": f"{found.step_error:.1e}" if found.step_error else "",
-                    "meshes": found.levels[-1].mesh,
-                    "element size / R": f"{found.levels[-1].element_size:.3g}",
-                    "substeps": found.substeps,
-                    "dofs": found.levels[-1].dofs,
-                    "seconds": f"{found.seconds:.1f}",
-                }
-            )
+            level = found.levels[-1]
+            row: dict[str, object] = {"joint": case.name, "asked": f"{wanted:g}"}
+            row["estimated"] = f"{found.estimated or nan:.1e}"
+            row["true"] = f"{error:.1e}"
+            row["of the mesh"] = f"{found.mesh_error or nan:.1e}"
+            row["of the steps"] = f"{found.step_error:.1e}" if found.step_error else ""
+            row["meshes"] = level.mesh
+            row["element size / R"] = f"{level.element_size:.3g}"
+            row["substeps"] = found.substeps
+            row["dofs"] = level.dofs
+            row["seconds"] = f"{found.seconds:.1f}"
+            rows.append(row)
     return rows, faults
 
 
@@ -98,9 +96,12 @@ def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarr
         return found
 
     finest, steps = (_FINE - 1, _STEPS) if case.scene.plastic else (_FINE, 1)
-    before, last = curve(finest - 1, steps), curve(finest, steps)
+    before = curve(finest - 1, steps)
+    last = curve(finest, steps)
     limit = last + (last - before) / (RATIO**3 - 1)
-    return limit + (before - curve(finest - 1, steps // 2)) if case.scene.plastic else limit
+    if not case.scene.plastic:
+        return limit
+    return limit + (before - curve(finest - 1, steps // 2))
 
 
 def _curve(scene: Scene, outcome: Outcome) -> list[float]:

@@ -50,11 +50,8 @@ def grown(name: str, now: dict[str, int], before: dict[str, int]) -> list[str]:
 def main() -> int:
     """Count, print and compare; the exit code is 1 if anything grew."""
     now = {case.name: count(case) for case in CASES}
-    print(
-        "{\n"
-        + ",\n".join(f" {json.dumps(name)}: {json.dumps(counts)}" for name, counts in now.items())
-        + "\n}"
-    )
+    lines = [f" {json.dumps(name)}: {json.dumps(counts)}" for name, counts in now.items()]
+    print("{\n" + ",\n".join(lines) + "\n}")
     faults = [fault for name, before in KEPT.items() for fault in grown(name, now[name], before)]
     for fault in faults:
         print(f"archord: {fault}.", file=sys.stderr)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from archord.benchmarks.case import paper_joint, write_table
-from archord.benchmarks.timing import Process, Said, Timing, time_all
+from archord.benchmarks.timing import Process, Said, Timing, solving, time_all
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
@@ -34,8 +33,10 @@ SIZES = {
     300_000: 0.00452517,
     1_000_000: 0.00247854,
 }
-PLASTIC_LARGEST, YIELD_STRESS = 100_000, 0.002  # dofs; over E*
-ELASTIC_STEPS, PLASTIC_STEPS = 2, 5
+PLASTIC_LARGEST = 100_000  # dofs
+YIELD_STRESS = 0.002  # over E*
+ELASTIC_STEPS = 2
+PLASTIC_STEPS = 5
 SAME_FORCE = 1e-8  # relative difference of P between numbers of ranks
 # the parts of a run, and the timers that they sum up
 PARTS = {
@@ -48,7 +49,6 @@ PARTS = {
     "linear solve": ("linear solve",),
     "output": ("output", "checkpoint"),
 }
-_GROWING = ("time", "linear solve", "memory")
 _A_DAY = 86400.0  # seconds that a run may take
 
 
@@ -68,24 +68,13 @@ class Setting:
     def process(self, folder: Path) -> Process:
         """The run as a user would start it, in the existing ``folder``, whose result is its
         run.json."""
-        steps, strength = (
-            (PLASTIC_STEPS, YIELD_STRESS) if self.material == "plastic" else (ELASTIC_STEPS, None)
-        )
-        scene, read = f"{self.name}.toml", (folder / self.name / "run.json").read_text
-        (folder / scene).write_text(
-            resolved(refined(SIZES[self.dofs], steps, strength)), encoding="utf-8"
-        )
-        command = (
-            *launcher(self.ranks),
-            sys.executable,
-            "-m",
-            "archord",
-            "solve",
-            scene,
-            "-o",
-            self.name,
-        )
-        command = (*command, "--force", "-q")
+        plastic = self.material == "plastic"
+        steps = PLASTIC_STEPS if plastic else ELASTIC_STEPS
+        scene = refined(SIZES[self.dofs], steps, YIELD_STRESS if plastic else None)
+        file = folder / f"{self.name}.toml"
+        file.write_text(resolved(scene), encoding="utf-8")
+        command = (*launcher(self.ranks), *solving(file.name, self.name))
+        read = (folder / self.name / "run.json").read_text
         return Process(
             self.name, command, folder, lambda: json.loads(read()), _A_DAY, kind=self.material
         )
@@ -111,9 +100,12 @@ def settings(largest: float, ranks: int) -> list[Setting]:
     """All runs up to ``largest`` dofs by size: elastic on 1, 2, 4, ... up to ``ranks`` ranks,
     plastic on one."""
     found = []
-    for dofs in (dofs for dofs in SIZES if dofs <= largest):
+    for dofs in SIZES:
+        if dofs > largest:
+            continue
         found += [Setting(dofs, 1 << k) for k in range(ranks.bit_length())]
-        found += [Setting(dofs, 1, "plastic")] if dofs <= PLASTIC_LARGEST else []
+        if dofs <= PLASTIC_LARGEST:
+            found.append(Setting(dofs, 1, "plastic"))
     return found
 
 
@@ -127,13 +119,20 @@ def run(
     """
     folder.mkdir(parents=True, exist_ok=True)
     timings = time_all([setting.process(folder) for setting in chosen], repeats, said)
-    costs = [cost_of(*pair) for pair in zip(chosen, timings, strict=True) if not pair[1].failure]
-    return costs, [f"{t.process.name}: {t.failure}" for t in timings if t.failure] + unlike(costs)
+    costs = []
+    faults = []
+    for setting, timing in zip(chosen, timings, strict=True):
+        if timing.failure:
+            faults.append(f"{timing.process.name}: {timing.failure}")
+        else:
+            costs.append(cost_of(setting, timing))
+    return costs, faults + unlike(costs)
 
 
 def cost_of(setting: Setting, timing: Timing) -> Cost:
     """The cost of the run with the median time, as its run.json tells it."""
-    report, total = timing.middle.result, timing.middle.seconds
+    report = timing.middle.result
+    total = timing.middle.seconds
     parts = {
         part: sum(report["seconds"].get(name, 0.0) for name in names)
         for part, names in PARTS.items()
@@ -155,16 +154,15 @@ def cost_of(setting: Setting, timing: Timing) -> Cost:
 
 def unlike(costs: Sequence[Cost]) -> list[str]:
     """A sentence for every force that depends on the number of ranks."""
-    found = (
-        (cost["name"], abs(cost["P"] / one["P"] - 1))
-        for cost in costs
-        if (one := _alone(cost, costs))
-    )
-    return [
-        f"{name}: P differs by {off:.1e} from that on 1 rank"
-        for name, off in found
-        if not off <= SAME_FORCE
-    ]
+    faults = []
+    for cost in costs:
+        one = _alone(cost, costs)
+        if one is None:
+            continue
+        off = abs(cost["P"] / one["P"] - 1)
+        if not off <= SAME_FORCE:
+            faults.append(f"{cost['name']}: P differs by {off:.1e} from that on 1 rank")
+    return faults
 
 
 def _alone(cost: Cost, costs: Sequence[Cost]) -> Cost | None:
@@ -181,10 +179,8 @@ def exponent(dofs: Sequence[float], values: Sequence[float]) -> float:
 
 def row(cost: Cost, costs: Sequence[Cost]) -> dict[str, object]:
     """The entries of a run by heading."""
-    one, plain = (
-        _alone(cost, costs),
-        ("material", "dofs", "ranks", "iterations", "coarse iterations", "factorisations"),
-    )
+    one = _alone(cost, costs)
+    plain = ("material", "dofs", "ranks", "iterations", "coarse iterations", "factorisations")
     return {
         **{key: cost[key] for key in plain},
         **{f"{part} [s]": f"{seconds:.2f}" for part, seconds in cost["parts"].items()},
@@ -201,14 +197,15 @@ def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
     text = ""
     for material in ("elastic", "plastic"):
         same = [cost for cost in costs if (cost["material"], cost["ranks"]) == (material, 1)]
-        if len(same) > 1:
-            found = [
-                (c["dofs"], c["total"], c["parts"]["linear solve"], max(c["memory"])) for c in same
-            ]
-            dofs, *grown = zip(*found, strict=True)
-            powers = (
-                f"{what} N^{exponent(dofs, values):.2f}"
-                for what, values in zip(_GROWING, grown, strict=True)
-            )
-            text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: {', '.join(powers)}.\n"
+        if len(same) < 2:
+            continue
+        dofs = [cost["dofs"] for cost in same]
+        growing = {
+            "time": [cost["total"] for cost in same],
+            "linear solve": [cost["parts"]["linear solve"] for cost in same],
+            "memory": [max(cost["memory"]) for cost in same],
+        }
+        powers = [f"{name} N^{exponent(dofs, found):.2f}" for name, found in growing.items()]
+        text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: "
+        text += f"{', '.join(powers)}.\n"
     return write_table(folder, "scaling", [row(cost, costs) for cost in costs], text)

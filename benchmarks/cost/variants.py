@@ -25,8 +25,14 @@ from archord.scene.scene import Scene
 
 SETS = tomllib.loads(Path(__file__).with_name("variants.toml").read_text(encoding="utf-8"))["set"]
 ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
-WATCHED = (*ABSENT, "dolfinx", "archord.materials.j2", "archord.output.fields", "kernel radial_return",
-           "kernel closest_point")  # fmt: skip
+WATCHED = (
+    *ABSENT,
+    "dolfinx",
+    "archord.materials.j2",
+    "archord.output.fields",
+    "kernel radial_return",
+    "kernel closest_point",
+)
 WITHOUT = {
     "": "",
     "revised": "from archord.solver.linear import look_ahead; look_ahead.MOST_REVISIONS = 0",
@@ -73,7 +79,8 @@ class Variant:
     def process(self, folder: Path) -> Process:
         """Its process in the existing ``folder``; the result is what it loaded. Raises `InputError`
         without mpirun."""
-        place, note = self.folder(folder), folder / "note.json"
+        place = self.folder(folder)
+        note = folder / "note.json"
         if self.picture_of:
             run = replace(self, name=self.picture_of).folder(folder)
             arguments = ["picture", run.name, "-o", f"{place.name}.png"]
@@ -91,8 +98,12 @@ class Variant:
             WITHOUT[self.without],
             *arguments,
         )
-        read, name = (lambda: json.loads(note.read_text())), f"{self.case}, {self.name}"
-        return Process(name, command, folder, read, _A_DAY, clear=(place.name,), kind=place.name)
+
+        def loaded() -> list[str]:
+            return json.loads(note.read_text(encoding="utf-8"))
+
+        name = f"{self.case}, {self.name}"
+        return Process(name, command, folder, loaded, _A_DAY, clear=(place.name,), kind=place.name)
 
     def folder(self, parent: Path) -> Path:
         """Its output folder below ``parent``."""
@@ -111,15 +122,15 @@ class Variant:
 def variants(group: str) -> list[Variant]:
     """The variants of a group, set by set."""
     found = []
-    for given in (given for given in SETS if given["group"] == group):
+    for given in SETS:
+        if given["group"] != group:
+            continue
         for name, own in given["variants"].items():
-            solved = "scene" in given and "picture_of" not in own
-            scene = paper_joint(**given["scene"] | own.get("scene", {})) if solved else None
-            found.append(
-                Variant(
-                    given["name"], name, **own | {"scene": scene, "sweep": given.get("sweep", "")}
-                )
-            )
+            scene = None
+            if "scene" in given and "picture_of" not in own:
+                scene = paper_joint(**given["scene"] | own.get("scene", {}))
+            keys = own | {"scene": scene, "sweep": given.get("sweep", "")}
+            found.append(Variant(given["name"], name, **keys))
     return found
 
 
@@ -145,19 +156,16 @@ def run(
             continue
         loaded = timing.middle.result
         files = [file for file in variant.folder(folder).rglob("*") if file.is_file()]
-        rows.append(
-            {
-                "case": variant.case,
-                "variant": variant.name,
-                "seconds": f"{timing.median:.2f}",
-                "times as long": f"{ratio(timing, first, 'seconds'):.2f}",
-                "CPU [s]": f"{median(run.cpu for run in timing.runs):.2f}",
-                "times the CPU": f"{ratio(timing, first, 'cpu'):.2f}",
-                "peak memory [MB]": f"{timing.middle.memory / 1e6:.0f}",
-                "written [kB]": f"{sum(file.stat().st_size for file in files) / 1e3:.0f}",
-                "loads": ", ".join(name for name in WATCHED if name in loaded),
-            }
-        )
+        written = sum(file.stat().st_size for file in files)
+        row: dict[str, object] = {"case": variant.case, "variant": variant.name}
+        row["seconds"] = f"{timing.median:.2f}"
+        row["times as long"] = f"{ratio(timing, first, 'seconds'):.2f}"
+        row["CPU [s]"] = f"{median(run.cpu for run in timing.runs):.2f}"
+        row["times the CPU"] = f"{ratio(timing, first, 'cpu'):.2f}"
+        row["peak memory [MB]"] = f"{timing.middle.memory / 1e6:.0f}"
+        row["written [kB]"] = f"{written / 1e3:.0f}"
+        row["loads"] = ", ".join(name for name in WATCHED if name in loaded)
+        rows.append(row)
         faults += variant.faults(loaded)
     return rows, faults
 

@@ -20,8 +20,13 @@ from archord.report.table import Table
 
 Pairs = list[tuple[float, float]]
 LEVELS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7)
-NAMES = {"P": "P", "p0": "p0", "eps": "contact angle", "profile": "pressure profile (L2)",
-         "dissipation": "plastic dissipation"}  # fmt: skip
+NAMES = {
+    "P": "P",
+    "p0": "p0",
+    "eps": "contact angle",
+    "profile": "pressure profile (L2)",
+    "dissipation": "plastic dissipation",
+}
 _FLOOR = 1e-9  # an error of zero has no place on a logarithmic axis
 
 
@@ -80,11 +85,11 @@ def envelopes(lines: Sequence[Line]) -> dict[str, Pairs]:
     counts from the mesh on from which its series stays below it."""
     found: dict[str, Pairs] = {}
     for (code, _), members in series_of(lines).items():
-        if known := [
-            (line.timing.median, line.errors["P"]) for line in members if "P" in line.errors
-        ]:
-            seconds, errors = zip(*known, strict=True)
-            found[code] = [*found.get(code, []), *zip(seconds, lasting(errors), strict=True)]
+        known = [line for line in members if "P" in line.errors]
+        seconds = [line.timing.median for line in known]
+        errors = lasting([line.errors["P"] for line in known])
+        if known:
+            found.setdefault(code, []).extend(zip(seconds, errors, strict=True))
     return {code: envelope(pairs) for code, pairs in found.items()}
 
 
@@ -115,31 +120,28 @@ def seconds_at(error: float, kept: Pairs) -> float | None:
 def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
     """Write a table of points, as CSV and Markdown, and a diagram for each case; returns the tables
     and the files."""
-    texts, files = [], []
+    texts = []
+    files = []
     for case, given in CASES.items():
-        if some := [line for line in lines if line.point.case == case]:
-            rows = [row(line) for line in some]
-            codes = ", ".join(
-                dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in some)
-            )
-            parts = [
-                f"**{given['title']}**: {codes}\n",
-                Table.of(rows).markdown(),
-                *ratios(envelopes(some)),
-            ]
-            texts.append("\n".join(parts))
-            files += write_report(
-                folder, f"work_precision_{case}", rows, texts[-1], partial(draw, case, some)
-            )
+        some = [line for line in lines if line.point.case == case]
+        if not some:
+            continue
+        rows = [row(line) for line in some]
+        codes = dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in some)
+        head = f"**{given['title']}**: {', '.join(codes)}\n"
+        text = "\n".join([head, Table.of(rows).markdown(), *ratios(envelopes(some))])
+        texts.append(text)
+        picture = partial(draw, case, some)
+        files += write_report(folder, f"work_precision_{case}", rows, text, picture)
     return "\n".join(texts), files
 
 
 def row(line: Line) -> dict[str, object]:
     """The entries of a point by heading; what is not known is empty."""
-    point, found, errors = line.point, line.found, line.errors
-    runs = line.timing.runs if found else []
-    seconds = sorted(run.seconds for run in runs)
-    return {
+    point = line.point
+    found = line.found
+    errors = line.errors
+    entries: dict[str, object] = {
         "code": point.code,
         "series": point.series,
         "mesh": f"{point.size:g} R",
@@ -147,16 +149,19 @@ def row(line: Line) -> dict[str, object]:
         "steps": point.steps,
         "iterations": found.get("iterations", ""),
         "factorisations": found.get("factorisations", ""),
-        "seconds": f"{line.timing.median:.4g}" if runs else "",
-        "from - to": f"{seconds[0]:.4g} - {seconds[-1]:.4g}" if runs else "",
-        "MB": f"{max(run.memory for run in runs) / 1e6:.0f}" if runs else "",
-        "P/(E* R)": f"{found['P']:.8f}" if "P" in found else "",
-        **{
-            f"error of {name}": f"{errors[name]:.1e}" if name in errors else ""
-            for name in quantities(point.case)
-        },
-        "failure": line.timing.failure,
     }
+    entries |= dict.fromkeys(("seconds", "from - to", "MB", "P/(E* R)"), "")
+    if found:
+        runs = line.timing.runs
+        seconds = sorted(run.seconds for run in runs)
+        entries["seconds"] = f"{line.timing.median:.4g}"
+        entries["from - to"] = f"{seconds[0]:.4g} - {seconds[-1]:.4g}"
+        entries["MB"] = f"{max(run.memory for run in runs) / 1e6:.0f}"
+    if "P" in found:
+        entries["P/(E* R)"] = f"{found['P']:.8f}"
+    for name in quantities(point.case):
+        entries[f"error of {name}"] = f"{errors[name]:.1e}" if name in errors else ""
+    return entries | {"failure": line.timing.failure}
 
 
 def quantities(case: str) -> list[str]:
@@ -172,25 +177,27 @@ def ratios(kept: dict[str, Pairs]) -> list[str]:
 
     table = Table("error of P", f"{OURS} [s]", *others)
     for level in LEVELS:
-        ours, *times = (seconds_at(level, kept[code]) for code in (OURS, *others))
+        ours = seconds_at(level, kept[OURS])
+        times = [seconds_at(level, kept[code]) for code in others]
         if ours or any(times):
-            told = (
-                f"takes {t / ours:.2g} times as long"
-                if t and ours
-                else f"{t:.1f} s"
-                if t
-                else "never"
-                for t in times
-            )
+            told = [_in_words(seconds, ours) for seconds in times]
             table.add(f"{level:g}", f"{ours:.2f}" if ours else "never", *told)
     reached = ", ".join(f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others))
     return [table.markdown(), f"Smallest errors of P reached: {reached}.\n"]
 
 
+def _in_words(seconds: float | None, ours: float | None) -> str:
+    """How long another code takes, as a multiple of ours where that is known."""
+    if not seconds:
+        return "never"
+    return f"takes {seconds / ours:.2g} times as long" if ours else f"{seconds:.1f} s"
+
+
 def draw(case: str, lines: Sequence[Line], file: Path) -> None:
     """Draw the errors of ``case`` over seconds (above) and dofs; grey is what the reference does
     not know."""
-    names, given = quantities(case), CASES[case]
+    names = quantities(case)
+    given = CASES[case]
     codes = list(dict.fromkeys((OURS, *(line.point.code for line in lines))))
     figure = new_figure(4.1 * len(names), 9)
     panels = figure.subplots(2, len(names), sharey="col")

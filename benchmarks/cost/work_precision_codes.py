@@ -14,9 +14,8 @@ import math
 import re
 import shutil
 import subprocess
-import sys
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +26,7 @@ import numpy as np
 from archord.benchmarks.case import matches, paper_joint, slug
 from archord.benchmarks.peers import calculix
 from archord.benchmarks.peers.installed import Peer, installed
-from archord.benchmarks.timing import Failure, Process
+from archord.benchmarks.timing import Failure, Process, solving
 from archord.geometry.basis import Array
 from archord.postprocess.run import Run
 from archord.report.version import VERSION
@@ -37,7 +36,8 @@ from archord.scene.scene import Scene
 
 DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
 CASES: dict[str, dict[str, Any]] = DATA["cases"]
-OURS, CALCULIX = "archord", "CalculiX"
+OURS = "archord"
+CALCULIX = "CalculiX"
 ANGLES = np.linspace(0.0, np.pi / 2, 401)  # of pressure profiles, from the contact axis
 # of history.csv
 _COLUMNS = {
@@ -72,57 +72,58 @@ class Point:
         which is made."""
         place = (folder / slug(self.name)).resolve()
         place.mkdir(parents=True, exist_ok=True)
-        process, kind = self.prepare(place), (self.case, self.code, self.series)
+        process = self.prepare(place)
+        kind = (self.case, self.code, self.series)
         return replace(process, name=self.name, limit=min(process.limit, limit), kind=kind)
 
 
 def points(patterns: Sequence[str] = ()) -> list[Point]:
     """All points, or those whose name fits one of ``patterns``; CalculiX's and peers' where they
     are installed. Raises `InputError` for a pattern that fits none."""
-    versions, peers = {OURS: VERSION} | _calculix_version(), installed()
-    found = []
-    for case, given in CASES.items():
+    versions = {OURS: VERSION} | _calculix_version()
+    peers = installed()
+    found: list[Point] = []
+    for case in CASES:
         for series in DATA["series"]:
             if series["code"] in versions and case in series.get("cases", CASES):
-                steps = series.get("steps", given["steps"])
-                start = partial(
-                    Point, case, series["code"], versions[series["code"]], series["name"]
-                )
-                for size, growth in zip(series["element_size"], series["growth"], strict=True):
-                    joint = {"growth": growth} | (
-                        {"edge_angle": given["edge_angle"]} if series.get("edge") else {}
-                    )
-                    analysis = {"degree": series.get("degree", 2)}
-                    scene = paper_joint(
-                        size, steps, given.get("yield_stress"), joint=joint, analysis=analysis
-                    )
-                    prepare = _calculix if series["code"] == "CalculiX" else _archord
-                    found.append(start(size, steps, partial(prepare, scene)))
+                found += _of_series(case, series, versions[series["code"]])
         for peer in peers:
-            for size, order in peer.series.get(case, ()):
-                prepare = partial(_peer, peer, case, size, order, given["steps"])
-                found.append(
-                    Point(
-                        case,
-                        peer.label,
-                        peer.version,
-                        f"order {order}",
-                        size,
-                        given["steps"],
-                        prepare,
-                    )
-                )
+            found += _of_peer(case, peer)
     for pattern in patterns:
         if not any(matches(pattern, point.name) for point in found):
-            known = ", ".join(
-                dict.fromkeys(f"{point.case}: {point.code}, {point.series}" for point in found)
+            known = dict.fromkeys(f"{point.case}: {point.code}, {point.series}" for point in found)
+            raise InputError(
+                f"--only {pattern}: no point has such a name; there are {', '.join(known)}."
             )
-            raise InputError(f"--only {pattern}: no point has such a name; there are {known}.")
     return [
         point
         for point in found
         if not patterns or any(matches(pattern, point.name) for pattern in patterns)
     ]
+
+
+def _of_series(case: str, series: dict[str, Any], version: str) -> Iterator[Point]:
+    """The points of a series of archord or CalculiX, from coarse to fine."""
+    given = CASES[case]
+    code = series["code"]
+    steps = series.get("steps", given["steps"])
+    prepare = _calculix if code == CALCULIX else _archord
+    for size, growth in zip(series["element_size"], series["growth"], strict=True):
+        joint = {"growth": growth}
+        if series.get("edge"):
+            joint["edge_angle"] = given["edge_angle"]
+        analysis = {"degree": series.get("degree", 2)}
+        scene = paper_joint(size, steps, given.get("yield_stress"), joint=joint, analysis=analysis)
+        start = partial(prepare, scene)
+        yield Point(case, code, version, series["name"], size, steps, start)
+
+
+def _of_peer(case: str, peer: Peer) -> Iterator[Point]:
+    """The points of a ``peer``, from coarse to fine."""
+    steps = CASES[case]["steps"]
+    for size, order in peer.series.get(case, ()):
+        start = partial(_peer, peer, case, size, order, steps)
+        yield Point(case, peer.label, peer.version, f"order {order}", size, steps, start)
 
 
 def profile(angle: Array, pressure: Array) -> Array:
@@ -147,17 +148,7 @@ def _archord(scene: Scene, folder: Path) -> Process:
             "factorisations": run.summary["totals"]["factorisations"],
         }
 
-    command = (
-        sys.executable,
-        "-m",
-        "archord",
-        "solve",
-        "input.toml",
-        "-o",
-        "run",
-        "--force",
-        "--quiet",
-    )
+    command = solving("input.toml", "run")
     return Process(OURS, command, folder, read)
 
 

@@ -27,7 +27,8 @@ from archord.report.table import Table
 TEXTS: dict[str, dict[str, str]] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )
-GOOD, FAIR = 0.05, 0.15
+GOOD = 0.05
+FAIR = 0.15
 _CORNER = 85  # degrees from the contact axis beyond which the block is held
 Tables = dict[str, list[Part]]  # of the figures, by name
 Found = tuple[
@@ -46,12 +47,9 @@ def verdict(strain: dict[str, float], stress: dict[str, float]) -> str:
     """On all that a claim is about, one for both planes where they agree, else each."""
     said = []
     for what in strain:
-        grades = grade(strain[what]), grade(stress[what])
-        both = (
-            grades[0]
-            if grades[0] == grades[1]
-            else f"{grades[0]} in plane strain, {grades[1]} in plane stress"
-        )
+        one = grade(strain[what])
+        other = grade(stress[what])
+        both = one if one == other else f"{one} in plane strain, {other} in plane stress"
         said.append(f"{what} {both}".strip())
     return "; ".join(said)
 
@@ -80,8 +78,10 @@ def chord_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     }
     largest = {name: float(off[name].max()) for name in ("Persson", "parabola")}
     return (
-        f"of p0, x/l < 0.95: Persson within {largest['Persson']:.1%}, parabola within {largest['parabola']:.1%}; for "
-        f"x/l > 0.5 the parabola is off by up to {off['parabola'][outer].max():.0%}, the ellipse by "
+        f"of p0, x/l < 0.95: Persson within {largest['Persson']:.1%}, parabola within "
+        f"{largest['parabola']:.1%}; for "
+        f"x/l > 0.5 the parabola is off by up to {off['parabola'][outer].max():.0%}, the ellipse "
+        "by "
         f"{off['ellipse'][outer].max():.0%}"
     ), largest
 
@@ -95,26 +95,29 @@ def peak_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     late = float(run.delta[np.flatnonzero(off > GOOD).max(initial=-1) + 1] / run.dR)
     deviation = float(off[run.delta >= 0.499 * run.dR].max())
     return (
-        f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; p0 R/(E* delta) goes from {ratio[0]:.3f} at 0.1 "
-        f"dR over {ratio.min():.3f} to {ratio[-1]:.3f} at 2 dR; k = 0.85 is off by up to {deviation:.1%} from "
+        f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; p0 R/(E* delta) goes from "
+        f"{ratio[0]:.3f} at 0.1 "
+        f"dR over {ratio.min():.3f} to {ratio[-1]:.3f} at 2 dR; k = 0.85 is off by up to "
+        f"{deviation:.1%} from "
         f"0.5 dR on, and within {GOOD:.0%} from {late:.2g} dR on"
     ), {"": deviation}
 
 
 def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C3."""
-    row, run = columns(tables["fig4"], plane=plane), runs.curve("elastic", plane)
+    row = columns(tables["fig4"], plane=plane)
+    run = runs.curve("elastic", plane)
     off = {name: row[name] / row[Y] - 1 for name in ("paper", "johnson", "radzimovsky")}
     at = int(np.argmin(np.abs(row[X] - 0.5)))
     deviation = float(np.abs(off["paper"])[row[X] >= 0.2].max())
-    joint, laws = (
-        LawJoint.from_scene(run.scene),
-        [find_law(name) for name in ("johnson", "radzimovsky")],
-    )
+    joint = LawJoint.from_scene(run.scene)
+    laws = [find_law(name) for name in ("johnson", "radzimovsky")]
     ends = [float(law.force(joint, law.limit(joint))) / (run.E_star * run.dR) for law in laws]
     return (
-        f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR and by up to {deviation:.1%} from 0.2 dR on; at 0.5 dR "
-        f"Johnson by {off['johnson'][at]:+.0%}, Radzimovsky as printed by {off['radzimovsky'][at]:+.0%}; their limits "
+        f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR and by up to {deviation:.1%} from 0.2 "
+        "dR on; at 0.5 dR "
+        f"Johnson by {off['johnson'][at]:+.0%}, Radzimovsky as printed by "
+        f"{off['radzimovsky'][at]:+.0%}; their limits "
         f"are {ends[0]:.4f} and {ends[1]:.3f} E* dR"
     ), {"": deviation}
 
@@ -126,7 +129,8 @@ def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
     middle = pressure[angle < 0.5 * run.eps[-1]] / strength(run)
     mean = columns(tables["fig5b"], plane=plane)["P/(A sigY)"][-1]
     return (
-        f"p0/sigY = {run.p0[-1] / strength(run):.3f}; p over the inner half of the arc {middle.min():.2f} to "
+        f"p0/sigY = {run.p0[-1] / strength(run):.3f}; p over the inner half of the arc "
+        f"{middle.min():.2f} to "
         f"{middle.max():.2f} sigY; P/A = {mean:.3f} sigY"
     ), {"": float(max(abs(middle.max() - 1), abs(middle.min() - 1), mean - 1, 0))}
 
@@ -155,7 +159,10 @@ class FirstYield:
 
     def __str__(self) -> str:
         """For a table."""
-        return f"δ/ΔR = {self.delta:.3f}, in the {self.body}, {self.depth:.3f} R below the contact at {self.angle:.0f}°"
+        return (
+            f"δ/ΔR = {self.delta:.3f}, in the {self.body}, {self.depth:.3f} R below the contact "
+            f"at {self.angle:.0f}°"
+        )
 
 
 def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.0) -> FirstYield:
@@ -169,13 +176,13 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     assert elastic.folder is not None
     fields = [read_fields(elastic.folder, elastic.scene, k + 1) for k in range(len(elastic.delta))]
     centroid = fields[0].coordinates[fields[0].cells[:, :3]].mean(axis=1)
-    stress, delta = (
-        np.array([0 * centroid[:, 0], *(f.von_mises for f in fields)]),
-        np.append(0.0, elastic.delta),
-    )
-    above, cell = stress >= yield_stress, np.arange(len(centroid))
+    stress = np.array([0 * centroid[:, 0], *(f.von_mises for f in fields)])
+    delta = np.append(0.0, elastic.delta)
+    above = stress >= yield_stress
+    cell = np.arange(len(centroid))
     step = np.maximum(above.argmax(axis=0), 1)
-    low, high = stress[step - 1, cell], stress[step, cell]
+    low = stress[step - 1, cell]
+    high = stress[step, cell]
     share = (yield_stress - low) / np.maximum(high - low, 1e-300)
     when = np.where(
         above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf
@@ -193,7 +200,8 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
 def onset(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C6."""
     run = runs.curve("elastic_0.1", plane)
-    anywhere, near = first_yield(run, 0.001), first_yield(run, 0.001, near_contact=0.5)
+    anywhere = first_yield(run, 0.001)
+    near = first_yield(run, 0.001, near_contact=0.5)
     deviation = abs(min(near.delta, anywhere.delta) / 1.18 - 1)
     return f"first of all {anywhere}; near the contact {near}", {"the onset": deviation}
 
@@ -202,7 +210,8 @@ def force_over_angle(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C7."""
     at_angle = "eq. 9 or 12 at the same angle"
     elastic = columns(tables["fig9"], plane=plane, joint="elastic")
-    low, unit = elastic["tan(eps/2)"] < 0.4, np.interp(0.4, elastic["tan(eps/2)"], elastic[Y])
+    low = elastic["tan(eps/2)"] < 0.4
+    unit = np.interp(0.4, elastic["tan(eps/2)"], elastic[Y])
     law, exact = (
         np.abs(elastic[name] - elastic[Y])[low].max() / unit for name in (at_angle, "Persson")
     )
@@ -211,12 +220,19 @@ def force_over_angle(runs: Runs, tables: Tables, plane: Plane) -> Found:
     known = off[np.isfinite(off) & (yielding[X] > 0.5)]
     worst = known[np.abs(known).argmax()]
     return (
-        f"tan(eps/2) < 0.4: eq. 9 off by up to {law:.0%} of P(0.4), Persson by up to {exact:.1%}; plastic: eq. 12 "
+        f"tan(eps/2) < 0.4: eq. 9 off by up to {law:.0%} of P(0.4), Persson by up to {exact:.1%}; "
+        "plastic: eq. 12 "
         f"at the same angle off by up to {worst:+.0%}"
     ), {"": float(max(law, abs(worst)))}
 
 
 _JUDGES: tuple[Callable[[Runs, Tables, Plane], Found], ...] = (
-    chord_pressure, peak_pressure, elastic_force, yield_plateau, plastic_force, onset, force_over_angle,
-)  # fmt: skip
+    chord_pressure,
+    peak_pressure,
+    elastic_force,
+    yield_plateau,
+    plastic_force,
+    onset,
+    force_over_angle,
+)
 CLAIMS = dict(zip(TEXTS, _JUDGES, strict=True))

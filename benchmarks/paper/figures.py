@@ -28,7 +28,8 @@ from archord.report.figure import new_figure, save
 from archord.report.files import replacing, write_rows
 
 Part = dict[str, Any]  # columns by heading; a number or a text holds for all rows
-X, Y = "delta/dR", "P/(E* dR)"
+X = "delta/dR"
+Y = "P/(E* dR)"
 STAGES = (
     1.25,
     1.6,
@@ -62,7 +63,8 @@ def scalars(part: Part) -> Part:
 def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
     """Write ``name``.csv and ``name``.png into ``folder``; returns them. The parts have the same
     headings."""
-    table, layout = folder / f"{name}.csv", LAYOUTS[name]
+    table = folder / f"{name}.csv"
+    layout = LAYOUTS[name]
     rows: list[Part] = []
     for part in parts:
         filled = np.broadcast_arrays(*(np.asarray(value, dtype=object) for value in part.values()))
@@ -110,7 +112,8 @@ def kind_of(part: Part) -> str:
 def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
     """P of a law at ``delta`` (those of the run) over the unit E* dR of the run's joint; nan beyond
     the law's limit."""
-    law, joint = find_law(name), LawJoint.from_scene(run.scene)
+    law = find_law(name)
+    joint = LawJoint.from_scene(run.scene)
     delta = run.delta if delta is None else delta
     inside = delta <= law.limit(joint) * (1 + 1e-9)
     force = np.full(len(delta), np.nan)
@@ -145,7 +148,8 @@ def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
 def fig2(runs: Runs, plane: Plane) -> list[Part]:
     """Chord pressure over x/l: ours, Persson's at the same angle, the parabola and Hertz's
     ellipse."""
-    run, parts = runs.curve("elastic", plane), []
+    run = runs.curve("elastic", plane)
+    parts = []
     for fraction in (2.0, 1.5, 1.0, 0.5):
         k = int(np.argmin(np.abs(run.delta / run.dR - fraction)))
         eps, x, py = chord_profile(run, k + 1)
@@ -170,7 +174,8 @@ def fig2(runs: Runs, plane: Plane) -> list[Part]:
 def fig3(runs: Runs, plane: Plane) -> list[Part]:
     """Peak pressure over delta: ours, Winkler with k = 0.85, Johnson."""
     run = runs.curve("elastic", plane)
-    joint, unit = LawJoint.from_scene(run.scene), run.E_star * run.dR
+    joint = LawJoint.from_scene(run.scene)
+    unit = run.E_star * run.dR
     johnson = hertz(joint, law_force("johnson", run) * unit).peak_pressure / unit
     ours = run.p0 * run.R / unit
     winkler = find_law("paper").at_displacement(joint, run.delta).peak_pressure / unit
@@ -215,7 +220,8 @@ def fig7(runs: Runs, plane: Plane) -> list[Part]:
     parts = []
     for joint in LAYOUTS["fig7"]["joints"]:
         run = runs.curve(joint, plane)
-        unit, law = run.R * strength(run), law_force("paper-plastic", run) * run.E_star * run.dR
+        unit = run.R * strength(run)
+        law = law_force("paper-plastic", run) * run.E_star * run.dR
         named: Part = {
             "dR/R [%]": JOINTS[joint][0],
             "sigY/E* [%]": JOINTS[joint][1],

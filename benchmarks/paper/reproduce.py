@@ -79,11 +79,12 @@ def report(runs: Runs, claims: str, pictures: list[str]) -> str:
     shown = "\n".join(f"![{name}]({name})\n" for name in pictures)
     return f"""# The claims of Hu et al., judged
 
-Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the paper \
-gives neither), block of 100 R, closest points on the deformed curves, {runs.strain} strains; E* = 1.
+Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, \
+nu = 0.3 (the paper gives neither), block of 100 R, closest points on the deformed curves, \
+{runs.strain} strains; E* = 1.
 
-Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {error:.2%} from 0.2 dR on ({worst}): the \
-discretisation error of the finer one, which all numbers come from, is below that.
+Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {error:.2%} from 0.2 dR on \
+({worst}): the discretisation error of the finer one, which all numbers come from, is below that.
 
 {claims}
 {shown}"""

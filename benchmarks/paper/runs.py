@@ -34,7 +34,8 @@ JOINTS: dict[str, tuple[float, float | None]] = {
     "plastic_1.0_0.6": (1.0, 0.6),
     "elastic": (0.5, None),
 }
-FULL_YIELD, MILD_YIELD = "plastic_0.5_0.2", "plastic_0.1_0.1"  # the joints of figures 5 and 8
+FULL_YIELD = "plastic_0.5_0.2"  # the joint of figure 5
+MILD_YIELD = "plastic_0.1_0.1"  # the joint of figure 8
 
 
 def case(joint: str, plane: Plane, mesh: str = "fine", strain: str = "small") -> Case:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from archord.benchmarks.peers.joint_script import axis_pressure
-from archord.benchmarks.timing import Failure, Process, run_once
+from archord.benchmarks.timing import Failure, Process, run_once, solving
 from archord.geometry.basis import Array
 from archord.materials.elasticity import von_mises
 from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
@@ -76,18 +76,17 @@ def process(scene: AnyScene, folder: Path) -> Process:
 
 def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) -> SecondOpinion:
     """CalculiX's results in ``folder``. Raises `Failure` if it did not reach the last step."""
-    printed = (
-        read_printed((folder / "deck.dat").read_text()) if (folder / "deck.dat").exists() else []
-    )
+    tables = folder / "deck.dat"
+    printed = read_printed(tables.read_text()) if tables.exists() else []
     forces = drive_forces(system, mesh, printed)
     reached = min(map(len, forces.values()))
     if reached != len(scene.targets):
         said = (folder / "stdout.txt").read_text(errors="replace").splitlines()
-        errors = [line.strip() for line in said if "*ERROR" in line]
-        raise Failure(
-            "; ".join([f"CalculiX ended after step {reached} of {len(scene.targets)}", *errors])
-        )
-    text, p0 = (folder / "deck.frd").read_text(), None
+        faults = [f"CalculiX ended after step {reached} of {len(scene.targets)}"]
+        faults += [line.strip() for line in said if "*ERROR" in line]
+        raise Failure("; ".join(faults))
+    text = (folder / "deck.frd").read_text()
+    p0 = None
     if isinstance(scene, Scene):
         arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
         angle = np.arctan2(mesh.x[:, 0], -mesh.x[:, 1] - scene.joint.dR)
@@ -95,17 +94,14 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
         pressed = arc[pressure[arc] > 0]
         p0 = axis_pressure(angle[pressed], pressure[pressed])
     increments = [line.split() for line in (folder / "deck.sta").read_text().splitlines()]
+    counted = [row for row in increments if len(row) > 5 and row[0].isdigit() and row[3].isdigit()]
     return SecondOpinion(
         mesh,
         forces,
         read_nodal(text, "STRESS", mesh)[:, :4],
         p0,
         peeq_integral(printed, mesh) * system.problem.symmetry,
-        sum(
-            int(row[3])
-            for row in increments
-            if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()
-        ),
+        sum(int(row[3]) for row in counted),
     )
 
 
@@ -116,10 +112,10 @@ def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, 
     forces: dict[str, Array] = {}
     for m in moved_sets(system, mesh):
         for drive, rate in m.rates.items():
-            factor = share * rate[0] if m.whole and np.ptp(rate) == 0 else math.nan
-            forces[drive] = factor * step_forces(printed, label(m.node_set))[
-                :, m.axis
-            ] + forces.get(drive, 0.0)
+            alike = m.whole and np.ptp(rate) == 0
+            factor = share * rate[0] if alike else math.nan
+            force = factor * step_forces(printed, label(m.node_set))[:, m.axis]
+            forces[drive] = force + forces.get(drive, 0.0)
     return forces
 
 
@@ -164,10 +160,17 @@ def areas(x: Array) -> Array:
     """Areas ``(m,)`` of elements by their nodes ``(m, 6 or 8, 2)``, counting curved edges'
     parabolic segments; positive if counterclockwise."""
     n = x.shape[1] // 2
-    around = x.reshape(len(x), 2, n, 2).swapaxes(1, 2).reshape(x.shape)
-    edges = (np.stack([p, np.roll(p, -1, axis=1)], axis=-1) for p in (x[:, :n], around))
-    corners, whole = (np.linalg.det(both).sum(axis=1) / 2 for both in edges)
-    return corners + 4 / 3 * (whole - corners)  # Archimedes: a segment has 4/3 of its triangle
+    corners = x[:, :n]
+    around = np.stack([corners, x[:, n:]], axis=2).reshape(x.shape)  # corners and middles in turn
+    straight = _polygon_areas(corners)
+    whole = _polygon_areas(around)
+    return straight + 4 / 3 * (whole - straight)  # Archimedes: a segment has 4/3 of its triangle
+
+
+def _polygon_areas(x: Array) -> Array:
+    """Areas ``(m,)`` of polygons by their corners ``(m, n, 2)``."""
+    edges = np.stack([x, np.roll(x, -1, axis=1)], axis=-1)
+    return np.linalg.det(edges).sum(axis=1) / 2
 
 
 def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
@@ -190,49 +193,32 @@ def compare(scene: Path, overrides: Sequence[str], folder: Path) -> Table:
     over nodes, over that of archord's), and seconds. Raises `InputError` and `Failure`."""
     overrides = ["output.fields=nodes", *overrides]
     changes = [word for override in overrides for word in ("--set", override)]
-    command = (
-        sys.executable,
-        "-m",
-        "archord",
-        "solve",
-        str(scene.resolve()),
-        *changes,
-        "-o",
-        "run",
-        "--force",
-        "-q",
-    )
+    command = solving(str(scene.resolve()), "run", *changes)
     ours = run_once(Process("archord", command, folder, lambda: Run(folder / "run")))
-    theirs = run_once(
-        replace(process(load_scene(scene, overrides), folder / "calculix"), limit=_LONG)
-    )
-    table, run, opinion = (
-        Table("", "archord", "CalculiX", "difference", left=1),
-        ours.result,
-        theirs.result,
-    )
+    calculix = process(load_scene(scene, overrides), folder / "calculix")
+    theirs = run_once(replace(calculix, limit=_LONG))
+    table = Table("", "archord", "CalculiX", "difference", left=1)
+    run = ours.result
+    opinion = theirs.result
 
     def add(what: str, one: float, other: float) -> None:
         table.add(what, f"{one:.6g}", f"{other:.6g}", f"{other / one - 1:+.2%}")
 
     for load, forces in opinion.forces.items():
-        add(f"{load} force".strip(), run.columns[f"{load} force" if load else "P"][-1], forces[-1])
+        column = f"{load} force" if load else "P"
+        add(f"{load} force".strip(), run.columns[column][-1], forces[-1])
     fields = run.fields()
     for body, tag in run.bodies.items():
-        own, nodes = (
-            np.flatnonzero(fields.body_of_node == tag),
-            np.unique(opinion.mesh.elements[body]),
-        )
-        own = own[KDTree(fields.coordinates[own]).query(opinion.mesh.x[nodes])[1]]
-        one, other = fields.stress[own], opinion.stress[nodes]
+        of_body = np.flatnonzero(fields.body_of_node == tag)
+        nodes = np.unique(opinion.mesh.elements[body])
+        _, nearest = KDTree(fields.coordinates[of_body]).query(opinion.mesh.x[nodes])
+        one = fields.stress[of_body[nearest]]
+        other = opinion.stress[nodes]
         add(f"{body}: largest von Mises stress", von_mises(one).max(), von_mises(other).max())
-        table.add(
-            f"{body}: stresses", "", "", f"{np.linalg.norm(other - one) / np.linalg.norm(one):.2%}"
-        )
-    seconds = ours.seconds, theirs.seconds
-    table.add(
-        "seconds", *(f"{taken:.1f}" for taken in seconds), f"times {seconds[1] / seconds[0]:.1f}"
-    )
+        off = np.linalg.norm(other - one) / np.linalg.norm(one)
+        table.add(f"{body}: stresses", "", "", f"{off:.2%}")
+    longer = theirs.seconds / ours.seconds
+    table.add("seconds", f"{ours.seconds:.1f}", f"{theirs.seconds:.1f}", f"times {longer:.1f}")
     return table
 
 

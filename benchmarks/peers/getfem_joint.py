@@ -32,7 +32,10 @@ from joint_script import (
     mesh_bodies,
 )
 
-ARC, LOADED, AXIS = 1, 2, 3  # regions; LOADED is the pin's top and the block's held edge
+# regions; LOADED is the pin's top and the block's held edge
+ARC = 1
+LOADED = 2
+AXIS = 3
 
 
 def mesh_body(body: tuple[float, float], size: float, growth: float):
@@ -42,7 +45,8 @@ def mesh_body(body: tuple[float, float], size: float, growth: float):
     cells = cells[:, [0, 3, 1, 5, 4, 2]]
     made = gf.Mesh("empty", 2)
     made.add_convex(gf.GeoTrans("GT_PK(2,2)"), points[cells].transpose(2, 1, 0))
-    (px, py), (y, radius) = made.pts(), body
+    (px, py) = made.pts()
+    (y, radius) = body
     on_arc = np.abs(np.hypot(px, py - y) - radius) < 1e-9
     for region, on in ((ARC, on_arc), (LOADED, np.abs(py - y) < 1e-9), (AXIS, np.abs(px) < 1e-9)):
         made.set_region(region, made.faces_from_pid(made.pid()[on]))
@@ -62,11 +66,14 @@ class Joint:
             name: mesh_body(body, size, growth) for name, body in (("pin", PIN), ("block", BLOCK))
         }
         for name, mesh in meshes.items():
-            u, mf, mim = f"u_{name}", self._space(mesh, 2), self._points(mesh, 2)
+            u = f"u_{name}"
+            mf = self._space(mesh, 2)
+            mim = self._points(mesh, 2)
             md.add_fem_variable(u, mf)
             if plastic:
                 md.add_fem_data(f"Previous_{u}", mf)
-                scalar, tensor = gf.MeshImData(mim, -1, [1]), gf.MeshImData(mim, -1, [2, 2])
+                scalar = gf.MeshImData(mim, -1, [1])
+                tensor = gf.MeshImData(mim, -1, [2, 2])
                 self.kept += [scalar, tensor]
                 md.add_im_data(f"xi_{name}", scalar)
                 md.add_im_data(f"Previous_xi_{name}", scalar)
@@ -80,10 +87,8 @@ class Joint:
         md.add_Dirichlet_condition_with_simplification("u_block", LOADED)
         self._hold(meshes["pin"], "pin", "top", LOADED)
 
-        self.arc, self.multipliers = (
-            self._points(meshes["pin"], 6),
-            self._space(meshes["pin"], 2, degree=1),
-        )
+        self.arc = self._points(meshes["pin"], 6)
+        self.multipliers = self._space(meshes["pin"], 2, degree=1)
         md.add_filtered_fem_variable("pressure", self.multipliers, ARC)
         contact = md.add_integral_large_sliding_contact_brick_raytracing("r", 20 * DR)
         md.add_slave_contact_boundary_to_large_sliding_contact_brick(
@@ -91,7 +96,8 @@ class Joint:
         )
         hole = self._points(meshes["block"], 6)
         md.add_master_contact_boundary_to_large_sliding_contact_brick(contact, hole, ARC, "u_block")
-        self.dofs, self.zero = md.nbdof(), md.from_variables()
+        self.dofs = md.nbdof()
+        self.zero = md.from_variables()
 
     def _space(self, mesh, components: int, degree: int = 2):
         self.kept.append(gf.MeshFem(mesh, components))
@@ -104,7 +110,8 @@ class Joint:
 
     def _hold(self, mesh, name: str, what: str, region: int) -> None:
         """Prescribe the normal displacement on a straight edge, with multipliers."""
-        force, value = f"{what}_force_{name}", f"{what}_{name}"
+        force = f"{what}_force_{name}"
+        value = f"{what}_{name}"
         self.md.add_filtered_fem_variable(force, self._space(mesh, 1), region)
         self.md.add_initialized_data(value, [0.0])
         points = self._points(mesh, 4)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -34,26 +33,22 @@ class Peer:
 
     def command(self, case: str, size: float, order: int, steps: int, output: Path) -> list[str]:
         """The command line that solves ``case`` and writes its result, JSON, to ``output``."""
-        options = {
-            "--case": case,
-            "--size": size,
-            "--order": order,
-            "--steps": steps,
-            "--output": output,
-        }
-        return self._started(*(str(word) for option in options.items() for word in option))
+        options = ("--case", case, "--size", size, "--order", order, "--steps", steps)
+        return self._started(*map(str, options), "--output", str(output))
 
     def _started(self, *words: str) -> list[str]:
         return [self.python, str(Path(__file__).with_name(self.script)), *words]
 
     def probe(self) -> str | None:
         """The version of the code, None if it is not here."""
-        with suppress(OSError, subprocess.SubprocessError):
-            command = self._started("--probe")
-            return subprocess.run(
-                command, capture_output=True, check=True, text=True, timeout=_LIMIT
-            ).stdout.strip()
-        return None
+        command = self._started("--probe")
+        try:
+            said = subprocess.check_output(
+                command, stderr=subprocess.DEVNULL, text=True, timeout=_LIMIT
+            )
+        except (OSError, subprocess.SubprocessError):
+            return None
+        return said.strip()
 
 
 _COARSE = ((0.16, 2), (0.08, 2), (0.04, 2), (0.02, 2))
@@ -72,9 +67,8 @@ PEERS = (
 
 def installed() -> list[Peer]:
     """The peers that run here, each with its version."""
-    return [
-        replace(peer, version=version) for peer in PEERS if (version := peer.probe()) is not None
-    ]
+    versions = [(peer, peer.probe()) for peer in PEERS]
+    return [replace(peer, version=found) for peer, found in versions if found is not None]
 
 
 if __name__ == "__main__":

@@ -25,14 +25,21 @@ from pathlib import Path
 
 import numpy as np
 
-R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
+R = 1.0
+DR = 0.005
+WIDTH = 100.0
+NU = 0.3
 E = 2 * (1 - NU**2)
-MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
+MU = E / (2 * (1 + NU))
+LAME = E * NU / ((1 + NU) * (1 - 2 * NU))
 SIGY = 0.002
 PENALTY = 1e5  # pressure per depth: a usual pressure E* dR/R goes 1e-5 dR deep
-ITERATIONS, CUTS = 25, 6
-TOLERANCE, FAR = 1e-8, 1e3  # of `newton`: residuals over the reaction
-PIN, BLOCK = (-DR, R), (0.0, R + DR)  # height of the centre, and radius
+ITERATIONS = 25
+CUTS = 6
+TOLERANCE = 1e-8  # residual over the reaction at which `newton` ends
+FAR = 1e3  # and at which it gives up
+PIN = (-DR, R)  # height of the centre, and radius
+BLOCK = (0.0, R + DR)
 
 
 def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
@@ -91,7 +98,10 @@ def newton(error, improve) -> int:
 
 def load(joint, steps: int, delta: float) -> int:
     """Press the pin down by ``delta`` in equal steps, cut where need be; returns the iterations."""
-    state, t, iterations, cut = joint.zero, 0.0, 0, 0
+    state = joint.zero
+    t = 0.0
+    iterations = 0
+    cut = 0
     rate = steps * (joint.elastic(delta / steps) - state)
     for step in range(1, steps + 1):
         while t < step / steps - 1e-12:
@@ -99,13 +109,17 @@ def load(joint, steps: int, delta: float) -> int:
             try:
                 new, count = joint.solve(state + dt * rate, (t + dt) * delta)
             except RuntimeError:
-                cut, iterations = cut + 1, iterations + ITERATIONS
+                cut += 1
+                iterations += ITERATIONS
                 if cut > CUTS:
                     raise RuntimeError(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
                 continue
             joint.commit()
-            rate, state, t = (new - state) / dt, new, t + dt
-            iterations, cut = iterations + count, max(cut - 1, 0)
+            rate = (new - state) / dt
+            state = new
+            t += dt
+            iterations += count
+            cut = max(cut - 1, 0)
     return iterations
 
 

@@ -62,9 +62,12 @@ class Joint:
         # starts from.
         self.top.components[1].Set(1, definedon=mesh.Boundaries("pin_top"))
         self.rigid.components[1].Set(1, definedon=mesh.Materials("pin"))
-        self.dofs, self.plastic, self.inverse = space.ndof, plastic, None
+        self.dofs = space.ndof
+        self.plastic = plastic
+        self.inverse = None
         self.free = ng.Projector(space.FreeDofs(), True)
-        self.residual, self.step = self.u.vec.CreateVector(), self.u.vec.CreateVector()
+        self.residual = self.u.vec.CreateVector()
+        self.step = self.u.vec.CreateVector()
         self.zero = self.u.vec.FV().NumPy().copy()
 
         points = ng.comp.IntegrationRuleSpace(mesh, order=2 * order - 2)
@@ -78,7 +81,8 @@ class Joint:
             self.form += ng.Variation(self._energy(u).Compile() * dx)
             self.returned = self._returned()
         else:
-            (a, e), (b, f) = self._trial(u), self._trial(v)
+            (a, e) = self._trial(u)
+            (b, f) = self._trial(v)
             self.form += ((LAME + 2 * MU / 3) * a * b + 2 * MU * e * f) * dx
         self.contact = ng.ContactBoundary(mesh.Boundaries("pin_arc"), mesh.Boundaries("block_arc"))
         place = ng.CF((ng.x, ng.y))
@@ -139,7 +143,9 @@ class Joint:
         return self.residual.Norm() / abs(self.reaction)
 
     def _improve(self) -> None:
-        form, residual, step = self.form, self.residual, self.step
+        form = self.form
+        residual = self.residual
+        step = self.step
         form.AssembleLinearization(self.u.vec)
         if self.inverse is None:
             self.inverse = form.mat.Inverse(

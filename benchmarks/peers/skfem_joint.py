@@ -49,28 +49,23 @@ class UpperTriangle:
 
     def __init__(self, dofs, free) -> None:
         """``free`` ``(n,)`` numbers the unconstrained dofs, -1 elsewhere."""
-        rows, cols = (
-            np.broadcast_to(a, (*dofs.shape, dofs.shape[1]))
-            for a in (dofs[:, :, None], dofs[:, None, :])
-        )
+        rows, cols = np.broadcast_arrays(free[dofs][:, :, None], free[dofs][:, None, :])
         n = int(free.max()) + 1
-        self.kept = (free[rows] >= 0) & (free[cols] >= free[rows])
-        keys, self.slot = np.unique(
-            free[rows][self.kept] * n + free[cols][self.kept], return_inverse=True
-        )
+        self.kept = (rows >= 0) & (cols >= rows)
+        places = rows[self.kept] * n + cols[self.kept]
+        keys, self.slot = np.unique(places, return_inverse=True)
         indptr = np.searchsorted(keys, n * np.arange(n + 1))
         self.matrix = sparse.csr_matrix((np.zeros(len(keys)), keys % n, indptr), (n, n))
-        self.matrix.indptr, self.matrix.indices = (
-            indptr.astype(np.int32),
-            (keys % n).astype(np.int32),
-        )
+        self.matrix.indptr = indptr.astype(np.int32)
+        self.matrix.indices = (keys % n).astype(np.int32)
         for library in sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*")):
             os.environ.setdefault(
                 "PYPARDISO_MKL_RT", str(library)
             )  # pypardiso would search the whole environment
         import pypardiso.pardiso_wrapper as pardiso
 
-        self.solver, self.fault = pardiso.PyPardisoSolver(mtype=2), pardiso.PyPardisoError
+        self.solver = pardiso.PyPardisoSolver(mtype=2)
+        self.fault = pardiso.PyPardisoError
 
     def solve(self, blocks, b):
         """The solution for element matrices ``blocks`` and right-hand side ``b``. Raises
@@ -92,11 +87,9 @@ def return_map(strain, history, sigy: float):
 
     ``history`` ``(m, q, 4)`` is the plastic strain (xx, yy, zz, xy).
     """
-    volumetric = strain[..., 0] + strain[..., 1]
-    deviator = (
-        np.stack([strain[..., 0], strain[..., 1], 0 * volumetric, strain[..., 2] / 2], axis=-1)
-        - history
-    )
+    xx, yy, shear = np.moveaxis(strain, -1, 0)
+    volumetric = xx + yy
+    deviator = np.stack([xx, yy, 0 * xx, shear / 2], axis=-1) - history
     deviator[..., :3] -= (volumetric / 3)[..., None]
     s = 2 * MU * deviator
     norm = np.maximum(np.sqrt((s[..., :3] ** 2).sum(-1) + 2 * s[..., 3] ** 2), 1e-300)
@@ -113,9 +106,8 @@ def return_map(strain, history, sigy: float):
     projection = np.diag([1, 1, 0.5]) - bulk / 3
     directions = n[..., [0, 1, 3]]
     tangent = (LAME + 2 * MU / 3) * bulk + 2 * MU * ratio[..., None, None] * projection
-    tangent -= (2 * MU * ratio * plastic)[..., None, None] * (
-        directions[..., :, None] * directions[..., None, :]
-    )
+    dyad = directions[..., :, None] * directions[..., None, :]
+    tangent -= (2 * MU * ratio * plastic)[..., None, None] * dyad
     return stress[..., [0, 1, 3]], tangent, new
 
 
@@ -131,10 +123,14 @@ class Joint:
 
     def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
         points, cells = mesh_bodies(size, growth, PIN, BLOCK)
-        mesh, element = skfem.MeshTri2(points.T, cells.T), skfem.ElementVector(skfem.ElementTriP2())
+        mesh = skfem.MeshTri2(points.T, cells.T)
+        element = skfem.ElementVector(skfem.ElementTriP2())
         basis = skfem.Basis(mesh, element, intorder=2)
-        self.plastic, self.sigy = plastic, np.inf
-        self.dofs, self.cells, self.zero = int(basis.N), len(cells), np.zeros(basis.N)
+        self.plastic = plastic
+        self.sigy = np.inf
+        self.dofs = int(basis.N)
+        self.cells = len(cells)
+        self.zero = np.zeros(basis.N)
         grad = np.stack([basis.basis[a][0].grad for a in range(12)], axis=-1)  # (2, 2, m, q, 12)
         B = np.stack([grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]], axis=-2)
         self.weight = basis.dx
@@ -162,14 +158,12 @@ class Joint:
         def arc(centre, radius):
             """Dofs ``(f, 3, 2)`` and nodes ``(f, 3, 2)`` of the facets on a circle, ends and
             midpoint, from the axis on."""
-            dofs = basis.element_dofs.T.reshape(-1, 6, 2)[
-                :, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]
-            ].reshape(-1, 3, 2)
+            of_cells = basis.element_dofs.T.reshape(-1, 6, 2)
+            dofs = of_cells[:, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]].reshape(-1, 3, 2)
             x, y = basis.doflocs[:, dofs[..., 0]]
             on = (np.abs(np.hypot(x, y - centre) - radius) < 1e-9).all(axis=1)
-            dofs = np.take_along_axis(
-                dofs[on], np.argsort(x[on], axis=1)[:, [0, 2, 1], None], axis=1
-            )
+            from_axis = np.argsort(x[on], axis=1)[:, [0, 2, 1], None]
+            dofs = np.take_along_axis(dofs[on], from_axis, axis=1)
             dofs = dofs[np.argsort(x[on].min(axis=1))]
             return dofs, basis.doflocs[:, dofs[..., 0]].transpose(1, 2, 0)
 
@@ -178,13 +172,15 @@ class Joint:
             return np.arctan2(x[..., 0], -x[..., 1] - DR)
 
         gauss, weights = np.polynomial.legendre.leggauss(2)
-        (pin, pin_nodes), (hole, hole_nodes) = arc(*PIN), arc(*BLOCK)
+        (pin, pin_nodes) = arc(*PIN)
+        (hole, hole_nodes) = arc(*BLOCK)
         N = shapes(gauss)
         x = N @ pin_nodes
         slope = np.stack([gauss - 0.5, gauss + 0.5, -2 * gauss], axis=-1) @ pin_nodes
         self.ds = weights * np.linalg.norm(slope, axis=-1)
         # The facet of the hole and the place on it (xi) that lie at the angle of x.
-        self.angle, ends = angle(x), angle(hole_nodes[:, 1])
+        self.angle = angle(x)
+        ends = angle(hole_nodes[:, 1])
         facet = np.minimum(np.searchsorted(ends, self.angle), len(ends) - 1)
         xi = np.zeros_like(self.angle)
         for _ in range(5):
@@ -194,16 +190,13 @@ class Joint:
         self.gap = ((y - x) * direction).sum(-1)
         N = np.concatenate([np.broadcast_to(N, (len(pin), *N.shape)), -shapes(xi)], axis=-1)
         self.N = (N[..., None] * direction[..., None, :]).reshape(-1, 12)
-        dofs = np.concatenate(
-            [np.broadcast_to(pin[:, None], (*xi.shape, 3, 2)), hole[facet]], axis=-2
-        )
-        return dofs.reshape(-1, 12)
+        of_pin = np.broadcast_to(pin[:, None], (*xi.shape, 3, 2))
+        return np.concatenate([of_pin, hole[facet]], axis=-2).reshape(-1, 12)
 
     def _element_matrices(self, tangent):
         """Stiffness ``(m, 12, 12)`` of tangents ``(m, q, 3, 3)``."""
-        stress = (tangent * self.weight[..., None, None]) @ self.B.reshape(
-            *self.weight.shape, 3, 12
-        )
+        B = self.B.reshape(*self.weight.shape, 3, 12)
+        stress = (tangent * self.weight[..., None, None]) @ B
         return self.B.transpose(0, 2, 1) @ stress.reshape(self.B.shape)
 
     def pressure(self, u):
@@ -215,19 +208,20 @@ class Joint:
         """Evaluate forces ``(n,)``, new history and tangent; the residual over the reaction."""
         strain = (self.B @ self.u[self.rows[: self.cells], None]).reshape(*self.weight.shape, 3)
         if np.isinf(self.sigy):
-            stress, self.next, blocks = strain @ self.C, self.history, self.unyielding
+            stress = strain @ self.C
+            self.next = self.history
+            blocks = self.unyielding
         else:
             stress, tangent, self.next = return_map(strain, self.history, self.sigy)
             blocks = self._element_matrices(tangent)
-        bulk = ((stress * self.weight[..., None]).reshape(self.cells, 1, -1) @ self.B)[:, 0]
+        weighted = (stress * self.weight[..., None]).reshape(self.cells, 1, -1)
+        bulk = (weighted @ self.B)[:, 0]
         pressure = self.pressure(self.u)
         contact = (pressure * self.ds).reshape(-1, 1) * self.N
-        stiff = (PENALTY * (pressure > 0) * self.ds).reshape(-1, 1, 1) * (
-            self.N[:, :, None] * self.N[:, None, :]
-        )
-        self.forces = np.bincount(
-            self.rows.ravel(), np.concatenate([bulk, contact]).ravel(), self.dofs
-        )
+        stiffness = PENALTY * (pressure > 0) * self.ds
+        stiff = stiffness.reshape(-1, 1, 1) * (self.N[:, :, None] * self.N[:, None, :])
+        parts = np.concatenate([bulk, contact])
+        self.forces = np.bincount(self.rows.ravel(), parts.ravel(), self.dofs)
         self.blocks = np.concatenate([blocks, stiff])
         return float(np.linalg.norm(self.forces[self.free]) / np.abs(self.forces[self.top].sum()))
 
@@ -252,10 +246,9 @@ class Joint:
 
     def results(self) -> dict[str, float | None]:
         """Force of the whole joint, and pressure on the axis from the means of the facets."""
-        mean, angle = (
-            (values * self.ds).sum(1) / self.ds.sum(1)
-            for values in (self.pressure(self.u), self.angle)
-        )
+        length = self.ds.sum(axis=1)
+        mean = (self.pressure(self.u) * self.ds).sum(axis=1) / length
+        angle = (self.angle * self.ds).sum(axis=1) / length
         return {"P": -2 * self.forces[self.top].sum(), "p0": axis_pressure(angle, mean)}
 
 

@@ -29,33 +29,27 @@ from archord.scene.scene import Scene
 Values = dict[str, dict[str, float]]  # by case and quantity
 FILE = Path(__file__).with_name("fine.json")
 FINE = "fine"  # an expected value that is the same case's on a fine mesh (see `fine_scene`)
-_COARSE, _STEPS = 0.1, 4
+_COARSE = 0.1
+_STEPS = 4
 _WITHIN = 0.005  # of the value on a fine mesh
-_SIZE, _TINY = (
-    0.025,
-    0.0025,
-)  # element size over R of fine meshes, where a few elements of 10 %R touch
+_SIZE = 0.025  # element size over R of fine meshes
+_TINY = 0.0025  # and of those where a few elements of 10 %R touch
 _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 
 
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
-    joints, problems = (
-        tomllib.loads(FILE.with_name(f"{name}.toml").read_text(encoding="utf-8"))
-        for name in ("cases", "problems")
-    )
+    joints = tomllib.loads(FILE.with_name("cases.toml").read_text(encoding="utf-8"))
+    problems = tomllib.loads(FILE.with_name("problems.toml").read_text(encoding="utf-8"))
     bases = problems.pop("base")
     found = {}
     for group, table in joints.items():
         for name, keys in table.items():
-            found[name] = _case(
-                name, group, keys, _joint, "P/(E* R)"
-            )  # which is compared by default
+            found[name] = _case(name, group, keys, _joint, "P/(E* R)")  # compared by default
     for group, table in problems.items():
         for name, keys in table.items():
-            found[name] = _case(
-                name, group, _merged(bases[keys.pop("base", group)], keys), _problem, ""
-            )
+            merged = _merged(bases[keys.pop("base", group)], keys)
+            found[name] = _case(name, group, merged, _problem, "")
     return found
 
 
@@ -90,14 +84,14 @@ def _expected(keys: dict[str, Any], stops: bool, default: str) -> tuple[Expected
 
 def _joint(keys: dict[str, Any]) -> Scene:
     """The joint that the rest of the ``keys`` of a case describe."""
-    size, steps = keys.pop("size", _COARSE), keys.pop("steps", _STEPS)
-    strength, load, both = (
-        keys.pop("yield_stress", None),
-        keys.pop("persson", None),
-        keys.pop("both", None),
-    )
+    size = keys.pop("size", _COARSE)
+    steps = keys.pop("steps", _STEPS)
+    strength = keys.pop("yield_stress", None)
+    load = keys.pop("persson", None)
+    both = keys.pop("both", None)
     if "ratio" in keys or "nu" in keys:
-        ratio, nu = keys.pop("ratio", 1.0), keys.pop("nu", 0.3)
+        ratio = keys.pop("ratio", 1.0)
+        nu = keys.pop("nu", 0.3)
         E = (1 - nu**2) * (1 + 1 / ratio)
         keys = {
             "pin": {"E": ratio * E, "nu": nu},
@@ -120,9 +114,8 @@ def _problem(keys: dict[str, Any]) -> AnyScene:
     if cycles := keys.pop("cycles", None):
         load |= {name: value * cycles for name, value in load.items() if isinstance(value, list)}
     if blocks := keys.pop("blocks", None):
-        keys["mesh"] = keys.get("mesh", {}) | {
-            "file": str(_drawn(json.dumps(blocks), keys.pop("triangles", False)))
-        }
+        drawn = _drawn(json.dumps(blocks), keys.pop("triangles", False))
+        keys["mesh"] = keys.get("mesh", {}) | {"file": str(drawn)}
     if edges := keys.pop("eye", None):
         keys["mesh"] = {"file": str(drawn_eye(edges))}
     return parse_any(keys)
@@ -133,24 +126,30 @@ def _drawn(blocks: str, triangles: bool) -> Path:
     """An .inp file of ``blocks`` by name: ranges x0, y0, x1, y1, and numbers of quadrilaterals
     across and up, which ``triangles`` cut in two; x and y are radius and angle (times pi) with a 1
     behind. Sets: "NAME left" and so on."""
-    file, start = Path(tempfile.mkdtemp()) / "blocks.inp", 1
+    file = Path(tempfile.mkdtemp()) / "blocks.inp"
+    start = 1
     with file.open("wb") as out:
         for name, (x0, y0, x1, y1, n, m, *polar) in json.loads(blocks).items():
             x, y = np.meshgrid(np.linspace(x0, x1, n + 1), np.linspace(y0, y1, m + 1))
             if polar:
-                x, y = x * np.cos(np.pi * y), x * np.sin(np.pi * y)
+                radius = x
+                x = radius * np.cos(np.pi * y)
+                y = radius * np.sin(np.pi * y)
             ids = start + np.arange(x.size).reshape(x.shape)
-            quads = np.stack(
-                [ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=2
-            ).reshape(-1, 4)
-            cells = (
-                np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
-            )
-            numbered = np.column_stack([start + np.arange(len(cells)), cells])
-            rows = {"*NODE": np.column_stack([ids.ravel(), x.ravel(), y.ravel()])}
-            rows[f"*ELEMENT, TYPE=CPE{cells.shape[1]}, ELSET={name}"] = numbered
-            sides = {"left": ids[:, 0], "right": ids[:, -1], "bottom": ids[0], "top": ids[-1]}
-            rows |= {f"*NSET, NSET={name} {side}": nodes for side, nodes in sides.items()}
+            corners = [ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]]
+            cells = np.stack(corners, axis=2).reshape(-1, 4)
+            if triangles:
+                cells = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+            rows = {
+                "*NODE": np.column_stack([ids.ravel(), x.ravel(), y.ravel()]),
+                f"*ELEMENT, TYPE=CPE{cells.shape[1]}, ELSET={name}": np.column_stack(
+                    [start + np.arange(len(cells)), cells]
+                ),
+                f"*NSET, NSET={name} left": ids[:, 0],
+                f"*NSET, NSET={name} right": ids[:, -1],
+                f"*NSET, NSET={name} bottom": ids[0],
+                f"*NSET, NSET={name} top": ids[-1],
+            }
             for heading, values in rows.items():
                 out.write(f"{heading}\n".encode())
                 np.savetxt(out, values, "%.15g", ", ")
@@ -164,26 +163,25 @@ def fine_scene(scene: Any) -> Scene:
     steps."""
     given = scene.joint
     tiny = not scene.force_controlled and 0 < max(scene.targets) <= _TINY_LOAD * given.dR
-    size = (
-        _TINY
-        if tiny
-        else min(_SIZE, given.h / given.radius / 2)
-        if given.size_ratio == 1
-        else _SIZE
-    )
+    size = _SIZE
+    if tiny:
+        size = _TINY
+    elif given.size_ratio == 1:
+        size = min(_SIZE, given.h / given.radius / 2)
     joint = {"element_size": None, "relative_element_size": size, "size_ratio": None}
-    return varied(
-        scene,
-        joint=joint | ({"growth": 1.0} if tiny else {}),
-        analysis={"gamma_factor": None},
-        load={"steps": [max(20, 2 * n) for n in scene.load.stage_steps]} if scene.plastic else {},
-    )
+    if tiny:
+        joint["growth"] = 1.0
+    load = {}
+    if scene.plastic:
+        load["steps"] = [max(20, 2 * n) for n in scene.load.stage_steps]
+    return varied(scene, joint=joint, analysis={"gamma_factor": None}, load=load)
 
 
 def main() -> None:
     """Solve the joints that `FILE` lacks on fine meshes, and write after each. Raises RuntimeError
     if a run stops."""
-    known, values = cases(), json.loads(FILE.read_text(encoding="utf-8"))
+    known = cases()
+    values = json.loads(FILE.read_text(encoding="utf-8"))
     for name, case in known.items():
         if name not in values and any(expected.value == FINE for expected in case.expected):
             fine = replace(case, scene=fine_scene(case.scene))

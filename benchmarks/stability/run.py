@@ -105,12 +105,13 @@ def chosen(pattern: str | None) -> list[str]:
 
 def with_references(names: list[str]) -> list[str]:
     """``names`` and the cases they are compared with, in the order of the table."""
-    table, wanted = cases(), set(names)
-    while (
-        more := {str(e.value) for n in wanted for e in table[n].expected if e.value in table}
-        - wanted
-    ):
+    table = cases()
+    wanted = set[str]()
+    more = set(names)
+    while more:
         wanted |= more
+        named = {str(e.value) for name in more for e in table[name].expected}
+        more = (named & table.keys()) - wanted
     return [name for name in table if name in wanted]
 
 
@@ -121,11 +122,9 @@ def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[str], No
     ``said(sentence)`` follows each on the rank that solved it. The lines are the same on all ranks.
     Collective.
     """
-    table, order, fine = (
-        cases(),
-        with_references(names),
-        json.loads(FILE.read_text(encoding="utf-8")),
-    )
+    table = cases()
+    order = with_references(names)
+    fine = json.loads(FILE.read_text(encoding="utf-8"))
 
     def solved(name: str) -> Result:
         r = solve_case(table[name], folder)
@@ -145,7 +144,9 @@ def solve_case(case: Case, folder: Path) -> Result:
 
     Raises KeyboardInterrupt if a signal interrupted the run.
     """
-    result, begun, scene = Result(), perf_counter(), case.scene
+    result = Result()
+    begun = perf_counter()
+    scene = case.scene
 
     def attempted(load: float, iterations: int) -> None:
         result.iterations += iterations
@@ -154,23 +155,26 @@ def solve_case(case: Case, folder: Path) -> Result:
 
     try:
         outcome = case.attempt(folder, on_attempt=attempted)
-        result.status, result.message = outcome.status, outcome.message
+        result.status = outcome.status
+        result.message = outcome.message
         report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
-        result.not_finite, result.warnings = not_finite(outcome.folder), report["warnings"]
+        result.not_finite = not_finite(outcome.folder)
+        result.warnings = report["warnings"]
         result.steps = len(outcome.steps)
-        result.cutbacks = report["totals"]["cutbacks"] + report.get("failed_step", {}).get(
-            "cutbacks", 0
-        )
+        result.cutbacks = report["totals"]["cutbacks"]
+        result.cutbacks += report.get("failed_step", {}).get("cutbacks", 0)
         if outcome.steps:
             estimates = report["error_estimates"]
-            balance, energy = estimates["force_balance"], estimates["energy_balance"] or 0.0
+            balance = estimates["force_balance"]
+            energy = estimates["energy_balance"] or 0.0
             allowed = max(_BALANCE, _SPREAD * estimates["newton_residual"])
             result.forces = Check(balance, allowed, f"forces differ by {balance:.1e} of P")
             limit = 1.001 * _energy_limit(scene, outcome.steps) + 1e-8
             result.energy = Check(energy, limit, f"energy is off by {energy:.1e} of the work")
             result.quantities = quantities(scene, outcome.steps[-1])
     except Exception as error:
-        result.status, result.message = "failed", f"{type(error).__name__}: {error}"
+        result.status = "failed"
+        result.message = f"{type(error).__name__}: {error}"
     result.seconds = perf_counter() - begun
     return result
 
@@ -180,21 +184,26 @@ def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
     between two steps: half the sum of |dP d delta|. That of interferences counts from their first
     step on; a single step tells nothing."""
     if isinstance(scene, Scene):
-        fits, path = scene.joint.dR < 0, np.array([[(m.P, m.delta)] for m in steps])
+        fits = scene.joint.dR < 0
+        path = np.array([[(m.P, m.delta)] for m in steps])
     else:
-        fits, what = scene.fits, ("force", "displacement")
+        fits = scene.fits
+        loads = [load.name for load in scene.load]
         path = np.array(
-            [[[m.values[f"{load.name} {of}"] for of in what] for load in scene.load] for m in steps]
+            [
+                [(m.values[f"{n} force"], m.values[f"{n} displacement"]) for n in loads]
+                for m in steps
+            ]
         )
     if fits and len(steps) == 1:
         return math.inf
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
-    path = path if fits else np.concatenate([np.zeros_like(path[:1]), path])
-    return (
-        float(np.abs(np.prod(np.diff(path, axis=0), axis=2)).sum() / 2 / largest)
-        if largest
-        else 0.0
-    )
+    if not largest:
+        return 0.0
+    if not fits:
+        path = np.concatenate([np.zeros_like(path[:1]), path])
+    rectangles = np.prod(np.diff(path, axis=0), axis=2)
+    return float(np.abs(rectangles).sum() / 2 / largest)
 
 
 def not_finite(folder: Path) -> list[str]:
@@ -225,14 +234,12 @@ def not_finite(folder: Path) -> list[str]:
 def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
     """Hold the result of ``case`` against its checks, the other ``results`` and the ``fine``-mesh
     values."""
-    result, faults = results[case.name], []
+    result = results[case.name]
+    faults = []
     ended = result.status == ("stopped" if case.stops else "done")
     if not ended:
-        faults.append(
-            f"{'went on' if result.status == 'done' else result.status}: {result.message}".rstrip(
-                ": "
-            )
-        )
+        how = "went on" if result.status == "done" else result.status
+        faults.append(f"{how}: {result.message}".rstrip(": "))
     elif case.stops not in result.message:
         faults.append(f"stopped, but said {result.message}")
     if case.warns and not any(case.warns in warning for warning in result.warnings):
@@ -240,40 +247,30 @@ def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
     if result.not_finite:
         faults.append(f"not finite: {', '.join(result.not_finite)}")
     comparisons = [_compare(case, expected, results, fine) for expected in case.expected if ended]
-    faults += [
-        c.fault
-        for c in (result.forces, result.energy, *comparisons)
-        if c is not None and c.share > 1
-    ]
-    return Line(
-        case, result, max(comparisons, key=lambda c: c.share) if comparisons else None, faults
-    )
+    checks = (result.forces, result.energy, *comparisons)
+    faults += [check.fault for check in checks if check and check.share > 1]
+    worst = max(comparisons, key=lambda check: check.share, default=None)
+    return Line(case, result, worst, faults)
 
 
 def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: Values) -> Check:
     """The relative error, absolute where the reference is 0."""
-    value, reference = (
-        results[case.name].quantities.get(expected.quantity, math.nan),
-        expected.value,
-    )
+    value = results[case.name].quantities.get(expected.quantity, math.nan)
+    reference = expected.value
     if isinstance(reference, str):
         values = fine.get(case.name, {}) if reference == FINE else results[reference].quantities
         reference = expected.factor * values.get(expected.quantity, math.nan)
     deviation = abs(value / reference - 1) if reference else abs(value)
     fault = f"{expected.quantity} is {value:.6g}, not {reference:.6g} ({expected.source})"
-    said = (
-        expected.quantity,
-        f"{value:.8g}",
-        f"{reference:.8g}",
-        expected.source,
-        f"{deviation:.1e}",
-    )
-    return Check(deviation, expected.tolerance, fault, dict(zip(_COMPARED, said, strict=True)))
+    numbers = f"{value:.8g}", f"{reference:.8g}", expected.source, f"{deviation:.1e}"
+    entries = dict(zip(_COMPARED, (expected.quantity, *numbers), strict=True))
+    return Check(deviation, expected.tolerance, fault, entries)
 
 
 def row(line: Line) -> dict[str, object]:
     """The entries of a line by heading; what is not there is empty."""
-    case, result = line.case, line.result
+    case = line.case
+    result = line.result
     energy = result.energy if result.energy and result.energy.allowed < math.inf else None
     return {
         "group": case.group,
@@ -293,17 +290,18 @@ def row(line: Line) -> dict[str, object]:
 def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
     """Write stability.csv and stability.md into ``folder``: how many are as they should be, the
     table, and the sentences of the runs that stopped. Returns the Markdown and the files."""
-    rows = [*map(row, lines)]
+    rows = [row(line) for line in lines]
     converged = sum(line.result.status == "done" for line in lines)
     solvable = sum(not line.case.stops for line in lines)
+    faulty = sum(bool(line.faults) for line in lines)
     seconds = sum(line.result.seconds for line in lines)
-    said = "".join(
-        f"- {line.case.name}: {line.result.message}.\n" for line in lines if line.result.message
-    )
     text = (
-        f"{len(lines)} scenes in {seconds:.0f} s: {converged} converged of the {solvable} that have a solution, "
-        f"{len(lines) - solvable} must stop with a sentence; {sum(bool(line.faults) for line in lines)} not as they "
+        f"{len(lines)} scenes in {seconds:.0f} s: {converged} converged of the {solvable} that "
+        f"have a solution, {len(lines) - solvable} must stop with a sentence; {faulty} not as they "
         f"should be.\n\n{Table.of(rows).markdown()}"
-        + (f"\nWhat the runs that stopped said:\n\n{said}" if said else "")
     )
+    stopped = [line for line in lines if line.result.message]
+    if stopped:
+        said = "".join(f"- {line.case.name}: {line.result.message}.\n" for line in stopped)
+        text += f"\nWhat the runs that stopped said:\n\n{said}"
     return text, write_report(folder, "stability", rows, text)

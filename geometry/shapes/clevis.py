@@ -48,7 +48,8 @@ def clevis(
     bodies = [f"{name}{part}" for name in plates for part in (" pin", "")]
     sketch = Sketch(bodies, [*(f"{name} {part}" for name in plates for part in _SETS), "axis"])
     for name, plate in plates.items():
-        at, x = places[name], places[name] + max(hole - 1, 0.0)
+        at = places[name]
+        x = places[name] + max(hole - 1, 0.0)
         draw_plate(sketch, plate, name, 1, at, f"{name} ")
         sketch.pin(x, 1, pin, f"{name} ")
         sketch.sizes[f"{name} pin"] = size_around(x, 1.0, size, growth)

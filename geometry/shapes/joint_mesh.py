@@ -76,7 +76,8 @@ class Sketch:
         pin = f"{before}pin"
         for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
             arc = self.path(pin, (x + to, 0), (x, up), on=Circle(pin, (x, 0.0), 1.0))
-            flat, axis = self.path(pin, (x, up), (x, 0)), self.path(pin, (x, 0), (x + to, 0))
+            flat = self.path(pin, (x, up), (x, 0))
+            axis = self.path(pin, (x, 0), (x + to, 0))
             self.face(pin, **{pin: arc, f"{before}flat": flat, "axis": axis})
 
 
@@ -99,7 +100,9 @@ def mesh_joint(
     """
 
     def build(gmsh) -> None:
-        geo, mesh, coarser = gmsh.model.geo, gmsh.model.mesh, 2.0**refinements
+        geo = gmsh.model.geo
+        mesh = gmsh.model.mesh
+        coarser = 2.0**refinements
         for _, place in sketch.points:
             geo.addPoint(*place, 0)
         for start, stop, *centre in sketch.curves:

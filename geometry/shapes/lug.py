@@ -47,7 +47,10 @@ def draw_plate(
 ) -> None:
     """Draw the half of a ``plate`` above (``up`` = 1) or below the axis, with the hole's centre at
     (``at``, 0); the names of its sets but the axis have ``before`` in front."""
-    hole, side, tip, back = plate.hole, plate.side, at + plate.tip, at - plate.back
+    hole = plate.hole
+    side = plate.side
+    tip = at + plate.tip
+    back = at - plate.back
     round_hole = Circle(f"{before}hole", (at, 0.0), hole)
     apex = Circle(f"{before}end", (tip - side, 0.0), side) if plate.round else None
     corner = (tip - side if apex else tip, up * side)
@@ -112,8 +115,10 @@ def lug(
     outer = bore + (wall or 0.0) / radius
     hole = outer - interference / radius
     plate = Plate(hole, side, tip, back, end == "round")
-    size, x = min(element_size / radius, plate.ligament / ACROSS), touching * max(bore - 1, 0.0)
-    bodies, sets = ["pin", "lug"], ["pin", "hole", "flat", "clamp", "axis", "end", "sides"]
+    size = min(element_size / radius, plate.ligament / ACROSS)
+    x = touching * max(bore - 1, 0.0)
+    bodies = ["pin", "lug"]
+    sets = ["pin", "hole", "flat", "clamp", "axis", "end", "sides"]
     if wall:
         size = min(size, longest_edge(outer - bore))
         bodies.insert(1, "bushing")

@@ -46,17 +46,20 @@ def quarter_joint(
     pin is not meshed; of a whole one the upper half, free, is meshed with the rest, which is then
     pressed along a line inside it.
     """
-    hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
+    hole = 1.0 + clearance / radius
+    width = block_size / radius
+    size = element_size / radius
     sketch = Sketch(
         ("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back")
     )
-    middle, bottom, side, top = (0, 1 - hole), (0, -hole), (1, 1 - hole), (0, 2 - hole)
+    middle = (0, 1 - hole)
+    bottom = (0, -hole)
+    side = (1, 1 - hole)
+    top = (0, 2 - hole)
     if not rigid_pin:
         sketch.point("pin", middle)
-        arc, half = (
-            sketch.path("pin", bottom, side, on=Circle("pin", middle, 1.0)),
-            sketch.path("pin", side, middle),
-        )
+        arc = sketch.path("pin", bottom, side, on=Circle("pin", middle, 1.0))
+        half = sketch.path("pin", side, middle)
         sketch.face(
             "pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom)
         )
@@ -78,7 +81,8 @@ def quarter_joint(
         if edge is None:
             sketch.parts |= dict.fromkeys(sketch.lines[name], math.pi / 2 / on_arc)
         else:
-            x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
+            x = hole * math.sin(edge[0])
+            y = hole * math.cos(edge[0])
             near_edge = (
                 f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
             )

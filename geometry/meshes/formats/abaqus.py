@@ -129,7 +129,8 @@ class _Model:
             there = self.nodes.keys() if kind == "NSET" else self.cells.keys() | self.lines
             chosen = []
             for first, last, *step in rows:
-                a, b = scope.key(first), scope.key(last)
+                a = scope.key(first)
+                b = scope.key(last)
                 every = max(int(*step), 1) if step else 1
                 chosen += [n for n in there if a <= n <= b and (n - a) % every == 0]
         else:
