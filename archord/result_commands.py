@@ -69,7 +69,7 @@ def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
 
 @click.command()
 @argument("folder", "RUN", "run folder")
-@file("--vtk", "write bodies.vtkhdf and contact.vtkhdf into DIR", "DIR")
+@file("--vtk", "write bodies, contact and points as .vtkhdf files into DIR", "DIR")
 @file("--csv", "write history and contact into DIR", "DIR")
 @click.option("--step", type=int, metavar="N", help="write .vtkhdf files of this step alone [all]")
 @flag("--force", "overwrite files that are there")

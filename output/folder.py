@@ -16,7 +16,6 @@ from archord.scene.errors import InputError
 FILES = (
     "scene.toml",
     "history.csv",
-    "fields.vtkhdf",
     "fields.xdmf",
     "fields.h5",
     "contact.h5",
@@ -26,6 +25,7 @@ MESH = "mesh.npz"  # of a run whose mesh was given from Python
 APART = "fields"  # the folder of the files that fields.h5 has links to
 CHECKPOINT = "checkpoint.h5"
 PICTURE = "picture.png"  # drawn later, from the others
+_OLDER = "fields.vtkhdf"  # of version 0.2
 _UNFINISHED = {
     "running": "did not end, unless archord works there still",
     "interrupted": "was interrupted",
@@ -36,7 +36,7 @@ _UNFINISHED = {
 def clear(folder: Path, kept: str = "") -> None:
     """Remove an old run's files but the one that is ``kept``, and what a kill left half done of
     them. Raises `OSError`."""
-    for name in {CHECKPOINT, *FILES, MESH, PICTURE} - {kept}:
+    for name in {CHECKPOINT, *FILES, MESH, PICTURE, _OLDER} - {kept}:
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
     for file in (folder / APART).glob("[0-9]*.h5*"):

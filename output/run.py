@@ -235,11 +235,9 @@ class _Output:
             def write() -> None:
                 if scene.output.fields:
                     if not self._fields:
-                        where, total = (self.folder, self._order, self._mesh), len(scene.targets)
                         points = scene.output.fields == "points"
-                        self._fields = self._of_fields.FieldWriter(
-                            *where, total, after, points=points
-                        )
+                        where = (self.folder, self._order, self._mesh)
+                        self._fields = self._of_fields.FieldWriter(*where, after, points=points)
                     self._fields.write(m.at, fields)
                 if not self._contact:
                     self._contact = StepFile(
@@ -256,8 +254,6 @@ class _Output:
         """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank
         0. Collective."""
         ending["peak_memory"] = self.system.comm.gather(peak_memory())
-        if self._fields:
-            self._fields.end()
         found = self._on_root(lambda: self._report.finish(warnings, **ending))
         return found if self.system.comm.rank == 0 else []
 

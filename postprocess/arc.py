@@ -1,4 +1,4 @@
-"""The contact on the arcs of a joint, and on the surfaces of any run, as contact.h5 holds it."""
+"""The contact on the surfaces of a run, as contact.h5 holds it; of a joint on its arcs."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from archord.materials.material import Array
 from archord.output.files.seal import require_intact
 from archord.output.files.step_file import step_name
 from archord.presets.arc import ArcProfile
-from archord.presets.edge import OF_FRICTION, PER_STEP, SurfaceProfile
+from archord.presets.edge import SurfaceProfile
 from archord.scene.errors import InputError
-from archord.scene.scene import Scene
+
+_OF_ARCS = ("pin", "hole")
 
 
 @contextmanager
@@ -27,9 +28,8 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
     path = Path(folder) / f"{name}.h5"
     if not path.is_file():
         raise InputError(f"{folder}: is not a complete run folder: {path.name} is missing.")
-    require_intact(
-        Path(folder), [path.name, f"{name}/{step_name(0)}.h5", f"{name}/{step_name(step)}.h5"]
-    )
+    apart = [f"{name}/{step_name(k)}.h5" for k in (0, step)]
+    require_intact(Path(folder), [path.name, *apart])
     try:
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:
@@ -42,27 +42,30 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
 def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
     """The integrated surfaces of the run of ``scene`` at ``step`` (from 1): `SurfaceProfile` by
     name, of a joint `ArcProfile` of "pin" and "hole". Raises `InputError` as `opened`."""
-    joint = isinstance(scene, Scene)
-    fixed, per_step = (
-        ("s", "weight", *(() if joint else ("X",))),
-        (*PER_STEP, *(() if joint else ("slip",))),
-    )
-    names = {name: name for name in fixed} | {
-        name: f"{name}/{step_name(step)}" for name in per_step
-    }
     with opened(folder, "contact", step) as file:
-        groups = {key: group for key, group in file.items() if isinstance(group, h5py.Group)}
-        if all("shear" in group for group in groups.values()):
-            names |= {name: f"{name}/{step_name(step)}" for name in OF_FRICTION}
         found = {
-            key: {name: group[at][()] for name, at in names.items()}
-            for key, group in groups.items()
+            name: _arrays_of(group, step)
+            for name, group in file.items()
+            if isinstance(group, h5py.Group)
         }
-    if not joint:
-        return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}
-    radius = {"pin": scene.joint.radius, "hole": scene.joint.radius + scene.joint.dR}
+        if not any("angle" in arrays for arrays in found.values()):
+            return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}
+        profiles = {}
+        for name in _OF_ARCS:
+            if name in found:
+                del found[name]["angle"]  # follows from the arc length
+                clearance = scene.joint.dR if name == "hole" else 0.0
+                radius = scene.joint.radius + clearance
+                profiles[name] = ArcProfile(**found[name], radius=radius)
+        return profiles
+
+
+def _arrays_of(surface: h5py.Group, step: int) -> dict[str, Array]:
+    """What contact.h5 has of a ``surface``: what does not change, and what it was at the
+    ``step``."""
     return {
-        side: ArcProfile(**found[side], radius=radius[side]) for side in radius if side in found
+        name: item[()] if isinstance(item, h5py.Dataset) else item[step_name(step)][()]
+        for name, item in surface.items()
     }
 
 
@@ -75,7 +78,7 @@ def undeformed(profile: ArcProfile | SurfaceProfile, side: str, scene: Any) -> A
     """
     if isinstance(profile, SurfaceProfile):
         return profile.X
-    centre, angle = -scene.joint.pin_depth if side == "pin" else 0.0, profile.angle
-    return np.stack(
-        [profile.radius * np.sin(angle), centre - profile.radius * np.cos(angle)], axis=-1
-    )
+    centre = -scene.joint.pin_depth if side == "pin" else 0.0
+    x = profile.radius * np.sin(profile.angle)
+    y = centre - profile.radius * np.cos(profile.angle)
+    return np.stack([x, y], axis=-1)

@@ -49,7 +49,8 @@ class Comparison:
         """``value/first - 1`` ``(r, n)``; NaN where the first is nothing beside its largest value
         and the other is not."""
         values = self.values[name]
-        first, nothing = values[0], _NOTHING * np.abs(values).max(initial=0.0)
+        first = values[0]
+        nothing = _NOTHING * np.abs(values).max(initial=0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = (values - first) / np.abs(first)
         unknown = np.where(np.abs(values - first) <= nothing, 0.0, np.nan)
@@ -64,29 +65,37 @@ def compare_runs(runs: list[Run]) -> Comparison:
     tables, labels, _ = curves_of(runs)
     load = tables[0]["load"]
     margin = _SAME * np.abs(load).max()
-    alike = [
-        len(t["load"]) == len(load) and np.allclose(t["load"], load, rtol=0, atol=margin)
-        for t in tables
-    ]
+    step_by_step = all(_same_loads(table["load"], load, margin) for table in tables)
     between: np.ndarray = np.zeros((len(runs), len(load)), dtype=bool)
-    if not all(alike):
-        tables = [
-            {name: values[first_loading(t["load"])] for name, values in t.items()} for t in tables
-        ]
-        low, high = max(t["load"][0] for t in tables), min(t["load"][-1] for t in tables)
+    if not step_by_step:
+        tables = [_on_first_loading(table) for table in tables]
+        low = max(table["load"][0] for table in tables) - margin
+        high = min(table["load"][-1] for table in tables) + margin
         load = tables[0]["load"]
-        load = load[(load >= low - margin) & (load <= high + margin)]
+        load = load[(load >= low) & (load <= high)]
         if not len(load):
             raise InputError(f"{runs[0].folder}: shares no range of loads with the others.")
-        between = np.array([np.abs(load[:, None] - t["load"]).min(axis=1) > margin for t in tables])
+        distances = [np.abs(load[:, None] - table["load"]).min(axis=1) for table in tables]
+        between = np.array(distances) > margin
         tables = [_at(load, table, k) for table, k in zip(tables, between, strict=True)]
-    values = {
-        name: np.array([table[name] for table in tables]) for name in labels if name != "load"
-    }
-    return Comparison(runs, labels, all(alike), load, values, between)
+    names = [name for name in labels if name != "load"]
+    values = {name: np.array([table[name] for table in tables]) for name in names}
+    return Comparison(runs, labels, step_by_step, load, values, between)
 
 
-def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, str], Array]:
+def _same_loads(one: Array, other: Array, margin: float) -> bool:
+    return len(one) == len(other) and np.allclose(one, other, rtol=0, atol=margin)
+
+
+def _on_first_loading(table: dict[str, Array]) -> dict[str, Array]:
+    first = first_loading(table["load"])
+    return {name: values[first] for name, values in table.items()}
+
+
+Curves = tuple[list[dict[str, Array]], dict[str, str], Array]
+
+
+def curves_of(runs: Sequence[Run]) -> Curves:
     """What is compared of each run over its "load", ``(n,)`` by name; their labels; and what
     pressures are divided by.
 
@@ -94,58 +103,64 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, st
     dR and E* of all are the same, else over powers of E*, R and the clearance. Raises `InputError`
     for general runs without a common quantity or unit.
     """
-    units = [run.scene.units for run in runs]
-    if not any(run.is_joint for run in runs):
-        first, columns = runs[0], [set(run.columns) for run in runs]
-        shared = set.intersection(*columns) - {
-            f"{load.name} {load.kind}" for load in first.scene.load
-        }
-        names = [name for name in first.columns if name.endswith(COMMON) and name in shared]
-        for run in runs:
-            run.number(None)
-            if any(run.units.get(name) != first.units.get(name) for name in names):
-                raise InputError(f"{run.folder}: has other units than {first.folder}.")
-        if not names:
-            raise InputError(f"{first.folder}: shares no load with the others.")
-        tables = [
-            {"load": np.array(run.path)} | {name: np.array(run.columns[name]) for name in names}
-            for run in runs
-        ]
-        return (
-            tables,
-            {"load": "load factor"} | {name: first.heading(name) for name in names},
-            np.ones(len(runs)),
-        )
+    if any("P" in run.columns for run in runs):
+        return _curves_of_joints(runs)
+    return _common_columns(runs)
+
+
+def _common_columns(runs: Sequence[Run]) -> Curves:
+    """The quantities of parts that all general runs have, but what the loads prescribe."""
+    first = runs[0]
+    shared = set.intersection(*(set(run.columns) for run in runs))
+    shared -= {f"{load.name} {load.kind}" for load in first.scene.load}
+    names = [name for name in first.columns if name.endswith(COMMON) and name in shared]
+    tables = []
+    for run in runs:
+        run.number(None)
+        if any(run.units.get(name) != first.units.get(name) for name in names):
+            raise InputError(f"{run.folder}: has other units than {first.folder}.")
+        table = {"load": np.array(run.path)}
+        tables.append(table | {name: np.array(run.columns[name]) for name in names})
+    if not names:
+        raise InputError(f"{first.folder}: shares no load with the others.")
+    labels = {"load": "load factor"} | {name: first.heading(name) for name in names}
+    return tables, labels, np.ones(len(runs))
+
+
+def _curves_of_joints(runs: Sequence[Run]) -> Curves:
+    """P, delta, p0 and eps of joints."""
     curves = [run.curve for run in runs]
+    units = [run.scene.units for run in runs]
     sizes = np.array([[curve.R, curve.dR, curve.E_star] for curve in curves])
-    if all(unit == units[0] for unit in units) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
-        one, per = units[0], np.ones((len(runs), 3))
-        labels = {
-            "delta": f"delta [{one.length}]",
-            "P": f"P [{one.force_of(None)}]",
-            "p0": f"p0 [{one.stress}]",
-        }
+    R, dR, E_star = np.abs(sizes).T
+    alike = all(unit == units[0] for unit in units)
+    if alike and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
+        length = units[0].length
+        stress = units[0].stress
+        force = units[0].force_of(None)
+        labels = {"delta": f"delta [{length}]", "P": f"P [{force}]", "p0": f"p0 [{stress}]"}
+        per = {"delta": np.ones_like(R), "P": np.ones_like(R), "p0": np.ones_like(R)}
     else:
         gap = gap_name(min(curve.dR for curve in curves))
         labels = {"delta": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}
-        R, dR, E_star = np.abs(sizes).T
-        per = np.stack([dR, E_star * dR, E_star * dR / R], axis=1)
+        per = {"delta": dR, "P": E_star * dR, "p0": E_star * dR / R}
+    labels["eps"] = "eps [rad]"
+    per["eps"] = np.ones_like(R)
     load = "P" if all(run.scene.force_controlled for run in runs) else "delta"
-    labels = {"load": labels.pop(load)} | labels | {"eps": "eps [rad]"}
-    tables = []
-    for c, row in zip(curves, per, strict=True):
-        scaled = {"delta": c.delta / row[0], "P": c.P / row[1], "p0": c.p0 / row[2], "eps": c.eps}
-        tables.append({"load" if name == load else name: values for name, values in scaled.items()})
-    return tables, labels, per[:, 2]
+    named = {name: "load" if name == load else name for name in (load, *labels)}
+    tables = [
+        {named[name]: getattr(curve, name) / per[name][k] for name in named}
+        for k, curve in enumerate(curves)
+    ]
+    return tables, {named[name]: labels[name] for name in named}, per["p0"]
 
 
 def _at(load: Array, table: dict[str, Array], between: np.ndarray) -> dict[str, Array]:
     """The first loading of a run at ``load`` ``(n,)``; interpolated where that lies ``between`` its
     own loads."""
     own = table["load"]
-    found = {
-        name: values[np.abs(load[:, None] - own).argmin(axis=1)] for name, values in table.items()
-    }
+    nearest = np.abs(load[:, None] - own).argmin(axis=1)
+    found = {name: values[nearest] for name, values in table.items()}
     if between.any():
         from scipy.interpolate import PchipInterpolator
 
@@ -158,9 +173,9 @@ def differing_keys(scenes: Sequence[Any]) -> dict[str, list[str]]:
     """Keys in which the ``scenes`` differ, and their values as TOML writes them; empty where a
     scene has none."""
     tables = [scene_keys(scene) for scene in scenes]
-    names = list(dict.fromkeys(name for table in tables for name in table))
-    rows = {
-        name: [json.dumps(t[name], ensure_ascii=False) if name in t else "" for t in tables]
-        for name in names
-    }
-    return {name: values for name, values in rows.items() if len(set(values)) > 1}
+    rows = {}
+    for name in dict.fromkeys(name for table in tables for name in table):
+        shown = [json.dumps(t[name], ensure_ascii=False) if name in t else "" for t in tables]
+        if len(set(shown)) > 1:
+            rows[name] = shown
+    return rows

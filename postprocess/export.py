@@ -2,8 +2,9 @@
 (ParaView, pyvista).
 
 In VTK the bodies keep their curved second-order cells, as fields.h5 has them. The contact is a line
-through the integration points of each facet, undeformed like the mesh, with the displacement of the
-points, so that the same filters deform both.
+through the integration points of each facet; the integration points of the bodies, where the run
+kept them, are vertices. All hold undeformed points and their displacement, so that the same filters
+deform them.
 """
 
 from __future__ import annotations
@@ -14,12 +15,21 @@ from pathlib import Path
 import numpy as np
 
 from archord.materials.material import Array
-from archord.output.files.vtkhdf import LINE, SECOND_ORDER, Arrays, Grid, VtkHdf, times
+from archord.output.files.step_file import times
+from archord.output.files.xdmf import CELLS
 from archord.output.folder import claim_folder
 from archord.output.user_file import check_target, writing
 from archord.postprocess.run import Run
+from archord.postprocess.vtkhdf import (
+    LINE,
+    SECOND_ORDER,
+    VERTEX,
+    Arrays,
+    Grid,
+    write_vtkhdf,
+)
 
-_DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
+_OF_CONTACT = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
 def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
@@ -28,22 +38,20 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
     is damaged, or one that would be written is there already and ``force`` is not given."""
     import pandas as pd
 
-    from archord.postprocess.frames import with_headings
+    from archord.postprocess.frames import write_frame
 
     run.number(None)
     tables = {folder / "history.csv": run.history}
     if run.has_contact:
-        names = ["step", "delta" if run.is_joint else "load_factor"]
+        names = ["step", run.view.path_name]
         steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
         contact = pd.concat(steps, names=names).reset_index(level=[0, 1])
-        contact.attrs["units"] = run.pressure().attrs["units"] | {
-            n: run.units[n] for n in names if n in run.units
-        }
+        of_path = {name: run.units[name] for name in names if name in run.units}
+        contact.attrs["units"] = run.pressure().attrs["units"] | of_path
         tables[folder / "contact.csv"] = contact
     _check_new(tables, folder, force)
     for file, table in tables.items():
-        with writing(file) as new:
-            with_headings(table).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
+        write_frame(table, file)
     return list(tables)
 
 
@@ -53,60 +61,100 @@ def export_vtk(
     """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the
     bodies' first. Time is delta, or the load factor; the number of the step, where that does not
     only grow. Raises `InputError` as `export_csv`, and if the run wrote no fields."""
-    steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)
-    parts = {"bodies": _bodies(run, steps[-1])} | (
-        {"contact": _contact(run, steps[-1])} if run.has_contact else {}
-    )
+    last = run.number(step)
+    steps = range(1, last + 1) if step is None else [last]
+    parts = {"bodies": _bodies(run, last)}
+    if run.has_contact:
+        parts["contact"] = _contact(run, last)
+    if run.scene.output.fields == "points":
+        parts["points"] = _points(run, last)
     files = {folder / f"{name}.vtkhdf": part for name, part in parts.items()}
     _check_new(files, folder, force)
-    at = [times(run.path)[n - 1] for n in steps]
+    all_times = times(run.path)
+    at = {n: all_times[n - 1] for n in steps}
     for file, (grid, values) in files.items():
         with writing(file) as new:
-            whole = VtkHdf(new, grid, len(steps))
-            for k, n in enumerate(steps, 1):
-                whole.write(at[:k], values(n))
+            write_vtkhdf(new, grid, at, values)
     return list(files)
 
 
 def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     """All bodies, and their data at a step."""
     mesh = run.fields(step)
-    grid = Grid(
-        _in_space(mesh.coordinates),
-        [(SECOND_ORDER[mesh.cells.shape[1]], mesh.cells)],
-        {"CellData/body": mesh.body},
-    )
+    kind = SECOND_ORDER[mesh.cells.shape[1]]
+    grid = Grid(_in_space(mesh.coordinates), mesh.cells, kind, {"CellData/body": mesh.body})
 
     def values(step: int) -> Arrays:
         fields = run.fields(step)
-        nodal = {"displacement": _in_space(fields.displacement)} | fields.nodal_fields()
-        found = {f"PointData/{name}": value for name, value in nodal.items()}
-        return found | {f"CellData/{name}": value for name, value in fields.cell_fields().items()}
+        found = {"PointData/displacement": _in_space(fields.displacement)}
+        for name, nodal in (fields.nodal_fields() | fields.nodal_tensors()).items():
+            found[f"PointData/{name}"] = _for_vtk(nodal)
+        for name, means in (fields.cell_fields() | fields.cell_tensors).items():
+            found[f"CellData/{name}"] = _for_vtk(means)
+        return found
 
     return grid, values
 
 
 def _contact(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
-    """The integration points of the arcs, joined by lines within each facet, and their data at a
-    step; ``side`` is 1 on the pin and 2 on the hole, or counts the surfaces."""
+    """The integration points of the surfaces, joined by lines within each facet, and their data at
+    a step; ``side`` counts the surfaces from 1, of a joint pin and hole."""
     table = run.pressure(step)
-    sides = ["pin", "hole"] if run.is_joint else list(table["side"].unique())
-    facet, side = table["facet"].to_numpy(), table["side"].map(sides.index).to_numpy(np.int8) + 1
+    facet = table["facet"].to_numpy()
+    side = table["side"].map(run.sides.index).to_numpy(np.int8) + 1
     first = np.flatnonzero((np.diff(facet) == 0) & (np.diff(side) == 0))
-    lines = [(LINE, np.stack([first, first + 1], axis=1))]
-    grid = Grid(_in_space(table[["x", "y"]].to_numpy()), lines, {"PointData/side": side})
+    lines = np.stack([first, first + 1], axis=1)
+    grid = Grid(_in_space(table[["x", "y"]].to_numpy()), lines, LINE, {"PointData/side": side})
 
     def values(step: int) -> Arrays:
         table = run.pressure(step)
-        data = {"displacement": _in_space(table[["ux", "uy"]].to_numpy())}
-        data |= {name: table[name].to_numpy() for name in _DATA_OF_ARC if name in table}
-        return {f"PointData/{name}": value for name, value in data.items()}
+        found = {"PointData/displacement": _in_space(table[["ux", "uy"]].to_numpy())}
+        for name in _OF_CONTACT:
+            if name in table:
+                found[f"PointData/{name}"] = table[name].to_numpy()
+        return found
+
+    return grid, values
+
+
+def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
+    """A vertex for each integration point, and their data at a step; they move as the second-order
+    cells around them."""
+    from archord.geometry.basis import QUADRILATERAL, TRIANGLE, bulk_quadrature, tabulate
+
+    mesh = run.fields(step)
+    x = run.points(step)["coordinates"]
+    m, q, _ = x.shape
+    kind = {6: TRIANGLE, 9: QUADRILATERAL}[mesh.cells.shape[1]]
+    reference, _ = bulk_quadrature(kind, run.scene.analysis.degree)
+    _, in_vtk_order = CELLS[mesh.cells.shape[1]]
+    cells = mesh.cells[:, np.argsort(in_vtk_order)]
+    shape = tabulate(kind, 2, reference)[0]
+    vertices = np.arange(m * q)[:, None]
+    body = np.repeat(mesh.body, q)
+    grid = Grid(_in_space(x.reshape(m * q, 2)), vertices, VERTEX, {"CellData/body": body})
+
+    def values(step: int) -> Arrays:
+        nodal = run.fields(step).displacement[cells]
+        displacement = np.einsum("qa,mak->mqk", shape, nodal).reshape(m * q, 2)
+        found = {"PointData/displacement": _in_space(displacement)}
+        at_points = run.points(step)
+        del at_points["coordinates"]
+        for name, array in at_points.items():
+            found[f"PointData/{name}"] = _for_vtk(array.reshape(m * q, *array.shape[2:]))
+        return found
 
     return grid, values
 
 
 def _in_space(values: Array) -> Array:
     return np.pad(values, ((0, 0), (0, 1)))
+
+
+def _for_vtk(values: Array) -> Array:
+    """Scalars as they are; tensors ``(n, 4)`` with the components of VTK: xx, yy, zz, xy, yz,
+    xz."""
+    return values if values.ndim == 1 else np.pad(values, ((0, 0), (0, 2)))
 
 
 def _check_new(files: Iterable[Path], folder: Path, force: bool) -> None:

@@ -1,9 +1,7 @@
-"""The fields of a run at a step, as fields.h5 holds them, and the deformed joint with its clearance
-magnified."""
+"""The fields of a run at a step, as fields.h5 holds them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,10 +16,10 @@ from archord.materials.material import COMPONENTS, Array
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
 from archord.scene.errors import InputError, toml_value
-from archord.scene.scene import Scene
 
 BODIES = {"pin": 1, "block": 2}
 CELL_FIELDS = ("von_mises", "mean_stress", "peeq", "contact_state", "contact_pressure")
+TENSORS = ("stress", "plastic_strain")
 # Of VTK's second-order cells by their nodes: straight triangles to draw them by, and the edges,
 # each along it
 _SUBTRIANGLES = {
@@ -29,9 +27,6 @@ _SUBTRIANGLES = {
     9: [[a, b, 8] for a, b in pairwise([0, 4, 1, 5, 2, 6, 3, 7, 0])],
 }
 _EDGES = {6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]], 9: [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]}
-_VISIBLE = 0.1  # clearance over R, as drawn
-_FARTHEST = 0.2  # displacement and clearance over R, as drawn
-_NEAR = 3.0  # radii within which displacements count
 
 
 @dataclass(frozen=True)
@@ -40,9 +35,10 @@ class Fields:
     of second order.
 
     ``cells`` has VTK's order: corners, then the nodes between the first two, the next two, ..., and
-    the last and the first, and that in the middle of four corners. Stress is positive in tension,
-    contact pressure in compression; PEEQ and plastic strain are None where no body can yield, and
-    all that is recovered at nodes where `output.fields` is "cells". All in the scene's units.
+    the last and the first, and the node in the middle of four corners. Stress is positive in
+    tension, contact pressure in compression. PEEQ and plastic strain are None where no body can
+    yield, and all that is recovered at nodes where `output.fields` is "cells". All in the scene's
+    units.
     """
 
     step: int
@@ -56,13 +52,12 @@ class Fields:
     peeq: Array | None  # (m,) equivalent plastic strain
     contact_state: Array  # (m,) share of the cell's contact edge that is in contact, 0 elsewhere
     contact_pressure: Array  # (m,) mean over that edge
-    stress: Array | None = None  # (n, 4) xx, yy, zz, xy: recovered at the nodes, like the following
+    stress: Array | None = None  # (n, 4) COMPONENTS, recovered at the nodes, like the following
     plastic_strain: Array | None = None  # (n, 4)
     peeq_nodal: Array | None = None  # (n,)
+    cell_tensors: dict[str, Array] = field(default_factory=dict)  # (m, 4) means, by TENSORS
     bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
-    edges: Mapping[str, np.ndarray] = field(
-        default_factory=dict
-    )  # (k, 3) nodes along each edge of a named set
+    edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along named sets
 
     @property
     def deformed(self) -> Array:
@@ -76,25 +71,33 @@ class Fields:
         found[self.cells] = self.body[:, None]
         return found
 
+    def nodal_tensors(self) -> dict[str, Array]:
+        """The recovered tensors ``(n, 4)`` by name."""
+        known = {name: getattr(self, name) for name in TENSORS}
+        return {name: tensor for name, tensor in known.items() if tensor is not None}
+
     def nodal_fields(self) -> dict[str, Array]:
         """The recovered fields of the nodes by name ``(n,)``, with the principal stresses "p1" to
         "p3" (the largest first), "principal_angle" (of the larger one in the plane, from the x
         axis) and "von_mises" of their tensor."""
         found: dict[str, Array] = {}
-        for name, tensor in (("stress", self.stress), ("plastic_strain", self.plastic_strain)):
-            if tensor is not None:
-                found |= {f"{name}_{c}": tensor[:, k] for k, c in enumerate(COMPONENTS)}
+        for name, tensor in self.nodal_tensors().items():
+            for k, component in enumerate(COMPONENTS):
+                found[f"{name}_{component}"] = tensor[:, k]
         if self.stress is not None:
-            values, angle = principal_stresses(self.stress)
-            found |= {f"p{k + 1}": values[:, k] for k in range(3)}
-            found |= {"principal_angle": angle, "von_mises": von_mises(self.stress)}
-        return found if self.peeq_nodal is None else found | {"peeq": self.peeq_nodal}
+            principal, angle = principal_stresses(self.stress)
+            for k in range(3):
+                found[f"p{k + 1}"] = principal[:, k]
+            found["principal_angle"] = angle
+            found["von_mises"] = von_mises(self.stress)
+        if self.peeq_nodal is not None:
+            found["peeq"] = self.peeq_nodal
+        return found
 
     def cell_fields(self) -> dict[str, Array]:
         """The fields of the cells by name; `peeq` only where a body can yield."""
-        return {
-            name: getattr(self, name) for name in CELL_FIELDS if getattr(self, name) is not None
-        }
+        known = {name: getattr(self, name) for name in CELL_FIELDS}
+        return {name: values for name, values in known.items() if values is not None}
 
     @property
     def triangles(self) -> np.ndarray:
@@ -111,16 +114,15 @@ class Fields:
         return edges.reshape(-1, 3)
 
     def outline(self) -> np.ndarray:
-        """Those of the `facets` that are on the boundary of the bodies."""
+        """The `facets` that are on the boundary of the bodies."""
         edges = self.facets()
-        _, first, count = np.unique(
-            np.sort(edges[:, [0, 2]], axis=1), axis=0, return_index=True, return_counts=True
-        )
+        ends = np.sort(edges[:, [0, 2]], axis=1)
+        _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
         return edges[first[count == 1]]
 
 
 def read_fields(
-    folder: str | Path, scene: Scene, step: int, bodies: Mapping[str, int] = BODIES
+    folder: str | Path, scene: Any, step: int, bodies: Mapping[str, int] = BODIES
 ) -> Fields:
     """The fields at ``step`` (from 1) of the run of ``scene`` in ``folder``, whose ``bodies`` have
     these tags.
@@ -131,68 +133,44 @@ def read_fields(
     at = step_name(step)
     _require(bool(scene.output.fields), folder, scene, "fields")
     with opened(folder, "fields", step) as file:
-        mesh = file["mesh"]
-        found: dict[str, Any] = {
-            name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS
-        }
-        for name in ("stress", "plastic_strain"):
-            if f"{name}_xx/{at}" in file:
-                found[name] = np.stack([file[f"{name}_{c}/{at}"][()] for c in COMPONENTS], axis=1)
-        if f"peeq_nodal/{at}" in file:
-            found["peeq_nodal"] = file[f"peeq_nodal/{at}"][()]
-        x, u, cells, body = (
-            mesh["coordinates"],
-            file[f"displacement/{at}"],
-            mesh["cells"][()],
-            mesh["body"][()],
-        )
-        edges = dict(all_arrays(file["edges"])) if "edges" in file else {}
-        load = float(file["load"][step - 1])
+
+        def array(name: str) -> Any:
+            return file[f"{name}/{at}"][()] if f"{name}/{at}" in file else None
+
+        found = {name: array(name) for name in (*CELL_FIELDS, "peeq_nodal")}
+        for name in TENSORS:
+            components = [array(f"{name}_{component}") for component in COMPONENTS]
+            known = all(values is not None for values in components)
+            found[name] = np.stack(components, axis=1) if known else None
+        means = {name: array(f"cells/{name}") for name in TENSORS}
         return Fields(
-            step, load, x[:, :2], cells, body, u[:, :2], **found, bodies=bodies, edges=edges
+            step=step,
+            delta=float(file["load"][step - 1]),
+            coordinates=file["mesh/coordinates"][:, :2],
+            cells=file["mesh/cells"][()],
+            body=file["mesh/body"][()],
+            displacement=file[f"displacement/{at}"][:, :2],
+            cell_tensors={name: values for name, values in means.items() if values is not None},
+            bodies=bodies,
+            edges=dict(all_arrays(file["edges"])) if "edges" in file else {},
+            **found,
         )
 
 
-def read_points(folder: str | Path, scene: Scene, step: int) -> dict[str, Array]:
+def read_points(folder: str | Path, scene: Any, step: int) -> dict[str, Array]:
     """What ``output.fields = "points"`` writes at ``step``: "coordinates" ``(m, q, 2)`` of the
     integration points, "stress" ``(m, q, 4)`` and, where a body can yield, "plastic_strain" and
     "peeq" ``(m, q)``. Raises `InputError`."""
     _require(scene.output.fields == "points", folder, scene, "integration points")
     with opened(folder, "fields", step) as file:
-        points, at = file["points"], step_name(step)
-        return {
-            name: points[name if name == "coordinates" else f"{name}/{at}"][()] for name in points
-        }
+        at = step_name(step)
+        found = {"coordinates": file["points/coordinates"][()]}
+        for name in set(file["points"]) - set(found):
+            found[name] = file[f"points/{name}/{at}"][()]
+        return found
 
 
-def _require(written: bool, folder: str | Path, scene: Scene, what: str) -> None:
+def _require(written: bool, folder: str | Path, scene: Any, what: str) -> None:
     if not written:
-        raise InputError(
-            f"{folder}: has no {what}: it was solved with output.fields = {toml_value(scene.output.fields)}."
-        )
-
-
-def magnification(scene: Scene, fields: Fields) -> float:
-    """Factor 1, 2, 3, 5, 10, ... that makes the clearance of ``scene`` visible and leaves the shape
-    recognisable."""
-    R, dR = scene.joint.radius, abs(scene.joint.dR)
-    near = np.hypot(*fields.coordinates.T) < _NEAR * R
-    farthest = dR + max(float(np.abs(fields.displacement[near]).max()), abs(fields.delta))
-    wanted = max(1.0, min(_VISIBLE * R / dR, _FARTHEST * R / farthest))
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return max(step * decade for step in (1, 2, 3, 5) if step * decade <= wanted * (1 + 1e-9))
-
-
-def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = True) -> Array:
-    """Points ``(n, 2)`` at which the nodes are drawn; of the joint before it is loaded, if not
-    ``displaced``.
-
-    Bodies that touch would overlap if displacements alone were magnified. So ``factor`` times the
-    displacement is that from the joint without clearance, in which both arcs are the circle of
-    radius R around the origin: a gap is as many times as wide, and what touches touches, but for
-    ``(factor s)^2/(2 R)`` where one body slid by s along the other.
-    """
-    X, pin = fields.coordinates, fields.body_of_node == BODIES["pin"]
-    start = X * (1 - scene.joint.dR / np.maximum(np.hypot(*X.T), scene.joint.radius / 2))[:, None]
-    start[pin] = X[pin] + [0.0, scene.joint.pin_depth]
-    return start + factor * ((fields.deformed if displaced else X) - start)
+        asked = toml_value(scene.output.fields)
+        raise InputError(f"{folder}: has no {what}: it was solved with output.fields = {asked}.")

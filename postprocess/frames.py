@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from archord.output.user_file import writing
 from archord.postprocess.arc import undeformed
 from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
+_LENGTHS = ("s", "weight", "gap", "x", "y", "ux", "uy")
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
 
 
@@ -26,9 +28,15 @@ def frame_of(columns: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataFra
 
 def with_headings(frame: pd.DataFrame) -> pd.DataFrame:
     """A copy of ``frame`` whose columns are headed ``name [unit]``, as archord's CSV files are."""
-    return frame.rename(
-        columns={name: f"{name} [{unit}]" for name, unit in frame.attrs["units"].items()}
-    )
+    units = frame.attrs["units"]
+    return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
+
+
+def write_frame(frame: pd.DataFrame, target: Path) -> Path:
+    """Write ``frame`` as a CSV file; returns the ``target``. Raises `InputError`."""
+    with writing(target) as new:
+        with_headings(frame).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
+    return target
 
 
 def read_frame(path: Path) -> pd.DataFrame:
@@ -56,18 +64,17 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
     ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both
     positive in compression; ``weight`` is arc length; ``gap`` is positive when open.
     """
-    units = dict.fromkeys(("s", "weight", "gap", "x", "y", "ux", "uy"), scene.units.length)
-    units |= {"angle": "rad"} | dict.fromkeys(("pressure", "raw_pressure"), scene.units.stress)
+    units = dict.fromkeys(_LENGTHS, scene.units.length)
+    units["angle"] = "rad"
+    units |= dict.fromkeys(("pressure", "raw_pressure"), scene.units.stress)
     parts = []
     for side, arc in arcs.items():
         X = undeformed(arc, side, scene)
-        (x, y), (ux, uy) = np.moveaxis(X, -1, 0), np.moveaxis(arc.coordinates - X, -1, 0)
-        columns = {"facet": np.broadcast_to(np.arange(1, len(x) + 1)[:, None], x.shape)}
+        u = arc.coordinates - X
+        facet = np.arange(1, len(X) + 1)[:, None]
+        columns = {"facet": np.broadcast_to(facet, X.shape[:2])}
         columns |= {name: getattr(arc, name) for name in _OF_POINTS if hasattr(arc, name)}
-        columns |= {"x": x, "y": y, "ux": ux, "uy": uy}
-        parts.append(
-            pd.DataFrame(
-                {"side": side} | {name: values.ravel() for name, values in columns.items()}
-            )
-        )
+        columns |= {"x": X[..., 0], "y": X[..., 1], "ux": u[..., 0], "uy": u[..., 1]}
+        flat = {name: values.ravel() for name, values in columns.items()}
+        parts.append(pd.DataFrame({"side": side} | flat))
     return frame_of(pd.concat(parts, ignore_index=True), units)

@@ -5,19 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
+from archord.postprocess.problem_view import ProblemView
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from archord.postprocess.run import Run
 
 _CONTACT = {
     "pressure": "pressure",
@@ -36,8 +36,8 @@ _SAMPLES = 201  # on a line
 @dataclass(frozen=True)
 class Probe:
     """A ``quantity`` at ``n`` points of the edge or line ``place`` at a ``step``, in the scene's
-    units; ``force`` is the largest of those that drive the run then, per unit thickness, that of
-    the load ``by``."""
+    units; ``force`` is the largest of those that drive the run then, per unit thickness, and the
+    load ``by`` exerts it."""
 
     place: str
     quantity: str
@@ -50,9 +50,8 @@ class Probe:
     s: Array
     values: Array  # (n,)
     length: str = ""  # the unit of x and s
-    angle: Array | None = (
-        None  # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
-    )
+    # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
+    angle: Array | None = None
 
     @property
     def largest(self) -> int:
@@ -68,14 +67,16 @@ class Probe:
         """The place of point ``k`` in words: its angle, or how far along the edge or line it is;
         and x and y."""
         along = f"s = {self.s[k]:.6g}" if self.angle is None else f"{self.angle[k]:.4g}°"
-        return f"at {along}, x = {self.x[k, 0]:.6g}, y = {self.x[k, 1]:.6g}"
+        x, y = self.x[k]
+        return f"at {along}, x = {x:.6g}, y = {y:.6g}"
 
     def at(self, angle: float) -> float:
         """The value at an ``angle`` in degrees. Raises `InputError` if the edge has none there."""
         if self.angle is not None:
             off = (self.angle - angle + 180) % 360 - 180
             order = np.argsort(off)
-            if np.abs(off).min() < 2 * np.median(np.diff(off[order])) + 1e-6:
+            spacing = np.median(np.diff(off[order]))
+            if np.abs(off).min() < 2 * spacing + _ROUND_OFF:
                 return float(np.interp(0.0, off[order], self.values[order]))
         raise InputError(f"{self.place}: has no point at {angle:g} degrees.")
 
@@ -85,29 +86,46 @@ class Probe:
         if not (self.force and length > 0):
             section = f"a section of {length:g} under a force of {self.force:g}"
             raise InputError(f"{self.place}: has no factor over {section}.")
-        return replace(
-            self,
-            quantity=f"{self.quantity}/(P/L)",
-            unit="",
-            values=self.values / (self.force / length),
-        )
+        values = self.values / (self.force / length)
+        return replace(self, quantity=f"{self.quantity}/(P/L)", unit="", values=values)
 
     def frame(self) -> pd.DataFrame:
         """As a table."""
         from archord.postprocess.frames import frame_of
 
-        columns = {
-            "s": self.s,
-            "angle": self.angle,
-            "x": self.x[:, 0],
-            "y": self.x[:, 1],
-            self.quantity: self.values,
-        }
-        known = {name: values for name, values in columns.items() if values is not None}
-        return frame_of(known, {"angle": "°", self.quantity: self.unit})
+        columns = {"s": self.s}
+        if self.angle is not None:
+            columns["angle"] = self.angle
+        columns |= {"x": self.x[:, 0], "y": self.x[:, 1], self.quantity: self.values}
+        return frame_of(columns, {"angle": "°", self.quantity: self.unit})
 
 
-def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) -> Probe:
+class Probed(Protocol):
+    """What is asked of a run."""
+
+    folder: Path
+    scene: Any
+    view: ProblemView
+    columns: dict[str, list[float]]
+    steps: int
+
+    def fields(self, step: int | None = None) -> Fields:
+        """See `Run.fields`."""
+
+    def arc(self, step: int | None = None, side: str | None = None) -> Any:
+        """See `Run.arc`."""
+
+
+class _Along(NamedTuple):
+    """Values along an edge or a line: the arrays of a `Probe` with the same names."""
+
+    x: Array
+    s: Array
+    values: Array
+    angle: Array | None = None
+
+
+def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float]) -> Probe:
     """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises
     `InputError`.
 
@@ -118,16 +136,17 @@ def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) 
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
-    quantity = quantity or ("von_mises" if line else "hoop")
-    along = _contact if quantity in _CONTACT else _stress
-    points = _inside(run, line, quantity, step) if line else along(run, edge, quantity, step)
-    unit = run.scene.units.length if quantity in ("ux", "uy", "gap") else run.scene.units.stress
-    unit = (
-        "rad" if quantity == "principal_angle" else "" if quantity.startswith(_UNITLESS) else unit
-    )
-    x, s, values, *angle = points
-    of_arc = angle[0] if angle else None
+    if line:
+        quantity = quantity or "von_mises"
+        found = _inside(run, line, quantity, step)
+    elif quantity in _CONTACT:
+        found = _contact(run, edge, quantity, step)
+    else:
+        quantity = quantity or "hoop"
+        found = _stress(run, edge, quantity, step)
     force, by = _driving(run, step)
+    unit = _unit_of(quantity, run.scene.units)
+    length = run.scene.units.length
     return Probe(
         edge or "line",
         quantity,
@@ -135,121 +154,129 @@ def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) 
         step,
         force,
         by,
-        x,
-        s,
-        values,
-        run.scene.units.length,
-        of_arc,
+        found.x,
+        found.s,
+        found.values,
+        length,
+        found.angle,
     )
 
 
-def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
-    from archord.geometry.curve import (
-        circle_through,
-    )  # with bases, which most readers of runs do without
+def _unit_of(quantity: str, units: Any) -> str:
+    if quantity == "principal_angle":
+        return "rad"
+    if quantity.startswith(_UNITLESS):
+        return ""
+    return units.length if quantity in ("ux", "uy", "gap") else units.stress
+
+
+def _contact(run: Probed, edge: str, quantity: str, step: int) -> _Along:
+    """Values at the integration points of a surface, or means of its facets."""
+    # with bases, which most readers of runs do without
+    from archord.geometry.curve import circle_through
 
     arc = run.arc(step, edge)
-    values = getattr(arc, _CONTACT[quantity])
-    if values is None:
+    at_points = getattr(arc, _CONTACT[quantity])
+    if at_points is None:
         raise InputError(f"{run.folder}: has no {quantity}, as its contacts have no friction.")
-    points = undeformed(arc, edge, run.scene), arc.s, values
-    circle, share = circle_through(points[0].reshape(-1, 2)), arc.weight / arc.width[:, None]
-    means = [np.einsum("fq,fq...->f...", share, values) for values in points]
-    x, s, values = means if quantity == "facet_pressure" else points
-    x, s, values = x.reshape(-1, 2), s.ravel(), values.ravel()
+    x = undeformed(arc, edge, run.scene)
+    circle = circle_through(x.reshape(-1, 2))
+    share = arc.weight / arc.width[:, None]
+    means = _Along(*(np.einsum("fq,fq...->f...", share, v) for v in (x, arc.s, at_points)))
+    if quantity == "facet_pressure":
+        found = means
+    else:
+        found = _Along(x.reshape(-1, 2), arc.s.ravel(), at_points.ravel())
     if circle is None:
-        return x, s, values
+        return found
     centre, radius = circle
-    middle, half = _angle(means[0], centre), np.degrees(arc.width / (2 * radius))
-    angle = _rising(_angle(x, centre), middle - half, middle + half)
+    middle = _angle(means.x, centre)
+    half = np.degrees(arc.width / (2 * radius))
+    angle = _rising(_angle(found.x, centre), middle - half, middle + half)
     angle -= 360 * np.floor(angle.min() / 360)
     order = np.argsort(angle)
-    return x[order], np.radians(angle[order]) * radius, values[order], angle[order]
+    angle = angle[order]
+    return _Along(found.x[order], np.radians(angle) * radius, found.values[order], angle)
 
 
-def _stress(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
+def _stress(run: Probed, edge: str, quantity: str, step: int) -> _Along:
+    """Values at the nodes of an edge, with the stress along it and across."""
     fields = run.fields(step)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:
-        raise InputError(
-            f"{run.folder}: has no edge {edge!r}; its edges are {', '.join(edges) or 'none'}."
-        )
-    rows, s, radius = _along(fields, edge)
-    tangent, joined = _tangents(fields.coordinates[rows], rows)
+        known = ", ".join(edges) or "none"
+        raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {known}.")
+    nodes, s, radius = _along(fields, edge)
+    tangent, joined = _tangents(fields.coordinates[nodes], nodes)
     stresses = {}
     if fields.stress is not None:
-        xx, yy, _, xy = np.moveaxis(fields.stress[rows], -1, 0)
+        xx, yy, _, xy = np.moveaxis(fields.stress[nodes], -1, 0)
         c, d = np.moveaxis(tangent, -1, 0)
         hoop = xx * c**2 + yy * d**2 + 2 * xy * c * d
-        stresses = {
-            "hoop": hoop,
-            "normal": xx + yy - hoop,
-            "shear": (yy - xx) * c * d + xy * (c**2 - d**2),
-        }
-    shown = np.ones(rows.shape, dtype=bool)
+        shear = (yy - xx) * c * d + xy * (c**2 - d**2)
+        stresses = {"hoop": hoop, "normal": xx + yy - hoop, "shear": shear}
+    shown = np.ones(nodes.shape, dtype=bool)
     shown[:, 2] = ~joined
-    values = _nodal(run, fields, quantity, rows, **stresses)
-    angle = np.degrees(s / radius)[shown] if radius else None
-    return fields.coordinates[rows][shown], s[shown], values[shown], angle
+    values = _nodal(run, fields, quantity, nodes, **stresses)
+    angle = np.degrees(s[shown] / radius) if radius else None
+    return _Along(fields.coordinates[nodes][shown], s[shown], values[shown], angle)
 
 
-def _inside(run: Run, line: Sequence[float], quantity: str, step: int) -> tuple[Any, ...]:
+def _inside(run: Probed, line: Sequence[float], quantity: str, step: int) -> _Along:
     """The points of the line that are in a body before it is loaded."""
     from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-    start, end, share = np.array(line[:2]), np.array(line[2:]), np.linspace(0, 1, _SAMPLES)
-    fields, x = run.fields(step), start + share[:, None] * (end - start)
+    start = np.array(line[:2])
+    end = np.array(line[2:])
+    share = np.linspace(0, 1, _SAMPLES)
+    x = start + share[:, None] * (end - start)
+    fields = run.fields(step)
     values = _nodal(run, fields, quantity)
     found: Array = np.full(_SAMPLES, np.nan)
     for body in fields.bodies.values():
-        triangles = Triangulation(
-            *fields.coordinates.T, fields.triangles[fields.body == body].reshape(-1, 3)
+        triangles = fields.triangles[fields.body == body].reshape(-1, 3)
+        interpolator = LinearTriInterpolator(
+            Triangulation(*fields.coordinates.T, triangles), values
         )
-        here = np.ma.filled(LinearTriInterpolator(triangles, values)(*x.T), np.nan)
+        here = np.ma.filled(interpolator(*x.T), np.nan)
         found = np.where(np.isnan(found), here, found)
     inside = ~np.isnan(found)
     if not inside.any():
         raise InputError(f"{run.folder}: no body lies on the line.")
-    return x[inside], share[inside] * np.linalg.norm(end - start), found[inside]
+    return _Along(x[inside], share[inside] * np.linalg.norm(end - start), found[inside])
 
 
-def _nodal(run: Run, fields: Fields, quantity: str, nodes: Any = ..., **more: Array) -> Array:
+def _nodal(run: Probed, fields: Fields, quantity: str, nodes: Any = ..., **more: Array) -> Array:
     """The quantity at ``nodes``, any shape: a nodal field, or one ``more`` that is known there."""
-    known = fields.nodal_fields() | {
-        "ux": fields.displacement[:, 0],
-        "uy": fields.displacement[:, 1],
-    }
+    ux, uy = fields.displacement.T
+    known = fields.nodal_fields() | {"ux": ux, "uy": uy}
     known = {name: values[nodes] for name, values in known.items()} | more
-    if quantity not in known:
-        why = (
-            ""
-            if fields.stress is not None
-            else ' (the run was solved with output.fields = "cells")'
-        )
-        raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
-    return known[quantity]
+    if quantity in known:
+        return known[quantity]
+    why = ""
+    if fields.stress is None:
+        why = ' (the run was solved with output.fields = "cells")'
+    raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
 
 
-def _driving(run: Run, step: int) -> tuple[float, str]:
+def _driving(run: Probed, step: int) -> tuple[float, str]:
     """The largest force of the loads at ``step``, per unit thickness, 0 if that is round-off; and
     its load's name."""
-    names = {"P": "P"}
-    if not run.is_joint:
-        pulls = [
-            load.name
-            for load in run.scene.load
-            if load.pressure is None and load.direction != "rotation"
-        ]
-        names = {name: f"{name} force" for name in pulls}
-    forces = {by: run.columns[name] for by, name in names.items()}
-    by = max(forces, key=lambda name: abs(forces[name][step - 1]), default="")
-    force = forces.get(by, [0.0] * run.steps)
-    counts = abs(force[step - 1]) > _NOTHING * max(map(abs, force))
-    return force[step - 1] / run.scene.thickness if counts else 0.0, by
+    forces = {by: run.columns[column] for by, column in run.view.pulls.items()}
+    if not forces:
+        return 0.0, ""
+    by = max(forces, key=lambda name: abs(forces[name][step - 1]))
+    force = forces[by][step - 1]
+    largest = max(map(abs, forces[by]))
+    if abs(force) <= _NOTHING * largest:
+        return 0.0, by
+    return force / run.scene.thickness, by
 
 
 def _angle(x: Array, centre: Array) -> Array:
-    return np.degrees(np.arctan2(*(x - centre).T[::-1]))
+    """Angles in degrees from the x axis, of points ``(n, 2)`` about the ``centre``."""
+    along, up = (x - centre).T
+    return np.degrees(np.arctan2(up, along))
 
 
 def _rising(angle: Array, begin: Array, end: Array) -> Array:
@@ -257,7 +284,8 @@ def _rising(angle: Array, begin: Array, end: Array) -> Array:
     ``end`` ``(k,)``, which start behind the largest gap between the facets, and at 0 on a whole
     circle."""
     order = np.argsort(begin % 360)
-    gap = (begin[order] - np.roll(end[order], 1) + _GAP) % 360 - _GAP
+    before = np.roll(end[order], 1)
+    gap = (begin[order] - before + _GAP) % 360 - _GAP
     start = begin[order[gap.argmax()]] if gap.max() > _GAP else 0.0
     start = (start + _ROUND_OFF) % 360 - _ROUND_OFF
     return start + (angle - start + _ROUND_OFF) % 360 - _ROUND_OFF
@@ -269,36 +297,44 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     (else 0)."""
     from archord.geometry.curve import Curve, circle_through, in_pieces
 
-    rows = fields.facets()
-    rows = rows[np.isin(rows[:, 1], fields.edges[edge][:, 1])]
-    rows = rows[np.unique(rows[:, 1], return_index=True)[1]]
-    x, radius = fields.coordinates, 0.0
-    height = x[rows[:, 0]] @ [1.0, 1e-3]
-    if (circle := circle_through(x[np.unique(rows)])) is not None:
+    x = fields.coordinates
+    nodes = fields.facets()
+    nodes = nodes[np.isin(nodes[:, 1], fields.edges[edge][:, 1])]
+    nodes = nodes[np.unique(nodes[:, 1], return_index=True)[1]]
+    height = x[nodes[:, 0]] @ [1.0, 1e-3]
+    radius = 0.0
+    circle = circle_through(x[np.unique(nodes)])
+    if circle is not None:
         centre, radius = circle
-        begin, end = (_angle(x[rows[:, k]], centre) for k in (0, 2))
-        if ((end - begin + 180) % 360 - 180).sum() < 0:
-            rows, begin, end = rows[:, ::-1], end, begin
+        begin = _angle(x[nodes[:, 0]], centre)
+        end = _angle(x[nodes[:, 2]], centre)
+        turned = (end - begin + 180) % 360 - 180
+        if turned.sum() < 0:
+            nodes = nodes[:, ::-1]
+            begin, end = end, begin
         height = _rising(begin, begin, end)
-    if len(np.unique(rows[:, 0])) < len(rows):
+    if len(np.unique(nodes[:, 0])) < len(nodes):
         raise InputError(
             f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it."
         )
-    order = in_pieces(rows[:, 0], rows[:, 2], height)
-    s = Curve(x, 2, rows[order]).arc_length(np.array([0.0, 0.5, 1.0]))
+    order = in_pieces(nodes[:, 0], nodes[:, 2], height)
+    s = Curve(x, 2, nodes[order]).arc_length(np.array([0.0, 0.5, 1.0]))
     if radius:
         s += radius * np.radians(height[order])[:, None] - s[:, :1]
-    return rows[order], s, radius
+    return nodes[order], s, radius
 
 
-def _tangents(x: Array, rows: np.ndarray) -> tuple[Array, np.ndarray]:
+def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
     """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet
     without a corner their mean; and which facets ``(k,)`` are so followed by the next."""
     tangent = np.einsum("qa,fai->fqi", [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]], x)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    here, after = np.nonzero(rows[:, 2:] == rows[:, 0])
+    here, after = np.nonzero(nodes[:, 2:] == nodes[:, 0])
     smooth = (tangent[here, 2] * tangent[after, 0]).sum(axis=1) > _SMOOTH
-    here, after = here[smooth], after[smooth]
+    here = here[smooth]
+    after = after[smooth]
     mean = tangent[here, 2] + tangent[after, 0]
-    tangent[here, 2] = tangent[after, 0] = mean / np.linalg.norm(mean, axis=1)[:, None]
-    return tangent, np.isin(np.arange(len(rows)), here[after == here + 1])
+    mean /= np.linalg.norm(mean, axis=1)[:, None]
+    tangent[here, 2] = mean
+    tangent[after, 0] = mean
+    return tangent, np.isin(np.arange(len(nodes)), here[after == here + 1])

@@ -21,17 +21,16 @@ from archord.output.history import fault_of_history, read_history
 from archord.postprocess.arc import read_contact
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
+from archord.postprocess.joint_view import view_of
 from archord.postprocess.probe import Probe, probe
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
-from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
 _NEEDED = (*_WHOLE, "seconds")
-_OF_A_JOINT = (*_NEEDED, *CURVES, "delta/dR", "P/(E* R)", "p0/E*")
 
 
 class _Report(BaseModel):
@@ -58,7 +57,8 @@ class Run:
     ``status`` says how it ended: "done", "stopped" (``message`` says why) or "interrupted";
     "running", if it has not or was killed. ``steps`` is the number of accepted steps, which are
     counted from 1; ``columns`` are those of history.csv by name, as plain lists, and ``units``
-    their units; ``summary`` is run.json, ``warnings`` those in it.
+    their units; ``summary`` is run.json, ``warnings`` are the warnings in it. ``view`` tells what
+    kind of problem was solved: its path, its forces, its surfaces.
 
     Raises `InputError` if it is no run folder, or its scene, report or history cannot be read.
     """
@@ -66,22 +66,22 @@ class Run:
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
         if is_sweep(self.folder):
+            cases = self.folder / "cases"
             raise InputError(
-                f"{self.folder}: is a sweep, not a run; its runs are the folders in {self.folder / 'cases'}."
+                f"{self.folder}: is a sweep, not a run; its runs are the folders in {cases}."
             )
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
                 raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
-        self.summary: dict[str, Any] = (
-            self._read_report()
-        )  # before the history, which a run writes first
+        # before the history, which a run writes first
+        self.summary: dict[str, Any] = self._read_report()
         require_intact(self.folder, ["scene.toml"])
         self.scene: Any = load_scene(self.folder / "scene.toml")
-        self.is_joint = isinstance(self.scene, Scene)
+        self.view = view_of(self.scene)
         self.columns, self.units = self._read_history()
-        self.status, self.message, self.warnings = (
-            self.summary[key] for key in ("status", "message", "warnings")
-        )
+        self.status: str = self.summary["status"]
+        self.message: str = self.summary["message"]
+        self.warnings: list[str] = self.summary["warnings"]
         self.steps = len(self.columns["step"])
 
     @cached_property
@@ -96,7 +96,7 @@ class Run:
     def curve(self) -> RunCurve:
         """P (per unit thickness), p0 and eps over delta as arrays, for laws and fits. Raises
         `InputError` without an accepted step, and of a run that is not of a joint."""
-        if not self.is_joint:
+        if "P" not in self.columns:
             raise InputError(
                 f"{self.folder}: is the run of a general scene; this is for those of a [joint]."
             )
@@ -119,9 +119,8 @@ class Run:
         step or side."""
         arcs = self.contact(step)
         if side is not None and side not in arcs:
-            raise InputError(
-                f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}."
-            )
+            sides = ", ".join(arcs)
+            raise InputError(f"{self.folder}: has no side {side!r}; its sides are {sides}.")
         return arcs[side or list(arcs)[-1]]
 
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
@@ -129,9 +128,8 @@ class Run:
         `InputError`."""
         from archord.postprocess.frames import contact_frame
 
-        return contact_frame(
-            {side: self.arc(step, side)} if side else self.contact(step), self.scene
-        )
+        arcs = {side: self.arc(step, side)} if side else self.contact(step)
+        return contact_frame(arcs, self.scene)
 
     def fields(self, step: int | None = None) -> Fields:
         """Mesh, displacement, stress and plastic strain at ``step`` (the last). Raises
@@ -146,12 +144,17 @@ class Run:
     @property
     def has_contact(self) -> bool:
         """Whether anything may touch."""
-        return self.is_joint or bool(self.scene.interaction)
+        return self.view.has_contact
+
+    @property
+    def sides(self) -> list[str]:
+        """All surfaces in contact, in the order of their numbers."""
+        return list(self.view.sides or self.contact())
 
     @property
     def path(self) -> list[float]:
         """How far the load was at every step: delta of a joint, else the load factor."""
-        return self.columns["delta" if self.is_joint else "load_factor"]
+        return self.columns[self.view.path_name]
 
     def heading(self, name: str) -> str:
         """The name of a column with its unit."""
@@ -173,8 +176,8 @@ class Run:
         return probe(self, edge, quantity, self.number(step), line)
 
     def number(self, step: int | None) -> int:
-        """``step``, or that of the last accepted one. Raises `InputError` if the run has none
-        such."""
+        """``step``, or the number of the last accepted step. Raises `InputError` if the run has no
+        such step."""
         if not self.steps:
             raise InputError(f"{self.folder}: holds no accepted step.")
         if step is None:
@@ -186,13 +189,13 @@ class Run:
         return int(step)
 
     def _read_history(self) -> tuple[dict[str, list[float]], dict[str, str]]:
+        """Columns of history.csv by name, and their units."""
         path = self.folder / "history.csv"
         try:
             columns = read_history(path)
             headings = next(csv.reader([path.read_text(encoding="utf-8").partition("\n")[0]]))
-            if not np.isfinite(
-                [columns[name] for name in (_OF_A_JOINT if self.is_joint else _NEEDED)]
-            ).all():
+            needed = [columns[name] for name in (*_NEEDED, *self.view.needed)]
+            if not np.isfinite(needed).all():
                 raise ValueError("numbers that are not finite")
         except (ValueError, IndexError, KeyError, OSError):
             raise InputError(f"{path}: cannot be read as the history of a run.") from None
@@ -205,14 +208,18 @@ class Run:
 
     def _read_report(self) -> dict[str, Any]:
         path = self.folder / "run.json"
+        fault = ""
         try:
             report = read_report(path)
             _Report.model_validate(report, strict=True)
+            return report
         except ValidationError as error:
-            place = ".".join(map(str, error.errors()[0]["loc"]))
-            fault = f": {place}: {error.errors()[0]['msg'].lower()}" if place else ""
-            raise InputError(f"{path}: cannot be read as the report of a run{fault}.") from None
-        except (OSError, ValueError) as error:
-            fault = f": {error}" if isinstance(error, ChangedError) else ""
-            raise InputError(f"{path}: cannot be read as the report of a run{fault}.") from None
-        return report
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            if place:
+                fault = f": {place}: {first['msg'].lower()}"
+        except ChangedError as error:
+            fault = f": {error}"
+        except (OSError, ValueError):
+            pass
+        raise InputError(f"{path}: cannot be read as the report of a run{fault}.")

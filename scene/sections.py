@@ -409,9 +409,9 @@ class Output(Section):
     """What a run writes besides its curves."""
 
     fields: Literal[False, "cells", "nodes", "points"] = key(
-        "write the fields of every step to fields.vtkhdf, fields.xdmf and fields.h5: of stress and "
-        "plastic strain the means of cells, or also values at the nodes, or also those at the "
-        "integration points; true is the default",
+        "write the fields of every step to fields.h5 and fields.xdmf: of stress and plastic strain "
+        "the means of cells, or also values at the nodes, or also those at the integration points; "
+        "true is the default",
         default="cells",
     )
 

@@ -10,7 +10,6 @@ from collections.abc import Callable
 
 import basix
 import numpy as np
-from dolfinx.cpp.io import perm_vtk
 from dolfinx.mesh import CellType, to_type
 
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE, Array, lagrange_element, order_of
@@ -109,11 +108,6 @@ def in_basix_order(
         x, cells = with_middle_nodes(x, cells)
     order_of(kind, cells.shape[1])
     return x, cells[:, permutation(to_type(kind.name), cells.shape[1])]
-
-
-def in_vtk_order(kind: basix.CellType, cells: np.ndarray) -> np.ndarray:
-    """Lagrange ``cells`` ``(m, a)`` of any order with their nodes in VTK's order."""
-    return cells[:, np.argsort(perm_vtk(to_type(kind.name), cells.shape[1]))]
 
 
 def quarters(kind: basix.CellType, X: Array) -> Array:

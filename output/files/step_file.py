@@ -8,8 +8,8 @@ written then grows with the steps, not with their square. A reader opens one fil
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import count
+from collections.abc import Iterator, Sequence
+from itertools import count, pairwise
 from pathlib import Path
 
 import h5py
@@ -135,6 +135,14 @@ def all_arrays(group: h5py.Group, prefix: str = "") -> Iterator[tuple[str, np.nd
 def step_name(step: int) -> str:
     """Name of a step's dataset: its number in four digits or more."""
     return f"{step:04d}"
+
+
+def times(loads: Sequence[float]) -> list[float]:
+    """The times of steps reached at ``loads``: the loads, or the numbers of the steps where the
+    loads do not only grow."""
+    if all(a < b for a, b in pairwise(loads)):
+        return [float(load) for load in loads]
+    return [float(number) for number in range(1, len(loads) + 1)]
 
 
 def _dataset(name: str, step: int) -> str:

@@ -95,7 +95,7 @@ class RunSteps:
         sha = hashlib.sha256(resolved(scene).encode()).hexdigest()[:16]
         joint = (
             {"R": scene.joint.radius, "dR": scene.joint.dR, "E*": scene.E_star}
-            if run.is_joint
+            if "P" in run.columns
             else {}
         )
         thick, accuracy = scene.analysis.thickness, self.accuracy
@@ -122,7 +122,7 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
     columns["unknown"] = np.full(run.steps, np.nan)
     if not run.has_contact:
         raise InputError(f"{run.folder}: has no contact, and a table is of a joint's.")
-    if run.is_joint:
+    if "P" in run.columns:
         if of is not None:
             raise InputError(
                 f"{run.folder}: is the run of a joint, which has one load; --of is for general scenes."

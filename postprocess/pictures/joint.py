@@ -1,91 +1,119 @@
-"""What a run looks like, a panel each: field on the deformed joint, pressure on the arcs, force
-over displacement."""
+"""What a run of a joint looks like, a panel each: field on the deformed joint, pressure on the
+arcs, force over displacement."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.curve import gap_name
-from archord.postprocess.fields import magnification, magnified
-from archord.postprocess.pictures.problems import draw_field, draw_outline, shown_step, shown_steps
+from archord.postprocess.fields import BODIES, Fields
+from archord.postprocess.pictures.problems import (
+    draw_field,
+    draw_outline,
+    frame,
+    shown_step,
+    shown_steps,
+)
 from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
 _BEFORE: dict[str, Any] = {"color": "0.55", "lw": 0.9}
+_VISIBLE = 0.1  # clearance over R, as drawn
+_FARTHEST = 0.2  # displacement and clearance over R, as drawn
+_NEAR = 3.0  # radii within which displacements count
+
+
+def magnification(scene: Scene, fields: Fields) -> float:
+    """Factor 1, 2, 3, 5, 10, ... that makes the clearance of ``scene`` visible and leaves the shape
+    recognisable."""
+    R = scene.joint.radius
+    dR = abs(scene.joint.dR)
+    near = np.hypot(*fields.coordinates.T) < _NEAR * R
+    moved = max(float(np.abs(fields.displacement[near]).max()), abs(fields.delta))
+    wanted = max(1.0, min(_VISIBLE * R / dR, _FARTHEST * R / (dR + moved)))
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return max(step * decade for step in (1, 2, 3, 5) if step * decade <= wanted * (1 + 1e-9))
+
+
+def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = True) -> Array:
+    """Points ``(n, 2)`` at which the nodes are drawn; of the joint before it is loaded, if not
+    ``displaced``.
+
+    Bodies that touch would overlap if displacements alone were magnified. So ``factor`` times the
+    displacement is drawn from the joint without clearance, in which both arcs are the circle of
+    radius R around the origin: a gap is as many times as wide, and what touches touches, but for
+    ``(factor s)^2/(2 R)`` where one body slid by s along the other.
+    """
+    X = fields.coordinates
+    pin = fields.body_of_node == BODIES["pin"]
+    distance = np.maximum(np.hypot(*X.T), scene.joint.radius / 2)
+    start = X * (1 - scene.joint.dR / distance)[:, None]
+    start[pin] = X[pin] + [0.0, scene.joint.pin_depth]
+    now = fields.deformed if displaced else X
+    return start + factor * (now - start)
 
 
 def _load(scene: Scene, delta: float) -> str:
     return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name(scene.joint.dR, 'ΔR')}"
 
 
-def _over(
-    divisor: float,
-) -> dict[str, Any]:  # of a second axis with the numbers of the first over the divisor
-    return {
-        "functions": (
-            lambda value: np.asarray(value) / divisor,
-            lambda value: np.asarray(value) * divisor,
-        )
-    }
+def _over(divisor: float) -> dict[str, Any]:
+    """Of a second axis with the numbers of the first over the ``divisor``."""
+
+    def divided(value: Any) -> Array:
+        return np.asarray(value) / divisor
+
+    def multiplied(value: Any) -> Array:
+        return np.asarray(value) * divisor
+
+    return {"functions": (divided, multiplied)}
 
 
 def force_panel(axes: Any, run: Run) -> None:
     """P over delta in the scene's units, with P/(E* R) and delta/dR opposite; where yielding began
     is marked."""
-    scene, history = run.scene, run.columns
-    delta, P = ([0.0, *history[name]] for name in ("delta", "P"))
+    scene = run.scene
+    delta = [0.0, *run.columns["delta"]]
+    P = [0.0, *run.columns["P"]]
     axes.plot(delta, P, ".-", color="tab:blue", ms=5)
-    if any(history["peeq_max"]):
-        first = int(np.flatnonzero(history["peeq_max"])[0]) + 1
-        axes.plot(
-            delta[first],
-            P[first],
-            "o",
-            ms=8,
-            mfc="none",
-            color="tab:red",
-            label="first plastic strain",
-        )
+    yielded = np.flatnonzero(run.columns["peeq_max"])
+    if len(yielded):
+        first = int(yielded[0]) + 1
+        ring = {"ms": 8, "mfc": "none", "color": "tab:red", "label": "first plastic strain"}
+        axes.plot(delta[first], P[first], "o", **ring)
         axes.legend(frameon=False, loc="upper left")
-    axes.set(
-        xlabel=f"δ [{scene.units.length}]",
-        ylabel=f"P [{run.units['P']}]",
-        title="force of the joint",
-    )
-    axes.set(xlim=(min(delta), None), ylim=(min(P), None))
+    axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.units['P']}]")
+    axes.set(title="force of the joint", xlim=(min(delta), None), ylim=(min(P), None))
     axes.grid(alpha=0.3)
-    axes.secondary_xaxis("top", **_over(abs(scene.joint.dR))).set_xlabel(
-        f"δ / {gap_name(scene.joint.dR, 'ΔR')}"
-    )
-    unit = scene.E_star * scene.joint.radius * scene.thickness
-    axes.secondary_yaxis("right", **_over(unit)).set_ylabel("P / (E* R)")
+    clearance = axes.secondary_xaxis("top", **_over(abs(scene.joint.dR)))
+    clearance.set_xlabel(f"δ / {gap_name(scene.joint.dR, 'ΔR')}")
+    stiffness = scene.E_star * scene.joint.radius * scene.thickness
+    axes.secondary_yaxis("right", **_over(stiffness)).set_ylabel("P / (E* R)")
 
 
 def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     """Mean contact pressure of each facet over the angle from the contact axis, at ``steps`` (up to
     four): of the hole, and dashed of the pin."""
     scene = run.scene
+    both = False
     for i, step in enumerate(steps or shown_steps(run)):
         arcs = run.contact(step)
+        both = len(arcs) > 1
         for side, arc in arcs.items():
-            angle, p = arc.facet_means()
-            label = None if side == "pin" and len(arcs) > 1 else _load(scene, run.path[step - 1])
-            axes.plot(
-                np.degrees(angle), p, "-" if label else "--", color=f"C{i}", lw=1.4, label=label
-            )
+            angle, pressure = arc.facet_means()
+            style: dict[str, Any] = {"ls": "-", "label": _load(scene, run.path[step - 1])}
+            if both and side == "pin":
+                style = {"ls": "--"}
+            axes.plot(np.degrees(angle), pressure, color=f"C{i}", lw=1.4, **style)
     reach = round(np.degrees(scene.joint.arc_end))
-    axes.set(
-        xlabel="angle from the contact axis [°]",
-        ylabel=f"p [{scene.units.stress}]",
-        xlim=(0, reach),
-    )
-    axes.set(
-        ylim=(0, None),
-        title=f"contact pressure on the arc{' (hole solid, pin dashed)' if len(arcs) > 1 else ''}",
-    )
+    sides = " (hole solid, pin dashed)" if both else ""
+    axes.set(xlabel="angle from the contact axis [°]", ylabel=f"p [{scene.units.stress}]")
+    axes.set(xlim=(0, reach), ylim=(0, None), title=f"contact pressure on the arc{sides}")
     axes.set_xticks(np.arange(0, reach + 1, reach / 6))
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
@@ -93,42 +121,35 @@ def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
 
 
 def field_panel(axes: Any, run: Run, step: int | None = None, field: str = "") -> None:
-    """`draw_field` at ``step`` (that of `shown_step`) on the deformed joint near the contact, with
-    its outline before (grey) and after; displacement and clearance are magnified by the factor in
-    the title."""
-    scene, fields = run.scene, run.fields(step or shown_step(run))
+    """`draw_field` at ``step`` (see `shown_step`) on the deformed joint near the contact, with its
+    outline before (grey) and after; displacement and clearance are magnified by the factor in the
+    title."""
+    scene = run.scene
+    ring = scene.joint.is_ring
+    R = scene.joint.radius
+    fields = run.fields(step or shown_step(run))
     factor = magnification(scene, fields)
-    x, ring, R = magnified(scene, fields, factor), scene.joint.is_ring, scene.joint.radius
+    x = magnified(scene, fields, factor)
     gap = max(0.0, factor * scene.joint.dR)
-    right, low = min(1.6 * R + gap, scene.joint.W), -min(1.9 * R + gap, scene.joint.W)
+    right = min(1.6 * R + gap, scene.joint.W)
+    low = -min(1.9 * R + gap, scene.joint.W)
     high = right if ring or scene.pin.whole else 0.06 * R
     corners = x[fields.cells[:, :3]]
-    near = (corners.max(axis=1) > [0, low]).all(axis=1) & (corners.min(axis=1) < [right, high]).all(
-        axis=1
-    )
+    above = (corners.max(axis=1) > [0, low]).all(axis=1)
+    below = (corners.min(axis=1) < [right, high]).all(axis=1)
     # in a ring the core on which the load acts does not count for the range of colours
-    away = np.hypot(*fields.coordinates[fields.cells[:, :3]].mean(axis=1).T) > (
-        R / 2 if ring else 0
-    )
-    draw_field(axes, run, fields, x, near, away, field)
+    middles = fields.coordinates[fields.cells[:, :3]].mean(axis=1)
+    away = np.hypot(*middles.T) > (R / 2 if ring else 0)
+    draw_field(axes, run, fields, x, above & below, away, field)
     draw_outline(axes, fields, magnified(scene, fields, factor, displaced=False), **_BEFORE)
     draw_outline(axes, fields, x, color="black", lw=1.1)
     if scene.pin.rigid:
-        angle, centre = np.linspace(0, np.pi / 2), -factor * (fields.delta + scene.joint.pin_depth)
-        axes.fill(
-            [0, *R * np.sin(angle)],
-            [centre, *centre - R * np.cos(angle)],
-            fc="0.85",
-            ec="black",
-            zorder=0,
-        )
-    length = scene.units.length
-    axes.set(
-        xlim=(0, right),
-        ylim=(low, high),
-        aspect="equal",
-        xlabel=f"x [{length}]",
-        ylabel=f"y [{length}]",
-    )
+        angle = np.linspace(0, np.pi / 2)
+        centre = -factor * (fields.delta + scene.joint.pin_depth)
+        across = [0, *R * np.sin(angle)]
+        along = [centre, *centre - R * np.cos(angle)]
+        axes.fill(across, along, fc="0.85", ec="black", zorder=0)
+    frame(axes, run)
+    axes.set(xlim=(0, right), ylim=(low, high))
     what = "not magnified" if factor == 1 else f"displacement and clearance × {factor:g}"
     axes.set_title(f"step {fields.step}, {_load(scene, fields.delta)}\n{what}", fontsize="medium")

@@ -12,8 +12,10 @@ from archord.materials.material import Array
 from archord.output.user_file import writing
 from archord.postprocess.comparison import curves_of
 from archord.postprocess.curve import first_loading
+from archord.postprocess.joint_view import JointView
 from archord.postprocess.pictures import joint, problems
 from archord.postprocess.probe import Probe
+from archord.postprocess.problem_view import ProblemView
 from archord.postprocess.run import Run
 from archord.report.figure import new_figure, save
 from archord.scene.errors import InputError
@@ -22,6 +24,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FEW = 10  # runs that get a name in the legend
+# what draws the fields, the contact and the forces of a kind of runs
+_PANELS: dict[type, tuple[Any, Any, Any]] = {
+    ProblemView: (problems.field_panel, problems.contact_panel, problems.load_panel),
+    JointView: (joint.field_panel, joint.arc_panel, joint.force_panel),
+}
 
 
 def save_figure(figure: Figure, target: Path) -> Path:
@@ -45,14 +52,15 @@ def draw_run(
     """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``;
     returns the file.
 
-    The ``field``, by default PEEQ or von Mises stress, is that of the first of ``steps``, by
-    default the last step, or of an unloaded run that with the largest load. Named ``edges`` of the
-    mesh take the place of the contact pressure: along them the ``field``, or the hoop stress, is
-    drawn at all ``steps``. Raises `InputError`.
+    The ``field``, by default PEEQ or von Mises stress, is drawn at the first of ``steps``, by
+    default the last step, or of an unloaded run the step with the largest load. Named ``edges`` of
+    the mesh take the place of the contact pressure: along them the ``field``, or the hoop stress,
+    is drawn at all ``steps``. Raises `InputError`.
     """
     draws = panels_of(run, steps=steps, field=field, edges=edges)
     figure = new_figure(5.0 * len(draws), 4.4)
-    for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(draws))), draws, strict=True):
+    panels = np.atleast_1d(figure.subplots(1, len(draws)))
+    for axes, draw in zip(panels, draws, strict=True):
         draw(axes)
     return save_figure(figure, Path(target))
 
@@ -64,20 +72,17 @@ def panels_of(
     run does not have."""
     run.number(None)
     numbers = [run.number(step) for step in steps]
-    kind: Any = joint if run.is_joint else problems
-    pressure = joint.arc_panel if run.is_joint else problems.contact_panel
-    forces = joint.force_panel if run.is_joint else problems.load_panel
+    draw_fields, draw_contact, draw_forces = _PANELS[type(run.view)]
     draws: list[Callable[[Any], None]] = []
     of_body = "" if edges and field in problems.OF_EDGES else field
     if run.scene.output.fields or of_body:
-        draws.append(
-            lambda axes: kind.field_panel(axes, run, numbers[0] if numbers else None, of_body)
-        )
+        first = numbers[0] if numbers else None
+        draws.append(lambda axes: draw_fields(axes, run, first, of_body))
     if edges:
         draws.append(lambda axes: problems.edge_panel(axes, run, edges, field, numbers))
     elif run.has_contact:
-        draws.append(lambda axes: pressure(axes, run, numbers))
-    draws.append(lambda axes: forces(axes, run))
+        draws.append(lambda axes: draw_contact(axes, run, numbers))
+    draws.append(lambda axes: draw_forces(axes, run))
     return draws
 
 
@@ -85,16 +90,12 @@ def draw_probe(probe: Probe, target: Path) -> Path:
     """Write ``probe`` as ``target``, a table if its name ends in .csv, else a picture; returns the
     file. Raises `InputError`."""
     if target.suffix == ".csv":
-        from archord.postprocess.frames import with_headings
+        from archord.postprocess.frames import write_frame
 
-        with writing(target) as new:
-            with_headings(probe.frame()).to_csv(
-                new, index=False, float_format="%.12g", lineterminator="\n"
-            )
-        return target
+        return write_frame(probe.frame(), target)
     figure = new_figure(6.0, 4.4)
-    label = f"{probe.place}, step {probe.step}"
-    problems.draw_probes(figure.subplots(), [probe], [label], probe.length)
+    style = {"label": f"{probe.place}, step {probe.step}"}
+    problems.draw_probes(figure.subplots(), [probe], [style])
     return save_figure(figure, target)
 
 
@@ -108,34 +109,31 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     from matplotlib import colormaps
 
     tables, labels, scales = curves_of(runs)
-    shown = list(labels)[1:4]
-    figure = new_figure(5.0 * len(shown), 4.6)
-    panels = np.atleast_1d(figure.subplots(1, len(shown)))
+    quantities = list(labels)[1:4]
+    figure = new_figure(5.0 * len(quantities), 4.6)
+    panels = np.atleast_1d(figure.subplots(1, len(quantities)))
     rising = [table["load"][first_loading(table["load"])] for table in tables]
-    last, colours = (
-        min(float(load[-1]) for load in rising),
-        colormaps["viridis"](np.linspace(0, 0.9, len(runs))),
-    )
-    for axes, quantity in zip(panels, shown, strict=True):
+    last = min(float(load[-1]) for load in rising)
+    colours = colormaps["viridis"](np.linspace(0, 0.9, len(runs)))
+    for axes, quantity in zip(panels, quantities, strict=True):
         axes.set(xlabel=labels["load"], ylabel=labels[quantity])
         axes.grid(alpha=0.3)
         for k, (run, table, name) in enumerate(zip(runs, tables, names, strict=True)):
-            x, y = table["load"], table[quantity]
+            x = table["load"]
+            y = table[quantity]
             if quantity == "p0":
-                phi, p = _pressure_at(run, rising[k], last)
-                x, y = np.degrees(phi), p / scales[k]
+                angle, pressure = _pressure_at(run, rising[k], last)
+                x = np.degrees(angle)
+                y = pressure / scales[k]
             axes.plot(x, y, lw=1.3, ls="--" if k else "-", color=colours[k], label=name)
         if quantity == "p0":
-            axes.set(
-                xlabel="angle from the contact axis [°]",
-                ylabel=labels["p0"].replace("p0", "p"),
-                xlim=(0, None),
-            )
-            axes.set(ylim=(0, None), title=f"contact pressure at {labels['load']} = {last:.4g}")
+            pressure_label = labels["p0"].replace("p0", "p")
+            axes.set(xlabel="angle from the contact axis [°]", ylabel=pressure_label)
+            title = f"contact pressure at {labels['load']} = {last:.4g}"
+            axes.set(xlim=(0, None), ylim=(0, None), title=title)
     if len(runs) <= _FEW:
-        figure.legend(
-            *axes.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False
-        )
+        named = axes.get_legend_handles_labels()
+        figure.legend(*named, loc="outside upper center", ncols=2, frameon=False)
     return save_figure(figure, target)
 
 
@@ -144,5 +142,6 @@ def _pressure_at(run: Run, delta: Array, wanted: float) -> tuple[Array, Array]:
     where the rising ``delta`` of the first steps is ``wanted``, linearly between two steps; before
     the first, that step."""
     place = float(np.interp(wanted, delta, np.arange(len(delta))))
-    below, above = (run.arc(int(k) + 1).facet_means() for k in (np.floor(place), np.ceil(place)))
-    return below[0], below[1] + (place % 1) * (above[1] - below[1])
+    angle, before = run.arc(int(np.floor(place)) + 1).facet_means()
+    _, after = run.arc(int(np.ceil(place)) + 1).facet_means()
+    return angle, before + (place % 1) * (after - before)

@@ -9,7 +9,7 @@ contact edge depends on the ranks.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 
 import basix
 import numpy as np
@@ -20,7 +20,6 @@ from archord.geometry.basis import Array, tabulate
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.materials.material import Points
 from archord.solver.bulk import PointFields
-from archord.solver.contact.pair import Pair
 from archord.solver.path.system import System
 
 Arrays = dict[str, np.ndarray]
@@ -135,20 +134,6 @@ class MeshOrder:
         whole = np.zeros((self.n_cells, *values[0].shape[1:]))
         whole[np.concatenate(cells)] = np.concatenate(values)
         return self.cells(whole)
-
-    def contact_facets(self) -> np.ndarray:
-        """Cell, and nodes along it within the cell, ``(k, 1 + degree + 1)`` of the facets of all
-        integrated contact surfaces, one surface after the other, on rank 0. Collective."""
-        return self.on_facets(
-            lambda pair: np.column_stack([self._cell_index[pair.surface.cells], pair.surface.trace])
-        )
-
-    def on_facets(self, values: Callable[[Pair], np.ndarray]) -> np.ndarray:
-        """The ``values`` ``(n, ...)`` of a pair's facets for all `contact_facets`, on rank 0.
-        Collective."""
-        pairs = self.system.contact.pairs
-        parts = [Gather(self.system.comm, pair.surface.facet)(values(pair)) for pair in pairs]
-        return np.concatenate(parts) if parts else np.zeros(0)
 
     def collect(self, u: Array) -> Array:
         """Nodal values ``(n_local, k)`` of all ranks on rank 0, nothing elsewhere. Collective."""

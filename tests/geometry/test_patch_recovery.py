@@ -50,7 +50,7 @@ def test_polynomials_of_the_degree_are_reproduced_at_every_node(degree, size, qu
 def recovered(system, folder):
     """Coordinates and stress of the nodes, as a run writes and reads them."""
     order = MeshOrder(system)
-    writer = FieldWriter(folder, order, collect_mesh(order), 1)
+    writer = FieldWriter(folder, order, collect_mesh(order))
     writer.write(1.0, collect_fields(order))
     scene = type("Scene", (), {"output": type("Output", (), {"fields": True})})
     return read_fields(folder, scene, 1)
@@ -128,7 +128,7 @@ def test_all_ranks_together_write_what_one_writes(comm, tmp_path_factory):
         folders = [tmp_path_factory.mktemp("run") for _ in found]
         read = []
         for folder, (m, f, o) in zip(folders, found, strict=True):
-            writer = FieldWriter(folder, o, m, 1, points=True)
+            writer = FieldWriter(folder, o, m, points=True)
             writer.write(1.0, f)
             read.append(
                 read_fields(folder, type("S", (), {"output": type("O", (), {"fields": True})}), 1)

@@ -59,8 +59,6 @@ def accepted_steps(folder: Path) -> int:
             found[name] = _step_file(folder / name)
     if (folder / "fields.xdmf").exists():
         found["fields.xdmf"] = _xdmf(folder / "fields.xdmf")
-    if (folder / "fields.vtkhdf").exists():
-        found["fields.vtkhdf"] = _vtkhdf(folder / "fields.vtkhdf")
     assert all(steps - 1 <= n <= steps for n in found.values()), (steps, found)
     return steps
 
@@ -72,18 +70,6 @@ def _step_file(path: Path) -> int:
         for name, values in all_arrays(file):
             assert np.isfinite(values).all(), name
     return accepted
-
-
-def _vtkhdf(path: Path) -> int:
-    with h5py.File(path) as file:
-        root = file["VTKHDF"]
-        n = int(root["Steps"].attrs["NSteps"])
-        assert (np.diff(root["Steps/Values"]) > 0).all()
-        for name in (f"{data}/{name}" for data in ("PointData", "CellData") for name in root[data]):
-            offsets = root["Steps"][name.replace("/", "Offsets/")]
-            assert np.isfinite(root[name]).all(), name
-            assert not n or offsets[n - 1] < len(root[name])
-    return n
 
 
 def _xdmf(path: Path) -> int:
@@ -131,13 +117,6 @@ def same_run(one: Path, other: Path, tolerance: float, fields: float = 0.0) -> N
                     arrays[1][key],
                     tolerance if key == "load" else fields or tolerance,
                 )
-    names = [folder / "fields.vtkhdf" for folder in (one, other)]
-    if all(name.exists() for name in names):
-        with h5py.File(names[0]) as first, h5py.File(names[1]) as second:
-            arrays = [dict(all_arrays(file["VTKHDF"])) for file in (first, second)]
-            assert set(arrays[0]) == set(arrays[1])
-            for key, values in arrays[0].items():
-                _agree(f"fields.vtkhdf/{key}", values, arrays[1][key], fields or tolerance)
 
 
 def _agree(name: str, a: np.ndarray, b: np.ndarray, tolerance: float) -> None:

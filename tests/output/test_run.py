@@ -73,7 +73,7 @@ def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
         curve.pop("seconds")
     assert curves[0] == curves[1]
     there, here = ({p.name for p in (tmp_path / name).iterdir()} for name in ("with", "without"))
-    assert there - here == {"fields.vtkhdf", "fields.xdmf", "fields.h5", "fields"}
+    assert there - here == {"fields.xdmf", "fields.h5", "fields"}
     assert not here - there
     with pytest.raises(
         InputError, match=r"without: has no fields: it was solved with output\.fields = false\."
@@ -337,3 +337,47 @@ def test_a_new_run_removes_the_picture_of_the_old_one(tmp_path):
         (tmp_path / name).touch()
     solve_scene(scene(0.3, 1), tmp_path, MPI.COMM_SELF)
     assert [name for name in (PICTURE, "notes.txt") if (tmp_path / name).exists()] == ["notes.txt"]
+
+
+def test_keys_of_older_scenes_mean_the_same():
+    """stress and points, which fields has taken the place of; together with it they are unknown."""
+
+    def level(**output):
+        return scene(0.25, 1, output=output).output.fields
+
+    assert [level(), level(fields=True), level(fields=False), level(stress=True)] == [
+        "cells",
+        "cells",
+        False,
+        "nodes",
+    ]
+    assert [level(points=True), level(stress=False, points=False, fields=True)] == [
+        "points",
+        "cells",
+    ]
+    with pytest.raises(InputError, match=r"output\.stress = true is not a known key; .*fields"):
+        level(fields="cells", stress=True)
+    with pytest.raises(
+        InputError,
+        match=r"output\.fields = \"all\" must be false, 'cells', 'nodes' or 'points'",
+    ):
+        level(fields="all")
+
+
+@pytest.mark.mpi
+def test_the_fields_do_not_depend_on_the_ranks(comm, tmp_path_factory):
+    """Mesh and values of a run on all ranks and on one."""
+    folders = [
+        comm.bcast(tmp_path_factory.mktemp("run") if comm.rank == 0 else None) for _ in range(2)
+    ]
+    for folder, c in zip(folders, (comm, MPI.COMM_SELF), strict=True):
+        if c == comm or comm.rank == 0:
+            solve_scene(scene(0.25, 1, output={"fields": "points"}), folder, c)
+    if comm.rank == 0:
+        whole, alone = (h5py.File(folder / "fields.h5") for folder in folders)
+        for name in ("mesh/coordinates", "mesh/cells", "mesh/body", "points/coordinates"):
+            np.testing.assert_allclose(whole[name], alone[name], atol=1e-14)
+        for name in ("displacement", "contact_pressure", "cells/stress", "stress_xx"):
+            values = alone[f"{name}/0001"][()]
+            atol = 1e-9 * np.abs(values).max()
+            np.testing.assert_allclose(whole[f"{name}/0001"], values, atol=atol)

@@ -8,7 +8,7 @@ import pytest
 from archord.cli import run as command
 from archord.postprocess.export import export_vtk
 from archord.postprocess.run import Run
-from tests.output.vtk_reader import VtkFile
+from tests.postprocess.vtk_reader import VtkFile
 
 _QUADRATIC_TRIANGLE = 22  # VTK's number
 

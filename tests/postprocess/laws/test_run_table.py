@@ -61,7 +61,7 @@ def synthetic(x, yields=True, keep=None, **changes):
     columns["plastic_dissipation"] = lost * dR * unit
     columns = {name: list(np.asarray(values)[:keep]) for name, values in columns.items()} | changes
     return SimpleNamespace(
-        folder=SCENES, scene=scene, columns=columns, units={"delta": "mm", "P": "N/mm"}, is_joint=True,
+        folder=SCENES, scene=scene, columns=columns, units={"delta": "mm", "P": "N/mm"},
         has_contact=True, steps=len(columns["P"]), number=lambda step: step, summary={"versions": {}},
     )  # fmt: skip
 
@@ -163,11 +163,7 @@ def general(**changes):
     """A run of a general scene whose pin is pushed along -x and touches at 0.13."""
     scene = load_scene(SCENES / "bushing.toml", ["load.displacement=-0.8"])
     run, q = synthetic(path(0.8), yields=False), path(0.8)
-    run.scene, run.is_joint, run.units = (
-        scene,
-        False,
-        {"pull displacement": "mm", "pull force": "N/mm"},
-    )
+    run.scene, run.units = scene, {"pull displacement": "mm", "pull force": "N/mm"}
     steps = np.append(0.0, q)  # the sleeve is pressed in first
     run.columns = {
         "pull displacement": -steps,
