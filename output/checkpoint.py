@@ -55,8 +55,9 @@ def halt(
 ) -> Checkpoint:
     """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step``
     says, from which `resume` goes on. Collective."""
-    system, increment = order.system, position.increment
-    u, levels = np.split(system.equilibrium.state(), [2 * system.equilibrium.n_local])
+    system = order.system
+    unknowns = system.equilibrium.unknowns
+    u, levels = unknowns.split(unknowns.state())
     scalars = {
         "measures": asdict(m),
         "step": asdict(step),
@@ -67,10 +68,11 @@ def halt(
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": levels.tolist(),
     }
-    arrays = order.collect_history() | {"fields/displacement": order.collect(u.reshape(-1, 2))}
-    if increment is not None:
-        scalars["level_increment"] = increment[len(u) :].tolist()
-        arrays["fields/increment"] = order.collect(increment[: len(u)].reshape(-1, 2))
+    arrays = order.collect_history() | {"fields/displacement": order.collect(u)}
+    if position.increment is not None:
+        of_nodes, of_levels = unknowns.split(position.increment)
+        scalars["level_increment"] = of_levels.tolist()
+        arrays["fields/increment"] = order.collect(of_nodes)
     mesh = order.mesh_digest() if system.comm.rank == 0 else ""
     return Checkpoint(m.step, scene, mesh, scalars, arrays)
 

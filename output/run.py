@@ -100,7 +100,9 @@ def solve_scene(
         failed: dict[str, Any] = {}
         try:
             with (
-                nullcontext(interrupt) if interrupt else Interrupt() as system.equilibrium.interrupt
+                nullcontext(interrupt)
+                if interrupt
+                else Interrupt() as system.equilibrium.evaluation.interrupt
             ):
                 position, work = output.begin()
                 # what a coarse mesh went through before a halt is not kept

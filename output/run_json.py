@@ -119,7 +119,7 @@ class Report:
         content = self.content | {
             "told": [asdict(one) for one in self._told.values()],
             # a matrix may decide otherwise later
-            "linear_solver": self.system.equilibrium.choice.words(),
+            "linear_solver": self.system.equilibrium.linear.choice.words(),
             "totals": self._totals(),
             "seconds": self._seconds(),
             "error_estimates": self._errors(),
@@ -138,7 +138,7 @@ class Report:
         return {
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
-            "factorisations": self.system.equilibrium.tangent.factorisations
+            "factorisations": self.system.equilibrium.linear.tangent.factorisations
             + before.get("factorisations", 0),
             "residual_evaluations": counts.get("return mapping", 0)
             + before.get("residual_evaluations", 0),

@@ -93,14 +93,14 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         [DeadLoad("pin", (0.0, -1.0), core)] if ring else [],
         drives=[Drive("", control="force")] if by_force and not ring else [],
         degree=analysis.degree,
-        symmetry=SYMMETRY * scene.thickness,
+        symmetry=SYMMETRY,
         load_name="P" if by_force else "delta",
         travel=travel,
         tolerance=analysis.tolerance,
         max_iterations=analysis.max_iterations,
         guess=guess,
         from_rest=g.dR > 0,
-        kinematics=kinematics(analysis.plane),
+        kinematics=kinematics(analysis.plane, scene.thickness),
         coarser=(lambda: joint_problem(_coarser(scene), comm)) if analysis.coarse_start else None,
     )
 

@@ -129,9 +129,8 @@ class JointAccount:
         area = SYMMETRY * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
         at_rest = 0.0 if area else self.scene.E_star * self.scene.thickness * abs(delta)
         scale = max(abs(P), *(abs(m.P) for m in before), at_rest)
-        nodal = joint.problem.symmetry * max(
-            joint.equilibrium.reaction_norm, joint.equilibrium.largest_reaction
-        )
+        at = joint.equilibrium
+        nodal = joint.problem.whole * max(at.evaluation.reaction_norm, at.largest_reaction)
         if scale <= _NOTHING * nodal:  # all that acts is a press fit, which balances by itself
             scale = nodal
         eps = float(np.mean([semi_angle(p) for p in arcs]))

@@ -8,8 +8,8 @@ work. Where a drive prescribes the conjugate (a force on what moves; the displac
 whose force is a Lagrange multiplier then), the level is unknown.
 
 A body that nothing but prescribed means holds would leave the tangent of all displacements
-singular. Three of its displacements become levels of drives without force, its anchors, which
-change nothing.
+singular. As many of its displacements as it has rigid motions become levels of drives without
+force, its anchors, which change nothing.
 """
 
 from __future__ import annotations
@@ -39,59 +39,103 @@ _PART = 1e-3  # of a combination of means that displacements cannot follow
 
 class Drives:
     """The drives of ``problem`` in the displacement space ``V``, which move the rigid surfaces of
-    ``contact``, too; ``stiffness`` is that of the stiffest body. Collective; raises ValueError.
+    ``contact``, too. Collective; raises ValueError.
 
-    ``names`` are the problem's; in arrays of ``d`` drives the anchors follow. ``fixed`` ``(n_local,
-    2)`` are the prescribed displacements; ``rate`` ``(d, n_local, 2)`` and ``applied`` ``(d,
-    n_owned, 2)``, on the modelled part, are per unit of the levels, which are displacements where
-    ``moving`` ``(d,)``. The levels ``unknown`` ``(m,)`` are solved for in units of ``weight``
-    ``(m,)``, as are their equations: displacements of bodies, and forces. ``warnings`` are of
-    displacements that nodes do not follow.
+    Arrays of ``l`` drives, of which the problem's come first and the anchors follow, in the order
+    in which they come to be:
+
+    names : names of the problem's drives
+    stiffness : force per displacement of the stiffest body
+    warnings : displacements that nodes do not follow
+    rate : (l, n_local, d) displacements of the nodes per unit of each level
+    applied : (l, n_owned, d) forces on the nodes, on the modelled part, per unit of each level
+    moving : (l,) whether the level is a displacement
+    unknown : (m,) levels that are solved for
+    fixed : (n_local, d) whether a displacement is prescribed
+    weight : (m,) units of the unknown levels and of their equations
+    unknown_rate, unknown_load : (m, n, d) ``rate`` and ``applied`` per unit of the unknown levels
     """
 
-    def __init__(
-        self, problem: Problem, V: fem.FunctionSpace, contact: Contact, stiffness: float
-    ) -> None:
-        self.problem, self.V, self.comm, index_map = problem, V, V.mesh.comm, V.dofmap.index_map
-        self.n_owned, self._n_local = (
-            index_map.size_local,
-            index_map.size_local + index_map.num_ghosts,
-        )
-        self._x, self.stiffness = V.tabulate_dof_coordinates()[:, :2], stiffness
+    def __init__(self, problem: Problem, V: fem.FunctionSpace, contact: Contact) -> None:
+        index_map = V.dofmap.index_map
+        self.problem = problem
+        self.kinematics = problem.kinematics
+        self.V = V
+        self.comm = V.mesh.comm
+        self.dimension = self.kinematics.dimension
+        self.n_owned = index_map.size_local
+        self._n_local = index_map.size_local + index_map.num_ghosts
+        self._x = V.tabulate_dof_coordinates()[:, : self.dimension]
         self._drives = problem.all_drives
-        self.names = names = [drive.name for drive in self._drives]
-        self.applied = np.zeros((len(names), self.n_owned, 2))
+        self.names = [drive.name for drive in self._drives]
+        self.stiffness = self._stiffest()
         self._prescribed = Prescribed(problem, V, self._drives)
-        self.rate = self._prescribed.rate
         self._holder = self._prescribed.holder
         self.warnings = self._prescribed.warnings
-        for load in problem.loads:
-            self.applied[names.index(load.drive)] += self._nodal_forces(load)
-        for mean in problem.means:
-            self.applied[names.index(mean.drive)] = self._mean_motion(mean) / problem.symmetry
-        controls = {drive.name: drive.control for drive in self._drives}
-        bodies = {mean.drive: problem.body_of(mean.facets) for mean in problem.means}
-        prescribed = [name for name in bodies if controls[name] == "displacement"]
-        moves = problem.moving_drives()
-        unknown = [name for name in moves if controls[name] == "force"] + prescribed
-        anchors = self._anchors({bodies[name].name: bodies[name] for name in prescribed}.values())
-        self.rate = np.concatenate([self.rate, anchors])
-        self.applied = np.pad(self.applied, ((0, len(anchors)), (0, 0), (0, 0)))
-        self.moving = np.append(np.isin(names, list(moves)), np.ones(len(anchors), dtype=bool))
-        self.unknown = np.flatnonzero(
-            np.append(np.isin(names, unknown), np.ones(len(anchors), dtype=bool))
-        )
-        for interface in contact.interfaces:
-            disc, given = interface.surfaces[0], interface.interaction.surfaces[0]
-            if isinstance(disc, RigidSurface) and isinstance(given, Rigid):
-                rates = [given.moved_by().get(name, (0.0, 0.0)) for name in names]
-                disc.rate = np.array(rates + [(0.0, 0.0)] * len(anchors))
+
+        anchors = self._anchors(self._bodies_of_prescribed_means())
+        self.rate = np.concatenate([self._prescribed.rate, anchors])
+        self.applied = np.zeros((len(self.rate), self.n_owned, self.dimension))
+        self._apply_loads()
+        self.moving = self._with_anchors(problem.moving_drives())
+        self.unknown = np.flatnonzero(self._with_anchors(self._unknown_names()))
+        self._move_discs(contact)
         self.fixed = self._holder >= 0
         self._require_independent()
         largest = self._largest_rates(contact)
         self.weight = np.array([self._weight(level, largest) for level in self.unknown])
-        self.unknown_rate = self.weight[:, None, None] * self.rate[self.unknown]
-        self.unknown_load = self.weight[:, None, None] * self.applied[self.unknown]
+        weight = self.weight[:, None, None]
+        self.unknown_rate = weight * self.rate[self.unknown]
+        self.unknown_load = weight * self.applied[self.unknown]
+
+    def _stiffest(self) -> float:
+        moduli = [body.material.elastic_tangent[0, 0] for body in self.problem.bodies]
+        depth = np.max(self.kinematics.measure(self._x), initial=0.0)
+        return float(max(moduli)) * self.comm.allreduce(float(depth), op=MPI.MAX)
+
+    def _bodies_of_prescribed_means(self) -> list[Body]:
+        """The bodies of means whose motion is prescribed, each once."""
+        by_displacement = self._controlled("displacement")
+        found = {}
+        for mean in self.problem.means:
+            body = self.problem.body_of(mean.facets)
+            if mean.drive in by_displacement:
+                found[body.name] = body
+        return list(found.values())
+
+    def _controlled(self, control: str) -> set[str]:
+        """Names of the drives under this control."""
+        return {drive.name for drive in self._drives if drive.control == control}
+
+    def _unknown_names(self) -> set[str]:
+        """Names of the drives that prescribe what is conjugate to their level."""
+        means = {mean.drive for mean in self.problem.means}
+        by_force = self.problem.moving_drives() & self._controlled("force")
+        return by_force | (means & self._controlled("displacement"))
+
+    def _with_anchors(self, names: Iterable[str]) -> np.ndarray:
+        """Which levels ``(l,)`` are of the drives of these ``names``, or of anchors."""
+        chosen = np.ones(len(self.rate), dtype=bool)
+        chosen[: len(self.names)] = np.isin(self.names, list(names))
+        return chosen
+
+    def _apply_loads(self) -> None:
+        for load in self.problem.loads:
+            self.applied[self.names.index(load.drive)] += self._nodal_forces(load)
+        for mean in self.problem.means:
+            motion = self._mean_motion(mean)
+            self.applied[self.names.index(mean.drive)] = motion / self.problem.whole
+
+    def _move_discs(self, contact: Contact) -> None:
+        """Give rigid surfaces their rates ``(l, d)``."""
+        for interface in contact.interfaces:
+            disc = interface.surfaces[0]
+            given = interface.interaction.surfaces[0]
+            if isinstance(disc, RigidSurface) and isinstance(given, Rigid):
+                rates = given.moved_by()
+                disc.rate = np.zeros((len(self.rate), self.dimension))
+                for level, name in enumerate(self.names):
+                    disc.rate[level] = rates.get(name, 0.0)
 
     def _require_independent(self) -> None:
         """Raise ValueError where displacements that are free cannot give prescribed means all their
@@ -99,23 +143,25 @@ class Drives:
         means = self.unknown[~self.moving[self.unknown]]
         if not len(means):
             return
-        free = np.where(self.fixed[: self.n_owned], 0.0, self.applied[means]).reshape(
-            len(means), -1
-        )
-        rates = self.rate[self.unknown[self.moving[self.unknown]], : self.n_owned]
-        of_levels = self.comm.allreduce(np.tensordot(self.applied[means], rates, ((1, 2), (1, 2))))
+        moving = self.unknown[self.moving[self.unknown]]
+        motions = self.applied[means]
+        is_fixed = self.fixed[: self.n_owned]
+        free = np.where(is_fixed, 0.0, motions).reshape(len(means), -1)
+        rates = self.rate[moving, : self.n_owned]
+        of_levels = self.comm.allreduce(np.tensordot(motions, rates, ((1, 2), (1, 2))))
         products = self.comm.allreduce(free @ free.T) + of_levels @ of_levels.T
-        lengths = np.sqrt(self.comm.allreduce((self.applied[means] ** 2).sum(axis=(1, 2))))
+        lengths = np.sqrt(self.comm.allreduce((motions**2).sum(axis=(1, 2))))
         smallest, modes = np.linalg.eigh(products / np.outer(lengths, lengths))
         if smallest[0] < _DEPENDENT:
             names = [repr(self.names[level]) for level in means[np.abs(modes[:, 0]) > _PART]]
             raise ValueError(
-                f"the mean motions of {' and '.join(names)} cannot be prescribed: supports, or each other, decide on "
-                "them already; take one away, or give it a force"
+                f"the mean motions of {' and '.join(names)} cannot be prescribed: "
+                "supports, or each other, decide on them already; "
+                "take one away, or give it a force"
             )
 
     def _largest_rates(self, contact: Contact) -> Array:
-        """The largest displacement ``(d,)`` of a node or a disc per unit of each level. Raises
+        """The largest displacement ``(l,)`` of a node or a disc per unit of each level. Raises
         ValueError where a level moves nothing."""
         largest = np.abs(self.rate).max(axis=(1, 2), initial=0.0)
         for disc in contact.rigid:
@@ -123,7 +169,8 @@ class Drives:
         self.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         for level in np.flatnonzero(self.moving & (largest == 0)):
             raise ValueError(
-                f"the drive {self.names[level]!r} moves nothing: supports hold all that it would move"
+                f"the drive {self.names[level]!r} moves nothing: "
+                "supports hold all that it would move"
             )
         return largest
 
@@ -135,17 +182,16 @@ class Drives:
         return self.stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
 
     def values(self, factor: float) -> Array:
-        """What the drives prescribe ``(d,)`` at the load ``factor``."""
-        values = [drive.value(factor) for drive in self._drives]
-        return np.array(values + [0.0] * (len(self.rate) - len(values)))
+        """What the drives prescribe ``(l,)`` at the load ``factor``."""
+        values = np.zeros(len(self.rate))
+        values[: len(self._drives)] = [drive.value(factor) for drive in self._drives]
+        return values
 
     def pushes(self, factor: float) -> bool:
         """Whether a force that is prescribed acts at the load ``factor``."""
         loaded = {load.drive for load in self.problem.loads}
-        by_force = [
-            drive for drive in self._drives if drive.control == "force" or drive.name in loaded
-        ]
-        return any(drive.value(factor) for drive in by_force)
+        forces = loaded | self._controlled("force")
+        return any(drive.value(factor) for drive in self._drives if drive.name in forces)
 
     def course(self, factor: float) -> Array:
         """Where the path is at the load ``factor``: the problem's drives over their largest values,
@@ -154,60 +200,77 @@ class Drives:
         return np.append(self.values(factor)[: len(largest)] / largest, self.problem.fitted(factor))
 
     def held_by(self, name: str) -> np.ndarray:
-        """Which displacements ``(n_owned, 2)`` the supports ``name`` prescribe, the last ones where
+        """Which displacements ``(n_owned, d)`` the supports ``name`` prescribe, the last ones where
         several do."""
         return self._holder[: self.n_owned] == self._prescribed.names.index(name)
 
     def share_of(self, name: str) -> Array:
-        """The part ``(n_owned, 2)`` that the supports ``name`` have of the reaction at each
+        """The part ``(n_owned, d)`` that the supports ``name`` have of the reaction at each
         node."""
         return self._prescribed.share_of(name)[: self.n_owned]
 
+    def nodes_of(self, body: Body) -> np.ndarray:
+        """Nodes ``(n,)`` of the ``body`` on this rank, ghosts included."""
+        return np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
+
     def rigid_modes(self, body: Body) -> Array:
-        """The rigid motions ``(3, n_local, 2)`` of the ``body``: along x, along y, and turning.
-        Collective."""
-        nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
-        x = self._x[nodes] / self.comm.allreduce(
-            np.abs(self._x[nodes]).max(initial=0.0), op=MPI.MAX
-        )
-        modes = np.zeros((3, self._n_local, 2))
-        modes[0, nodes, 0] = modes[1, nodes, 1] = 1.0
-        modes[2, nodes] = np.stack([-x[:, 1], x[:, 0]], axis=1)
+        """The rigid motions ``(k, n_local, d)`` of the ``body``, of size 1 about. Collective."""
+        nodes = self.nodes_of(body)
+        farthest = np.abs(self._x[nodes]).max(initial=0.0)
+        size = self.comm.allreduce(farthest, op=MPI.MAX)
+        modes = np.zeros((self.kinematics.n_rigid, self._n_local, self.dimension))
+        modes[:, nodes] = self.kinematics.rigid_motions(self._x[nodes] / size)
         return modes
 
     def held(self, body: Body) -> bool:
         """Whether supports alone keep the ``body`` from moving rigidly. Collective."""
         rows = self.rigid_modes(body)[:, self._holder >= 0]
-        smallest, _, largest = np.linalg.eigvalsh(self.comm.allreduce(rows @ rows.T))
-        return bool(smallest > MOVABLE * largest)
+        sizes = np.linalg.eigvalsh(self.comm.allreduce(rows @ rows.T))
+        return bool(sizes[0] > MOVABLE * sizes[-1])
 
     def _anchors(self, bodies: Iterable[Body]) -> Array:
-        """The rates ``(a, n_local, 2)`` of three anchors for each of the ``bodies`` that supports
-        do not hold."""
+        """The rates ``(a, n_local, d)`` of the anchors of those ``bodies`` that supports do not
+        hold, one for each rigid motion. Collective."""
         found: list[Array] = []
         for body in bodies:
             if self.held(body):
                 continue
-            nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
+            nodes = self.nodes_of(body)
             nodes = nodes[(self._holder[nodes] < 0).all(axis=1)]
             places = np.concatenate(self.comm.allgather(self._x[nodes[nodes < self.n_owned]]))
-            first = places[np.lexsort(places.T)[0]]
-            away = places[np.argmax(np.linalg.norm(places - first, axis=1))] - first
-            across = int(abs(away[0]) > abs(away[1]))
-            for place, axis in ((first, 0), (first, 1), (first + away, across)):
-                here = nodes[
-                    np.abs(self._x[nodes] - place).max(axis=1) < _SAME_PLACE * np.abs(away).max()
-                ]
-                found.append(np.zeros((self._n_local, 2)))
-                found[-1][here, axis] = 1.0
+            near = _SAME_PLACE * float(np.ptp(places, axis=0).max())
+            for place, axis in self._anchored(places):
+                here = nodes[np.abs(self._x[nodes] - place).max(axis=1) < near]
+                rate = np.zeros((self._n_local, self.dimension))
+                rate[here, axis] = 1.0
+                found.append(rate)
                 self._holder[here, axis] = len(self._prescribed.names)
-        return np.array(found).reshape(len(found), self._n_local, 2)
+        return np.array(found).reshape(len(found), self._n_local, self.dimension)
+
+    def _anchored(self, places: Array) -> list[tuple[Array, int]]:
+        """Places and axes of displacements that rigid motions do not leave all zero: of the first
+        of ``places`` ``(n, d)``, and of the farthest from it, across the way there."""
+        first = places[np.lexsort(places.T)[0]]
+        along = [axis for axis in range(self.dimension) if self._translates(axis)]
+        anchors = [(first, axis) for axis in along]
+        if len(anchors) < self.kinematics.n_rigid:
+            farthest = places[np.argmax(np.linalg.norm(places - first, axis=1))]
+            away = np.abs(farthest - first)
+            anchors.append((farthest, int(away[0] > away[1])))
+        return anchors
+
+    def _translates(self, axis: int) -> bool:
+        """Whether bodies can move rigidly along an ``axis``."""
+        origin = np.zeros((1, self.dimension))
+        return bool(self.kinematics.rigid_motions(origin)[:, 0, axis].any())
 
     def measure(self, cells: str = "", facets: str = "") -> Any:
-        """The measure of a set of cells, or of facets."""
-        mesh, sets = self.V.mesh, self.problem.mesh
+        """The measure of a set of cells, or of facets, as drawn."""
+        mesh = self.V.mesh
+        sets = self.problem.mesh
         entities = np.unique(sets.cells_in(cells) if cells else sets.facets_in(facets))
-        tags = meshtags(mesh, 2 if cells else 1, entities.astype(np.int32), 1)
+        dimension = mesh.topology.dim if cells else mesh.topology.dim - 1
+        tags = meshtags(mesh, dimension, entities.astype(np.int32), 1)
         rule = {"quadrature_degree": LOAD_DEGREE}
         measure = ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
         if not self.integral(fem.Constant(mesh, 1.0) * measure):
@@ -216,47 +279,58 @@ class Drives:
             )
         return measure
 
+    def swept(self, integrand: Any) -> Any:
+        """The ``integrand``, in UFL, times what areas and lengths stand for: around an axis for a
+        ring."""
+        return integrand * self.kinematics.measure(ufl.SpatialCoordinate(self.V.mesh))
+
     def integral(self, form: Any) -> float:
         """The ``form`` without arguments, over all ranks."""
         return self.comm.allreduce(fem.assemble_scalar(fem.form(form)))
 
     def _vector(self, form: Any) -> Array:
-        """The linear ``form`` at the nodes ``(n_owned, 2)``."""
+        """The linear ``form`` at the nodes ``(n_owned, d)``."""
         vector = fem.assemble_vector(fem.form(form))
         vector.scatter_reverse(InsertMode.add)
-        return vector.array[: 2 * self.n_owned].reshape(-1, 2)
+        own = vector.array[: self.dimension * self.n_owned]
+        return own.reshape(-1, self.dimension)
 
     def _nodal_forces(self, load: DeadLoad) -> Array:
-        """Forces ``(n_owned, 2)`` on the modelled part per unit of the drive."""
-        mesh, v, measure = (
-            self.V.mesh,
-            ufl.TestFunction(self.V),
-            self.measure(load.cells, load.facets),
-        )
+        """Forces ``(n_owned, d)`` on the modelled part per unit of the drive."""
+        mesh = self.V.mesh
+        v = ufl.TestFunction(self.V)
+        measure = self.measure(load.cells, load.facets)
         if load.pressure:
-            normal = ufl.FacetNormal(mesh)
-            return self._vector(-fem.Constant(mesh, load.pressure) * ufl.inner(normal, v) * measure)
+            along_normal = ufl.inner(ufl.FacetNormal(mesh), v)
+            return self._vector(
+                -fem.Constant(mesh, load.pressure) * self.swept(along_normal) * measure
+            )
         force = fem.Constant(mesh, np.array(load.force))
-        density = (
-            fem.Constant(mesh, 1.0)
-            if load.density is None
-            else load.density(ufl.SpatialCoordinate(mesh))
-        )
-        total = self.integral(density * measure)
-        return self._vector(density * ufl.inner(force, v) * measure) / (
-            self.problem.symmetry * total
-        )
+        density = fem.Constant(mesh, 1.0)
+        if load.density is not None:
+            density = load.density(ufl.SpatialCoordinate(mesh))
+        total = self.integral(self.swept(density) * measure)
+        forces = self._vector(self.swept(density) * ufl.inner(force, v) * measure)
+        return forces / (self.problem.whole * total)
 
     def _mean_motion(self, mean: Mean) -> Array:
-        """Derivative ``(n_owned, 2)`` of the mean motion by the displacements of the nodes."""
-        mesh, v, ds = self.V.mesh, ufl.TestFunction(self.V), self.measure(facets=mean.facets)
-        x, one = ufl.SpatialCoordinate(mesh), fem.Constant(mesh, 1.0)
-        length = self.integral(one * ds)
+        """Derivative ``(n_owned, d)`` of the mean motion by the displacements of the nodes. Raises
+        ValueError for a rotation of a ring."""
+        mesh = self.V.mesh
+        v = ufl.TestFunction(self.V)
+        ds = self.measure(facets=mean.facets)
+        length = self.integral(self.swept(fem.Constant(mesh, 1.0)) * ds)
+        if not self.kinematics.is_plane:
+            if mean.axis == self.dimension:
+                raise ValueError(f"the mean {mean.name!r} is a rotation, which no ring has")
+            return self._vector(self.swept(v[mean.axis]) * ds) / length
+        x = ufl.SpatialCoordinate(mesh)
         centre = np.array([self.integral(x[i] * ds) for i in (0, 1)]) / length
         arm = x - fem.Constant(mesh, centre)
         lever = np.zeros(2) if mean.point is None else np.array(mean.point) - centre
-        rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis] / self.integral(
-            ufl.inner(arm, arm) * ds
-        )
-        shift, turn = (fem.Constant(mesh, c) for c in (np.eye(3)[mean.axis, :2] / length, rotation))
-        return self._vector((ufl.inner(shift, v) + turn * (arm[0] * v[1] - arm[1] * v[0])) * ds)
+        by_rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis]
+        inertia = self.integral(ufl.inner(arm, arm) * ds)
+        shift = fem.Constant(mesh, np.eye(3)[mean.axis, :2] / length)
+        turn = fem.Constant(mesh, by_rotation / inertia)
+        moment = arm[0] * v[1] - arm[1] * v[0]
+        return self._vector((ufl.inner(shift, v) + turn * moment) * ds)

@@ -75,8 +75,6 @@ class _Expansion:
             "couplings": (),
             "means": self.means,
             "drives": self.drives,
-            "symmetry": stated.symmetry * (stated.thickness or 1.0),
-            "thickness": None,
         }
         slide = 0.0
         if self.given_loads:

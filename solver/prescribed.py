@@ -3,6 +3,9 @@ node.
 
 What fixes a node wins over a displacement. Whatever else meets at a node must move it alike. So the
 order of supports has no part in a result.
+
+Nodes on the axis of an axisymmetric problem cannot move away from it, whatever the supports say:
+their radial displacement is prescribed, too.
 """
 
 from __future__ import annotations
@@ -18,17 +21,18 @@ from archord.geometry.basis import Array
 from archord.solver.problem import Dirichlet, Drive, Problem
 
 _ALIKE = 1e-9  # of the larger of two displacements: a difference that is round-off
-_AXES = "xy"
-Place = tuple[float, float]
+Place = tuple[float, ...]
 
 
 @dataclass
 class _Motion:
     """What the supports of one name prescribe for one set along one axis.
 
-    nodes (k,): block dofs on this rank, ghosts included rate (d, k): their displacement per unit of
-    each drive moves: whether any drive moves the set; if not, it is fixed together: whether the set
-    must move as one, as it does under a force, or where both axes are prescribed
+    nodes : (k,) block dofs on this rank, ghosts included
+    rate : (l, k) their displacement per unit of each drive
+    moves : whether any drive moves the set; if not, it is fixed
+    together : whether the set must move as one, as it does under a force, or where other axes are
+        prescribed, too
     """
 
     name: str
@@ -49,36 +53,61 @@ class Prescribed:
     """What the supports of ``problem`` prescribe for the nodes of ``V``, by its ``drives``.
     Collective.
 
-    names: those of the supports rate (d, n_local, 2): displacements of the nodes per unit of each
-    drive holder (n_local, 2): number of the name that a displacement is prescribed by, the last of
-    several; -1 if it is free warnings: displacements that nodes do not follow, as supports fix them
+    names : names of the supports
+    rate : (l, n_local, d) displacements of the nodes per unit of each drive
+    holder : (n_local, d) number of the name that a displacement is prescribed by, the last of
+        several; -1 if it is free, the number behind the last if the kinematics demand it
+    warnings : displacements that nodes do not follow, as supports fix them
 
-    Raises ValueError on all ranks where supports contradict each other.
+    Raises ValueError on all ranks where supports contradict each other, or nodes lie beyond the
+    axis.
     """
 
     def __init__(self, problem: Problem, V: fem.FunctionSpace, drives: list[Drive]) -> None:
-        self._problem, self._V, self._drives = problem, V, drives
+        kinematics = problem.kinematics
+        d = kinematics.dimension
+        self._problem = problem
+        self._V = V
+        self._drives = drives
         self._comm = V.mesh.comm
-        self._x = V.tabulate_dof_coordinates()[:, :2]
+        self._axes = kinematics.axes
+        self._x = V.tabulate_dof_coordinates()[:, :d]
         self._size = self._comm.allreduce(np.abs(self._x).max(initial=0.0), op=MPI.MAX)
         n_local = len(self._x)
         self.names = list(dict.fromkeys(s.name for s in problem.supports))
-        self.rate = np.zeros((len(drives), n_local, 2))
-        self.holder = np.full((n_local, 2), -1)
+        self.rate = np.zeros((len(drives), n_local, d))
+        self.holder = np.full((n_local, d), -1)
         self.warnings: list[str] = []
-        self._holds = np.zeros((len(self.names), n_local, 2), dtype=bool)
-        motions = self._collected()
+        self._holds = np.zeros((len(self.names), n_local, d), dtype=bool)
         self._course = _courses(drives)
+        motions = self._collected()
         fixing = [motion for motion in motions if not motion.moves]
         moving = [motion for motion in motions if motion.moves]
         for motion in fixing:
             self._note(motion, motion.nodes)
+        if kinematics.has_hoop:
+            fixing.append(self._axis())
+        self._prescribe(moving, fixing)
+
+    def _axis(self) -> _Motion:
+        """The axis, which its nodes do not leave."""
+        r = self._x[:, 0]
+        near = _ALIKE * self._size
+        if self._comm.allreduce(bool((r < -near).any()), op=MPI.LOR):
+            raise ValueError("axisymmetric bodies have no places at x < 0: x is the radius")
+        nodes = np.flatnonzero(r <= near)
+        held = self.holder[:, 0]
+        held[nodes] = np.where(held[nodes] < 0, len(self.names), held[nodes])
+        return _Motion("the axis", "the axis", 0, nodes, np.zeros((len(self._drives), len(nodes))))
+
+    def _prescribe(self, moving: list[_Motion], fixing: list[_Motion]) -> None:
+        """Prescribe what moves, where nothing fixes it. Raises ValueError for contradictions."""
         fixed = self.holder >= 0
         largest = np.array([np.abs(self._displaced(motion)).max(initial=0.0) for motion in moving])
         self._comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         self._require_free(moving, fixing, fixed, _ALIKE * largest)
         self._require_alike(moving, fixed, _ALIKE * largest)
-        meeting = np.zeros((n_local, 2))
+        meeting = np.zeros(self.holder.shape)
         for motion in moving:
             free = ~fixed[motion.nodes, motion.axis]
             nodes = motion.nodes[free]
@@ -109,7 +138,7 @@ class Prescribed:
                 continue
             if (*key, s.drive) in given:
                 raise ValueError(
-                    f"{s.name!r} gives {s.facets!r} two rates in {_AXES[s.axis]} by the drive {s.drive!r}"
+                    f"{s.name!r} gives {s.facets!r} two rates in {self._axes[s.axis]} by the drive {s.drive!r}"
                 )
             given.add((*key, s.drive))
             motion = found[key]
@@ -117,7 +146,8 @@ class Prescribed:
             motion.moves = True
             motion.together |= s.drive in by_force
         for (name, facets, axis), motion in found.items():
-            motion.together |= (name, facets, 1 - axis) in found
+            others = set(range(len(self._axes))) - {axis}
+            motion.together |= any((name, facets, other) in found for other in others)
         return [found[key] for key in sorted(found)]
 
     def _rate(self, support: Dirichlet, nodes: np.ndarray) -> Array | float:
@@ -151,7 +181,7 @@ class Prescribed:
         free = self._comm.allreduce(free)
         for m, f, place in self._everywhere(met):
             motion, fix = moving[m], fixing[f]
-            axis, at = _AXES[motion.axis], _at(place)
+            axis, at = self._axes[motion.axis], _at(place)
             if not free[m]:
                 raise ValueError(
                     f"{motion} moves nothing: supports fix all its nodes in {axis}, {fix} the one at {at}; "
@@ -181,14 +211,14 @@ class Prescribed:
             met += self._first_place(a, b, common[unlike & ~fixed[common, first.axis]])
         for a, b, place in self._everywhere(met):
             raise ValueError(
-                f"{moving[a]} and {moving[b]} move their common node at {_at(place)} differently in "
-                f"{_AXES[moving[a].axis]}: leave it out of one of the sets, let both move alike, or load one of them "
-                "by a pressure or a distributing coupling"
+                f"{moving[a]} and {moving[b]} move their common node at {_at(place)} "
+                f"differently in {self._axes[moving[a].axis]}: leave it out of one of the sets, "
+                "let both move alike, or load one of them by a pressure or a distributing coupling"
             )
 
     def _first_place(self, a: int, b: int, nodes: np.ndarray) -> list[tuple[int, int, Place]]:
-        """Where the motions ``a`` and ``b`` meet first, by x and y, at ``nodes`` of this rank;
-        nothing without any."""
+        """Where the motions ``a`` and ``b`` meet first, by coordinates, at ``nodes`` of this
+        rank; nothing without any."""
         digits = _ALIKE * self._size
         places = [tuple((np.round(x / digits) * digits + 0.0).tolist()) for x in self._x[nodes]]
         return [(a, b, min(places))] if places else []
@@ -221,4 +251,4 @@ def _courses(drives: list[Drive]) -> Array:
 
 
 def _at(place: Place) -> str:
-    return f"({place[0]:g}, {place[1]:g})"
+    return f"({', '.join(f'{x:g}' for x in place)})"

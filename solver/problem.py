@@ -159,7 +159,7 @@ class Problem:
         if self.strain not in ("small", "large"):
             said = f'must be "small" or "large", not {self.strain!r}'
             raise InputError(f"archord.Problem: strain {said}.")
-        object.__setattr__(self, "kinematics", _kinematics(self.kinematics))
+        object.__setattr__(self, "kinematics", _kinematics(self.kinematics, self.thickness))
         bodies = [replace(body, material=self._live(body)) for body in self.bodies]
         object.__setattr__(self, "bodies", bodies)
         for kind in _DIFFERENT:
@@ -258,6 +258,12 @@ class Problem:
         return {s.drive for s in moving} | by_discs
 
     @property
+    def whole(self) -> float:
+        """What takes forces and energies of the part on the mesh to those reported: how many times
+        it makes up the whole, and the thickness."""
+        return self.symmetry * self.kinematics.thickness
+
+    @property
     def all_drives(self) -> list[Drive]:
         """The ``drives``, and the drive of the load factor where it is used and not given, or
         alone."""
@@ -308,11 +314,12 @@ def _require_parts(kind: str, given: Any, classes: tuple[type, ...]) -> None:
             raise InputError(f"archord.Problem: {kind} must be of the class {names}, not {part!r}.")
 
 
-def _kinematics(given: str | Kinematics) -> Kinematics:
-    """The kinematics of this name. Raises `InputError`."""
+def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
+    """The kinematics of this name, with the ``thickness``. Raises `InputError`, and ValueError for
+    a thickness of rings."""
     if isinstance(given, Kinematics):
-        return given
+        return given.with_thickness(given.thickness if thickness is None else thickness)
     if given not in _PLANES:
         known = ", ".join(f'"{name}"' for name in _PLANES)
         raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
-    return kinematics(given.removeprefix("plane "))
+    return kinematics(given.removeprefix("plane "), thickness or 1.0)

@@ -100,7 +100,7 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
         forces,
         read_nodal(text, "STRESS", mesh)[:, :4],
         p0,
-        peeq_integral(printed, mesh) * system.problem.symmetry,
+        peeq_integral(printed, mesh) * system.problem.whole,
         sum(int(row[3]) for row in counted),
     )
 
@@ -108,7 +108,7 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
 def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, Array]:
     """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step;
     nan where the nodes of a set do not move alike."""
-    share = system.problem.symmetry / thickness(system.problem, mesh)
+    share = system.problem.whole / thickness(system.problem, mesh)
     forces: dict[str, Array] = {}
     for m in moved_sets(system, mesh):
         for drive, rate in m.rates.items():

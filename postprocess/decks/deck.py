@@ -160,7 +160,7 @@ class _Writer:
         """Nodes, elements, sets and surfaces."""
         problem, mesh = self.problem, self.mesh
         yield "*HEADING"
-        whole = number(problem.symmetry / self.thick)
+        whole = number(problem.whole / self.thick)
         yield f"archord: {heading}; thickness {number(self.thick)}, forces times {whole} are those of the whole"
         yield "*NODE, NSET=ALL_NODES"
         x = self._drawn()
@@ -298,7 +298,7 @@ class _Writer:
             )
             loaded = np.argwhere(sum(np.abs(f) for f in self.loads.values())) if self.loads else ()
             rows = [f"{n + 1}, {axis + 1}, {number(forces[n, axis])}" for n, axis in loaded]
-            share = self.thick / self.problem.symmetry
+            share = self.thick / self.problem.whole
             rows += [
                 f"{n}, 1, {number(values[d] * share)}"
                 for d, n in self.own.items()

@@ -97,10 +97,6 @@ class Bordered(Strategy):
         self._ksp = PETSc.KSP().create(self.comm)
         self._factoriser(A).attach(self._ksp)
 
-    def vector(self) -> PETSc.Vec:
-        """A vector with the levels as its last entries."""
-        return self.matrix.createVecRight()
-
     def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
         """New border for a matrix with new values (see `Border`). Without ``factorise`` the
         preconditioner stays that of the last matrix that was factorised."""

@@ -8,8 +8,8 @@ Woodbury (Golub and Van Loan 2013, 2.1.4)
 
 a system as small as the contact. ``Z`` is found once, for all places that may get a force.
 
-Which points are closed is asked again after each solve, as in look_ahead.py, and the small system
-is solved again.
+The active set is updated after each solve, as look_ahead.py says, and the small system is solved
+again.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear import look_ahead
 from archord.solver.linear.direct import Direct
+from archord.solver.linear.look_ahead import look_ahead
 from archord.solver.linear.strategy import Facts, Product, Strategy
 
 _MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
@@ -50,51 +50,79 @@ class Condensed(Strategy):
     """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it.
     Collective.
 
-    ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block
-    dofs that may get forces, ``near`` ``(k,)`` those on which they depend: the same on every rank,
-    as all that is as small as contact. ``revise(increment)`` goes over to the points that are
-    closed after an increment ``(k, 2)`` of the solution at ``near``, calls `update`, and returns
-    what that adds to the residual at the nodes ``(m, 2)``; None for no change.
+    ``K`` ``(n, n)`` is symmetric and positive definite, in blocks of ``dimension``; ``nodes``
+    ``(m,)``, sorted, are the block dofs that may get forces, the same on every rank.
+    ``revise(increment)`` goes over to the points that are closed after an increment ``(k, d)`` of
+    the solution at ``near``, calls `update`, and returns what that adds to the residual at the
+    nodes ``(m, d)``; None for no change.
+
+    Arrays, ``d`` times as long as the nodes, the same on every rank but the first:
+
+    _Z : (n of this rank, d m) displacements under unit forces at the nodes
+    near : (k,) block dofs on which the forces depend
+    _near_Z : (d k, d m) the rows of Z at these
+    _blocks : (b, d, d) blocks of D that this rank gave
+    _own_D, _D : (d m, d k) D of this rank and of all ranks
+    _DZ : (d m, d m) their product with Z
     """
 
     def __init__(
-        self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]
+        self,
+        K: PETSc.Mat,
+        nodes: np.ndarray,
+        dimension: int,
+        revise: Callable[[Array], Array | None],
     ) -> None:
-        self.comm, self._K, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
+        self.comm = K.comm.tompi4py()
+        self.dimension = dimension
+        self._K = K
+        self._nodes = nodes
+        self._revise = revise
         self._start, self._end = K.getOwnershipRange()
         K.setOption(PETSc.Mat.Option.SPD, True)
         self._ksp = PETSc.KSP().create(K.comm)
         Direct(K, "cholesky").attach(self._ksp)
         self._y = K.createVecLeft()
-        self._Z = self._responses(_dofs(nodes))
-        self.occupy(*np.zeros((2, 0), dtype=np.int64))
+        self._Z = self._responses(self._dofs(nodes))
+        nothing = np.zeros(0, dtype=np.int64)
+        self.occupy(nothing, nothing)
         self.matrix = PETSc.Mat().createPython(K.getSizes(), context=Product(self), comm=K.comm)
         self.matrix.setUp()
 
+    def _dofs(self, nodes: np.ndarray) -> np.ndarray:
+        """All dofs of each of ``nodes``."""
+        return (self.dimension * nodes[:, None] + np.arange(self.dimension)).ravel()
+
     def _responses(self, dofs: np.ndarray) -> Array:
-        """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one
+        """Displacements ``(n of this rank, d m)`` under unit forces at ``dofs`` ``(d m,)``, one
         after the other."""
-        K, m = self._K, len(dofs)
-        self._found, unit = (
-            PETSc.Mat().createDense((K.getSizes()[0], (None, m)), comm=K.comm) for _ in range(2)
-        )
-        self._found.setUp()
-        if (
-            self.comm.size == 1
-        ):  # sparse: MUMPS skips what they leave zero; of several ranks PETSc spoils sparse ones
-            csr = np.arange(m + 1, dtype=PETSc.IntType), dofs.astype(PETSc.IntType), np.ones(m)
-            unit = PETSc.Mat().createTranspose(
-                PETSc.Mat().createAIJ((m, K.getSize()[0]), csr=csr, comm=K.comm)
-            )
-        else:
-            unit.setUp()
-            mine, at = self._own(dofs)
-            unit.getDenseArray()[at, mine] = 1.0
-            unit.assemble()
+        self._found = self._dense(len(dofs))
+        unit = self._unit_forces(dofs)
         self._ksp.setUp()
         self._ksp.getPC().getFactorMatrix().matSolve(unit, self._found)
         unit.destroy()
         return self._found.getDenseArray()
+
+    def _dense(self, columns: int) -> PETSc.Mat:
+        sizes = self._K.getSizes()[0], (None, columns)
+        matrix = PETSc.Mat().createDense(sizes, comm=self._K.comm)
+        matrix.setUp()
+        return matrix
+
+    def _unit_forces(self, dofs: np.ndarray) -> PETSc.Mat:
+        m = len(dofs)
+        if self.comm.size > 1:  # PETSc spoils sparse ones of several ranks
+            unit = self._dense(m)
+            mine, at = self._own(dofs)
+            unit.getDenseArray()[at, mine] = 1.0
+            unit.assemble()
+            return unit
+        # sparse: MUMPS skips what they leave zero
+        offsets = np.arange(m + 1, dtype=PETSc.IntType)
+        csr = offsets, dofs.astype(PETSc.IntType), np.ones(m)
+        size = self._K.getSize()[0]
+        rows = PETSc.Mat().createAIJ((m, size), csr=csr, comm=self._K.comm)
+        return PETSc.Mat().createTranspose(rows)
 
     def _own(self, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which of ``dofs`` this rank owns, and where they are among its own."""
@@ -109,9 +137,9 @@ class Condensed(Strategy):
         return self._sum(values)
 
     def at_nodes(self, own: Array) -> Array:
-        """What this rank has for its block dofs, ``own`` ``(n, 2)``, for the nodes ``(m, 2)`` on
+        """What this rank has for its block dofs, ``own`` ``(n, d)``, for the nodes ``(m, d)`` on
         every rank."""
-        return self._on_all(_dofs(self._nodes), own.ravel()).reshape(-1, 2)
+        return self._on_all(self._dofs(self._nodes), own.ravel()).reshape(-1, self.dimension)
 
     def _sum(self, values: Array) -> Array:
         if self.comm.size > 1:
@@ -121,26 +149,30 @@ class Condensed(Strategy):
     def occupy(self, rows: np.ndarray, columns: np.ndarray) -> None:
         """Let this rank's blocks of `update` be at block dofs ``rows``, among the nodes, and
         ``columns`` ``(b,)``, each place once; all are zero."""
+        d = self.dimension
         self.near = np.unique(np.concatenate(self.comm.allgather(np.unique(columns))))
-        self._columns = _dofs(self.near)
+        self._columns = self._dofs(self.near)
         self._row = np.searchsorted(self._nodes, rows)
-        axis, column = np.arange(2), np.searchsorted(self.near, columns)
-        self._at = 2 * self._row[:, None, None] + axis[:, None], 2 * column[:, None, None] + axis
+        column = np.searchsorted(self.near, columns)
+        axis = np.arange(d)
+        self._row_at = d * self._row[:, None, None] + axis[:, None]
+        self._column_at = d * column[:, None, None] + axis
         self._near_Z = self._on_all(self._columns, self._Z)
         m = self._Z.shape[1]
-        self._blocks: Array = np.zeros((len(rows), 2, 2))
-        self._own_D, self._DZ = np.zeros((m, len(self._columns))), np.zeros((m, m))
+        self._blocks: Array = np.zeros((len(rows), d, d))
+        self._own_D = np.zeros((m, len(self._columns)))
+        self._DZ = np.zeros((m, m))
         self._D = self._own_D if self.comm.size == 1 else self._own_D.copy()
 
     def update(self, blocks: Array) -> None:
-        """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, 2, 2)``; what has not changed costs
+        """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, d, d)``; what has not changed costs
         nothing."""
         changed = filled(blocks != self._blocks)
-        self._own_D[self._at[0][changed], self._at[1][changed]] = blocks[changed]
+        self._own_D[self._row_at[changed], self._column_at[changed]] = blocks[changed]
         self._blocks = blocks
         touched = np.zeros(len(self._nodes))
         touched[self._row[changed]] = 1.0
-        row = _dofs(np.flatnonzero(self._sum(touched)))
+        row = self._dofs(np.flatnonzero(self._sum(touched)))
         D = self._sum(self._own_D[row])
         self._D[row], used = D, np.flatnonzero(D.any(axis=0))
         self._DZ[row] = D[:, used] @ self._near_Z[used]
@@ -148,27 +180,33 @@ class Condensed(Strategy):
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = (K + E D) x``, called by PETSc."""
         self._K.mult(x, y)
-        mine, at = self._own(_dofs(self._nodes))
+        mine, at = self._own(self._dofs(self._nodes))
         y.array[at] += (self._D @ self._on_all(self._columns, x.array_r))[mine]
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = (K + E D)^-1 r`` with the points that are closed after ``-x``, called by PETSc; not
         a number if that is singular."""
         self._ksp.solve(r, self._y)
-        forces, near = np.zeros(self._Z.shape[1]), self._on_all(self._columns, self._y.array_r)
+        forces = np.zeros(self._Z.shape[1])
+        near = self._on_all(self._columns, self._y.array_r)
         drawn = self._drawn(near)
-        for _ in range(look_ahead.MOST_REVISIONS):
-            change = self._revise((self._near_Z @ drawn - near).reshape(-1, 2))
-            if change is None:
-                break
-            forces += change.ravel()
-            near += self._near_Z @ change.ravel()
+
+        def increment() -> Array:
+            return (self._near_Z @ drawn - near).reshape(-1, self.dimension)
+
+        def solve_again(change: Array) -> Array:
+            nonlocal drawn
+            forces[:] += change.ravel()
+            near[:] += self._near_Z @ change.ravel()
             drawn = self._drawn(near)
+            return increment()
+
+        look_ahead(increment(), self._revise, solve_again)
         x.array[:] = self._y.array_r + self._Z @ (forces - drawn)
 
     def _drawn(self, y: Array) -> Array:
-        """``(1 + D Z)^-1 D y`` of ``y`` ``(2 k,)`` at ``near``, a force on each dof of the nodes
-        ``(2 m,)``."""
+        """``(1 + D Z)^-1 D y`` of ``y`` ``(d k,)`` at ``near``, a force on each dof of the nodes
+        ``(d m,)``."""
         force = np.zeros(len(self._DZ))
         rows = np.flatnonzero(self._D.any(axis=1))
         small = self._DZ[np.ix_(rows, rows)]
@@ -181,12 +219,9 @@ class Condensed(Strategy):
 
 
 def filled(blocks: np.ndarray) -> np.ndarray:
-    """Which of ``blocks`` ``(n, 2, 2)`` are not all zero; numpy's `any` is several times slower on
+    """Which of ``blocks`` ``(n, d, d)`` are not all zero; numpy's `any` is several times slower on
     so short axes."""
-    a, b, c, d = blocks.reshape(-1, 4).T != 0
-    return np.flatnonzero(a | b | c | d)
-
-
-def _dofs(nodes: np.ndarray) -> np.ndarray:
-    """Both dofs of each of ``nodes``."""
-    return (2 * nodes[:, None] + np.arange(2)).ravel()
+    found = np.zeros(len(blocks), dtype=bool)
+    for i, j in np.ndindex(blocks.shape[1:]):
+        found |= blocks[:, i, j] != 0
+    return np.flatnonzero(found)

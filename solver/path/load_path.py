@@ -73,14 +73,13 @@ class LoadPath:
         at: Position | None,
         coarse: Companion | None,
     ) -> None:
-        self.solver, self._first_guess, self.at, self.coarse = (
-            solver,
-            first_guess,
-            at or Position(),
-            coarse,
-        )
-        self.state = solver.equilibrium.state()
+        self.solver = solver
+        self.equilibrium = solver.equilibrium
+        self.at = at or Position()
+        self.coarse = coarse
+        self.state = self.equilibrium.state()
         self.coarse_iterations = 0  # of the last attempt
+        self._first_guess = first_guess
 
     def attempt(self, load: float) -> Newton:
         """Solve for equilibrium at ``load``, from one guess after the other. Collective."""
@@ -96,14 +95,20 @@ class LoadPath:
             self.coarse_iterations = self.coarse.iterations
         guesses = list(self._own_guesses(load))
         if ahead is not None:
-            of_coarse, own = self.state + ahead, guesses[0]
-            off, plastic = self.solver.newton.residual_norm, self.solver.equilibrium.bulk.plastic
-            later = plastic and not own[1] and off(own[0]) < _AS_GOOD * off(of_coarse)
-            guesses.insert(1 if later else 0, (of_coarse, False))
+            of_coarse = self.state + ahead
+            place = 1 if self._is_as_good(*guesses[0], of_coarse) else 0
+            guesses.insert(place, (of_coarse, False))
         yield from guesses
 
+    def _is_as_good(self, own: Array, afar: bool, of_coarse: Array) -> bool:
+        """Whether the ``own`` guess of bodies that yield serves as well as the coarse start's."""
+        if afar or not self.equilibrium.bulk.plastic:
+            return False
+        residual = self.solver.newton.residual_norm
+        return residual(own) < _AS_GOOD * residual(of_coarse)
+
     def _own_guesses(self, load: float) -> Iterator[tuple[Array, bool]]:
-        """Those without a coarse start."""
+        """Guesses without a coarse start."""
         if self.at.increment is None:
             yield self._first_guess(load), True
             return
@@ -111,43 +116,49 @@ class LoadPath:
         if ratio is None:
             yield self.state, True
             return
-        near = abs(ratio) <= _PREDICTOR_LIMIT
-        # where the path turns, it first goes back elastically
-        afar = ratio < 0
-        yield self.state + self.at.increment * ratio if near else self.state, afar
-        if near and not afar and not self.solver.equilibrium.bulk.plastic:
+        turns = ratio < 0  # where the path turns, it first goes back elastically
+        if abs(ratio) > _PREDICTOR_LIMIT:
+            yield self.state, turns
+            return
+        yield self.state + self.at.increment * ratio, turns
+        if not turns and not self.equilibrium.bulk.plastic:
             # an extrapolated state has a kink where the contact ended, which fine meshes resolve
             yield self.state, True
 
     def _ratio(self, load: float) -> float | None:
-        """How far the step to ``load`` goes on the line of the last one, over that one's length;
-        None if off it."""
-        at, course = self.at, self.solver.equilibrium.drives.course
-        before, last, now = course(at.load - at.stride), course(at.load), course(load)
-        step, length = last - before, float(np.linalg.norm(last - before))
-        ratio = float(step @ (now - last)) / length**2 if length else 0.0
-        return (
-            ratio
-            if np.linalg.norm(now - last - ratio * step) <= _STRAIGHT * np.linalg.norm(now - last)
-            else None
-        )
+        """How far the step to ``load`` goes on the line of the last one, over the last one's
+        length; None if off it."""
+        at = self.at
+        course = self.equilibrium.drives.course
+        last = course(at.load)
+        before = last - course(at.load - at.stride)
+        step = course(load) - last
+        length = float(np.linalg.norm(before))
+        ratio = float(before @ step) / length**2 if length else 0.0
+        aside = np.linalg.norm(step - ratio * before)
+        return ratio if aside <= _STRAIGHT * np.linalg.norm(step) else None
 
     def accept(self, load: float) -> None:
         """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""
-        at, new = self.at, self.solver.equilibrium.state()
+        at = self.at
+        new = self.equilibrium.state()
         if load != at.load:
-            problem, springs = self.solver.equilibrium.problem, self.solver.equilibrium.springs
-            placed = springs is not None and not springs.idle
-            known = (problem.from_rest or at.increment is not None) and not placed
-            at.increment = new - self.state if known else np.zeros_like(new)
-            at.stride = 0.0 if placed else load - at.load
-        at.load, self.state = load, new
-        self.solver.equilibrium.commit()
+            springs = self.equilibrium.springs
+            is_placed = springs is not None and not springs.idle
+            began_in_balance = self.equilibrium.problem.from_rest or at.increment is not None
+            if began_in_balance and not is_placed:
+                at.increment = new - self.state
+            else:
+                at.increment = np.zeros_like(new)
+            at.stride = 0.0 if is_placed else load - at.load
+        at.load = load
+        self.state = new
+        self.equilibrium.commit()
         if self.coarse is not None and not self.coarse.follow():
             self.coarse = None
 
     def take_back(self) -> None:
         """Undo the last attempt."""
-        self.solver.equilibrium.restore(self.at.load, self.state)
+        self.equilibrium.restore(self.at.load, self.state)
         if self.coarse is not None:
             self.coarse.take_back()

@@ -48,50 +48,66 @@ class Gather:
 class MeshOrder:
     """The generator's order of the nodes and cells of ``system``. Collective.
 
-    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank
-    0; cells are of one ``kind``. Nodes are the displacement's: where the geometry is of another order, they come as the cells
-    first name them.
+    Nodes are the displacement's: where the geometry is of another order, they come as the cells
+    first name them. On rank 0 are
+
+    kind : the kind of its cells, on all ranks
+    coordinates : (n, 3) of the nodes
+    nodes_of_cell : (n, a)
     """
 
     def __init__(self, system: System) -> None:
-        self.system, V = system, system.V
-        mesh, geometry, dofs = V.mesh, V.mesh.geometry, V.dofmap.list
+        self.system = system
+        V = system.V
+        mesh = V.mesh
+        index_map = mesh.topology.index_map(mesh.topology.dim)
         self.kind = mesh.basix_cell()
-        self.n_cells = mesh.topology.index_map(2).size_local
-        self._n_local, self._n_owned = system.equilibrium.n_local, V.dofmap.index_map.size_local
+        self.n_cells = index_map.size_local
+        self._n_local = system.equilibrium.unknowns.n_local
+        self._n_owned = system.equilibrium.unknowns.n_owned
         self._cell_index = np.asarray(mesh.topology.original_cell_index)[: self.n_cells]
         self.cells = Gather(system.comm, self._cell_index)
-        index, owned = np.asarray(geometry.input_global_indices), geometry.index_map().size_local
-        nodes = Gather(system.comm, index[:owned])
-        self.coordinates, cells = (
-            nodes(geometry.x[:owned]),
-            self.cells(index[cell_nodes(mesh)[: self.n_cells]]),
-        )
-        root = system.comm.rank == 0
-        self.nodes_of_cell = np.searchsorted(nodes.unique, cells) if root else cells
-        if V.element.basix_element.degree == cell_degree(
-            mesh
-        ):  # both number the nodes of a cell alike
-            self._index = np.zeros(self._n_local, dtype=np.int64)
-            self._index[dofs] = index[cell_nodes(mesh)]
-        else:
-            numbers = V.dofmap.index_map.local_to_global(np.arange(self._n_local, dtype=np.int32))
-            of_cells, first = self.cells(numbers[dofs[: self.n_cells]]), None
-            if root:
-                at = tabulate(mesh.basix_cell(), cell_degree(mesh), V.element.basix_element.points)[
-                    0
-                ]
-                places = np.einsum("qa,nai->nqi", at, self.coordinates[self.nodes_of_cell]).reshape(
-                    -1, 3
-                )
-                first = np.unique(of_cells, return_index=True)[1]
-                self.coordinates = places[np.sort(first)]
-                self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
-            self._index = system.comm.bcast(first)[numbers]
+        self._take_geometry()
+        if V.element.basix_element.degree != cell_degree(mesh):
+            self._number_nodes_by_cells()
         self._nodes = Gather(system.comm, self._index[: self._n_owned])
         corners = slice(len(basix.topology(mesh.basix_cell())[0]))  # come first in every cell
-        self._dof_of_vertex = np.zeros(len(geometry.x), dtype=np.int64)
-        self._dof_of_vertex[cell_nodes(mesh)[:, corners]] = dofs[:, corners]
+        self._dof_of_vertex = np.zeros(len(mesh.geometry.x), dtype=np.int64)
+        self._dof_of_vertex[cell_nodes(mesh)[:, corners]] = V.dofmap.list[:, corners]
+
+    def _take_geometry(self) -> None:
+        """The geometry's nodes and cells, and for the displacement's nodes ``_index`` the numbers
+        of the geometry's, where both number the nodes of a cell alike."""
+        mesh = self.system.V.mesh
+        owned = mesh.geometry.index_map().size_local
+        index = np.asarray(mesh.geometry.input_global_indices)
+        of_cells = index[cell_nodes(mesh)]
+        nodes = Gather(self.system.comm, index[:owned])
+        self.coordinates = nodes(mesh.geometry.x[:owned])
+        self.nodes_of_cell = self.cells(of_cells[: self.n_cells])
+        if self.system.comm.rank == 0:
+            self.nodes_of_cell = np.searchsorted(nodes.unique, self.nodes_of_cell)
+        self._index = np.zeros(self._n_local, dtype=np.int64)
+        if self.system.V.element.basix_element.degree == cell_degree(mesh):
+            self._index[self.system.V.dofmap.list] = of_cells
+
+    def _number_nodes_by_cells(self) -> None:
+        """Number the displacement's nodes as the cells first name them."""
+        V = self.system.V
+        element = V.element.basix_element
+        local = np.arange(self._n_local, dtype=np.int32)
+        numbers = V.dofmap.index_map.local_to_global(local)
+        of_cells = self.cells(numbers[V.dofmap.list[: self.n_cells]])
+        first = None
+        if self.system.comm.rank == 0:
+            degree = cell_degree(V.mesh)
+            shape = tabulate(V.mesh.basix_cell(), degree, element.points)[0]
+            corners = self.coordinates[self.nodes_of_cell]
+            places = np.einsum("qa,nai->nqi", shape, corners).reshape(-1, 3)
+            first = np.unique(of_cells, return_index=True)[1]
+            self.coordinates = places[np.sort(first)]
+            self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
+        self._index = self.system.comm.bcast(first)[numbers]
 
     def mesh_digest(self) -> str:
         """SHA-256 of coordinates and cells, on rank 0."""
@@ -101,30 +117,31 @@ class MeshOrder:
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
-        problem, of_cells = self.system.problem, np.zeros(self.n_cells, dtype=np.int32)
+        problem = self.system.problem
+        of_cells = np.zeros(self.n_cells, dtype=np.int32)
         for body in problem.bodies:
             cells = problem.cells_of(body)
             of_cells[cells[cells < self.n_cells]] = problem.tag(body)
         return self.cells(of_cells)
 
     def facet_sets(self) -> dict[str, np.ndarray]:
-        """Both vertices ``(k, 2)`` of every facet of the named sets, as nodes of the mesh, on rank
+        """The vertices ``(k, v)`` of every facet of the named sets, as nodes of the mesh, on rank
         0. Collective."""
-        tagged, comm = self.system.problem.mesh, self.system.comm
-        mesh, found = tagged.mesh, {}
+        tagged = self.system.problem.mesh
+        mesh = tagged.mesh
+        facet = mesh.topology.dim - 1
+        n_vertices = len(basix.topology(mesh.basix_cell())[facet][0])
+        found = {}
         for name in (name for name, tags in tagged.facet_sets.items() if tags):
             facets = tagged.facets_in(name)
-            # dolfinx divides by their number
-            ends = (
-                entities_to_geometry(mesh, 1, facets)[:, :2]
-                if len(facets)
-                else np.zeros((0, 2), dtype=np.int32)
-            )
-            parts = comm.gather(np.sort(self._index[self._dof_of_vertex[ends]], axis=1))
+            vertices = np.zeros((0, n_vertices), dtype=np.int32)
+            if len(facets):  # dolfinx divides by their number
+                vertices = entities_to_geometry(mesh, facet, facets)[:, :n_vertices]
+            nodes = np.sort(self._index[self._dof_of_vertex[vertices]], axis=1)
+            parts = self.system.comm.gather(nodes)
             if parts is not None:
-                found[name] = np.searchsorted(
-                    self._nodes.unique, np.unique(np.concatenate(parts), axis=0)
-                )
+                each_once = np.unique(np.concatenate(parts), axis=0)
+                found[name] = np.searchsorted(self._nodes.unique, each_once)
         return found
 
     def at_points(self, name: str, parts: Iterable[PointFields]) -> np.ndarray:
@@ -151,11 +168,11 @@ class MeshOrder:
         order, and "history/PLACE/NAME" for every array of their state. Collective."""
         whole = {}
         for place, points, number in self._points():
-            now, virgin = vars(points.state), vars(points.material.state(points.n))
-            changed = [
-                (v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in now.items()
-            ]
-            used = np.logical_or.reduce(changed)
+            now = vars(points.state)
+            virgin = vars(points.material.state(points.n))
+            used = np.zeros(points.n, dtype=bool)
+            for name, values in now.items():
+                used |= (values != virgin[name]).any(axis=tuple(range(1, values.ndim)))
             gather = Gather(self.system.comm, number[used])
             for name, values in ({"point": number} | now).items():
                 whole[f"history/{place}/{name}"] = gather(values[used])
@@ -165,7 +182,8 @@ class MeshOrder:
         """The inverse of `collect_history`: give every point its history. Collective."""
         stored: Arrays = self.system.comm.bcast(whole)
         for place, points, number in self._points():
-            state, known = points.material.state(len(number)), stored[f"history/{place}/point"]
+            state = points.material.state(len(number))
+            known = stored[f"history/{place}/point"]
             _, here, there = np.intersect1d(number, known, assume_unique=True, return_indices=True)
             for name, values in vars(state).items():
                 values[here] = stored[f"history/{place}/{name}"][there]
@@ -173,11 +191,12 @@ class MeshOrder:
 
     def _points(self) -> Iterator[tuple[str, Points, np.ndarray]]:
         """The places with history, this rank's points there, and their numbers ``(n q,)``."""
-        found = {
-            f"bulk {tag}": (self._cell_index[c], p)
-            for tag, (c, p) in self.system.bulk.histories().items()
-        }
-        for place, (entity, points) in (found | self.system.contact.histories()).items():
+        places = {}
+        for tag, (cells, points) in self.system.bulk.histories().items():
+            places[f"bulk {tag}"] = self._cell_index[cells], points
+        places |= self.system.contact.histories()
+        for place, (entity, points) in places.items():
             if points.state is not None:
                 q = points.n // max(len(entity), 1)
-                yield place, points, (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()
+                number = entity.astype(np.int64)[:, None] * q + np.arange(q)
+                yield place, points, number.ravel()

@@ -9,27 +9,28 @@ from typing import Any
 from weakref import WeakMethod
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.kernels.compat import RESIDUAL_NOT_FINITE
 from archord.report.timer import BEFORE_SOLVING
-from archord.solver.equilibrium import Equilibrium
+from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
 from archord.solver.linear.look_ahead import LookAhead
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
-_ADDED_UP = (
-    "iterations",
-    "residuals",
-    "active_set_changes",
-    "factorisations",
-    "evaluations",
-)  # of several solves
+_R = PETSc.SNES.ConvergedReason
+_REASONS = {
+    _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
+    _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
+    _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",
+    RESIDUAL_NOT_FINITE: "the residual is not a number",
+}
+# sums in an order that depends on where memory lies
+_RANDOM_SUMS = ("vec_mdot_use_gemv", "vec_maxpy_use_gemv")
 
 
 @dataclass
@@ -37,7 +38,7 @@ class Newton:
     """What a nonlinear solve did: whether it converged and why not, its iterations and residuals
     relative to reaction.
 
-    Without convergence ``worst`` is the place ``(2,)`` of the largest residual,
+    Without convergence ``worst`` is the place ``(d,)`` of the largest residual,
     ``plastic_increment`` the largest of PEEQ. ``active_set_changes`` belong to each residual.
     ``held`` contact points had to stay on their facets.
     """
@@ -46,7 +47,7 @@ class Newton:
     reason: str
     iterations: int
     residuals: list[float]
-    worst: tuple[float, float] | None = None
+    worst: tuple[float, ...] | None = None
     active_set_changes: list[int] = field(default_factory=list)
     plastic_increment: float = 0.0
     held: bool = False
@@ -56,11 +57,16 @@ class Newton:
     @staticmethod
     def together(solves: Sequence[Newton]) -> Newton:
         """Several ``solves`` as one, which ended as the last of them did."""
-        added = {
-            name: sum((getattr(s, name) for s in solves[1:]), getattr(solves[0], name))
-            for name in _ADDED_UP
-        }
-        return replace(solves[-1], **added, held=any(s.held for s in solves))
+        last = solves[-1]
+        return replace(
+            last,
+            iterations=sum(s.iterations for s in solves),
+            residuals=[residual for s in solves for residual in s.residuals],
+            active_set_changes=[changes for s in solves for changes in s.active_set_changes],
+            factorisations=sum(s.factorisations for s in solves),
+            evaluations=sum(s.evaluations for s in solves),
+            held=any(s.held for s in solves),
+        )
 
 
 class NewtonSolver:
@@ -74,35 +80,35 @@ class NewtonSolver:
     watch: Callable[[float, Newton], None] = staticmethod(lambda load, result: None)
 
     def __init__(self, equilibrium: Equilibrium) -> None:
-        self.equilibrium, problem = equilibrium, equilibrium.problem
-        self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
-        self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
-        looks, yields = equilibrium.choice.uses("look_ahead"), equilibrium.bulk.plastic
-        self._ahead = LookAhead(equilibrium.revised, yields=yields) if looks else None
-        for sums in (
-            "vec_mdot_use_gemv",
-            "vec_maxpy_use_gemv",
-        ):  # in an order that depends on where memory lies
+        self.equilibrium = equilibrium
+        self.tolerance = equilibrium.problem.tolerance
+        self.max_iterations = equilibrium.problem.max_iterations
+        self._system = equilibrium.linear
+        choice = self._system.choice
+        self._lagged = Lagged() if choice.uses("lagged") else None
+        self._ahead: LookAhead | None = None
+        if choice.uses("look_ahead"):
+            self._ahead = LookAhead(self._system.revise, yields=equilibrium.bulk.plastic)
+        for sums in _RANDOM_SUMS:
             PETSc.Options()[sums] = False
-        self._x = equilibrium.vector()
+        self._x = equilibrium.unknowns.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
-            self._solvers = {
-                searches: self._solver("bt" if searches else "basic") for searches in (True, False)
-            }
+            # by whether they search along the line
+            self._solvers = {True: self._solver("bt"), False: self._solver("basic")}
             self._start_linear()
 
     def _solver(self, line_search: str) -> PETSc.SNES:
         snes = PETSc.SNES().create(self.equilibrium.comm)
         snes.setOptionsPrefix("archord_")
         options = PETSc.Options("archord_")
-        options["snes_linesearch_type"], options["snes_linesearch_max_it"] = line_search, 8
+        options["snes_linesearch_type"] = line_search
+        options["snes_linesearch_max_it"] = 8
         snes.setType("newtonls")
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
         snes.setConvergenceTest(self._guarded(self._test))
-        snes.setTolerances(
-            stol=0.0
-        )  # else a line search that ends in a short step counts as convergence
+        # else a line search that ends in a short step counts as convergence
+        snes.setTolerances(stol=0.0)
         snes.setFromOptions()
         return snes
 
@@ -118,10 +124,10 @@ class NewtonSolver:
 
     def _attach(self) -> None:
         """Solve with the tangent as it is chosen."""
-        self._linear = self.equilibrium.linear
+        self._strategy = self._system.strategy
         for snes in self._solvers.values():
-            snes.setJacobian(self._guarded(self._jacobian), self._linear.matrix)
-        self._linear.attach(self._ksp)
+            snes.setJacobian(self._guarded(self._jacobian), self._strategy.matrix)
+        self._strategy.attach(self._ksp)
         if self._lagged is not None:
             self._lagged.attach(self._ksp)
         if self._ahead is not None:
@@ -131,16 +137,15 @@ class NewtonSolver:
         ksp.getPC().setReusePreconditioner(self._reuse)
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        border = self.equilibrium.border
-        if (
-            self._ahead is None
-            or ksp.getConvergedReason() < 0
-            or (border and border.singular is not None)
-        ):
+        if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
             return
-        self._ahead.improve(b, x, self._linear.matrix)
-        if border:
-            border.singular = None  # vectors that FGMRES tries say nothing of it
+        self._ahead.improve(b, x, self._strategy.matrix)
+        if self._system.border:
+            self._system.border.singular = None  # vectors that FGMRES tries say nothing of it
+
+    def _is_singular(self) -> bool:
+        border = self._system.border
+        return border is not None and border.singular is not None
 
     def _guarded(self, callback: Callable) -> Callable:
         """Keep what ``callback``, a method, raises, which PETSc would turn into an error number. It
@@ -167,52 +172,60 @@ class NewtonSolver:
         there. Without one the solve goes on from the last iterate and its partners. Steps are full
         ones without ``line_search``.
         """
-        at, snes = self.equilibrium, self._solvers[line_search]
-        self._goal = goal or self.tolerance
-        self._result = result = Newton(False, "", 0, [])
-        self._failure, self._raised = "", None
-        self._renewed, self._reuse = True, False  # the last factorisation is of another matrix
-        if at.border:
-            at.border.singular = None
-        if self._ahead is not None:
-            self._ahead.given_up = False
+        self._begin(goal)
         if guess is not None:
-            at.pack(guess, self._x)
-            at.contact.search()
+            self._start_from(guess)
+        snes = self._solvers[line_search]
         snes.setTolerances(max_it=self.max_iterations)
-        with at.timer("solve"):
+        with self.equilibrium.timer("solve"):
             try:
                 snes.solve(None, self._x)
             except PETSc.Error:
                 if self._raised is not None:
                     raise self._raised from None
                 raise
-        code, result.iterations = snes.getConvergedReason(), snes.getIterationNumber()
         if self._ksp.getConvergedReason() < 0:
-            at.renew_factorisation()
+            self._system.renew_factorisation()
             self._start_linear()
+        return self._ended(snes)
+
+    def _begin(self, goal: float) -> None:
+        self._goal = goal or self.tolerance
+        self._result = Newton(False, "", 0, [])
+        self._failure = ""
+        self._raised = None
+        self._renewed = True  # the last factorisation is of another matrix
+        self._reuse = False
+        if self._system.border:
+            self._system.border.singular = None
+        if self._ahead is not None:
+            self._ahead.given_up = False
+
+    def _start_from(self, guess: Array) -> None:
+        self.equilibrium.pack(guess, self._x)
+        self.equilibrium.contact.search()
+
+    def _ended(self, snes: PETSc.SNES) -> Newton:
+        """The result of a solve, with diagnostics where it failed."""
+        result = self._result
+        code = snes.getConvergedReason()
+        result.iterations = snes.getIterationNumber()
         result.converged = code > 0
-        result.reason = (
-            "converged"
-            if result.converged
-            else self._failure or _REASONS.get(code, f"SNES reason {code}")
-        )
-        if not result.converged:
-            grown = [
-                (p.peeq - p.material.peeq(p.state)).max(initial=0.0) for p in at.plastic_points()
-            ]
-            result.plastic_increment = at.comm.allreduce(float(max(grown, default=0.0)), op=MPI.MAX)
-            result.worst = at.worst_place()
+        if result.converged:
+            result.reason = "converged"
+            return result
+        result.reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
+        result.plastic_increment = self.equilibrium.diagnostics.plastic_increment()
+        result.worst = self.equilibrium.diagnostics.worst_place()
         return result
 
     def residual_norm(self, guess: Array) -> float:
         """The norm of the residual at a ``guess`` for `solve`; infinite where a contact point finds
         no partner."""
-        at, f = self.equilibrium, self._x.duplicate()
-        at.pack(guess, self._x)
-        at.contact.search()
+        f = self._x.duplicate()
+        self._start_from(guess)
         try:
-            at.residual_of(self._x, f)
+            self.equilibrium.residual_of(self._x, f)
         except ProjectionError:
             return np.inf
         return float(f.norm())
@@ -227,26 +240,25 @@ class NewtonSolver:
             self._failure = str(error)
             f.set(np.nan)
             return
-        if self.equilibrium.linear is not self._linear:
+        if self._system.strategy is not self._strategy:
             self._attach()
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Assemble the tangent unless the last one will do, and factorise it unless a lagged
         factorisation will."""
-        at, result = self.equilibrium, self._result
-        if self._close():
+        result = self._result
+        if self._is_close():
             return
-        lagged, changes = self._lagged, result.active_set_changes[-1]
-        factorise = lagged is None or lagged.factorises(
-            self._ksp.getIterationNumber(), changes, renewed=self._renewed
+        factorise = self._lagged is None or self._lagged.factorises(
+            self._ksp.getIterationNumber(), result.active_set_changes[-1], renewed=self._renewed
         )
         self._reuse = not factorise
-        before = at.tangent.factorisations
-        at.update_tangent(factorise=factorise)
-        result.factorisations += at.tangent.factorisations - before
+        before = self._system.tangent.factorisations
+        self._system.update(factorise=factorise)
+        result.factorisations += self._system.tangent.factorisations - before
         self._renewed = False
 
-    def _close(self) -> bool:
+    def _is_close(self) -> bool:
         """Whether one more step with the last factorisation will do: Newton's method converges, and
         the residual that such a step leaves, smaller by the last reduction, is below the
         tolerance."""
@@ -258,40 +270,43 @@ class NewtonSolver:
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Note the residual and tell SNES whether to go on."""
-        at, result, norm, reasons = (
-            self.equilibrium,
-            self._result,
-            norms[2],
-            PETSc.SNES.ConvergedReason,
-        )
-        reaction = max(at.reaction_norm, at.largest_reaction)
-        result.active_set_changes.append(at.changes)
+        evaluation = self.equilibrium.evaluation
+        result = self._result
+        norm = norms[2]
+        reaction = max(evaluation.reaction_norm, self.equilibrium.largest_reaction)
+        result.active_set_changes.append(evaluation.changes)
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
-        self.watch(at.load, result)
-        if at.border and at.border.singular is not None:
-            pressed = at.load > 0 and at.contact.n_active() > 0
-            level = at.drives.unknown[at.border.singular]
-            of = "".join(
-                f" of the drive {name!r}" for name in at.drives.names[level : level + 1] if name
-            )
-            self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'}{of} (singular mode)"
-            return reasons.DIVERGED_LINEAR_SOLVE
+        self.watch(self.equilibrium.load, result)
+        if self._is_singular():
+            self._failure = self._singular_mode()
+            return _R.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):
             return RESIDUAL_NOT_FINITE
-        if norm <= max(self._goal * reaction, at.noise):
-            return reasons.CONVERGED_FNORM_RELATIVE
-        patience = _PATIENCE if any(result.active_set_changes[-CIRCLING:]) else CIRCLING
-        recent, earlier = result.residuals[-patience:], result.residuals[:-patience]
-        if earlier and min(recent) > 0.5 * min(earlier):
+        if norm <= max(self._goal * reaction, evaluation.noise):
+            return _R.CONVERGED_FNORM_RELATIVE
+        if self._stagnates():
             self._failure = "the residual does not fall any further"
-            return reasons.DIVERGED_DTOL
-        return reasons.DIVERGED_MAX_IT if iteration >= self.max_iterations else reasons.ITERATING
+            return _R.DIVERGED_DTOL
+        return _R.DIVERGED_MAX_IT if iteration >= self.max_iterations else _R.ITERATING
 
+    def _stagnates(self) -> bool:
+        """Whether the residual has not halved in as many iterations as it is given."""
+        residuals = self._result.residuals
+        has_changes = any(self._result.active_set_changes[-CIRCLING:])
+        patience = _PATIENCE if has_changes else CIRCLING
+        recent = residuals[-patience:]
+        earlier = residuals[:-patience]
+        return bool(earlier) and min(recent) > 0.5 * min(earlier)
 
-_R = PETSc.SNES.ConvergedReason
-_REASONS = {
-    _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
-    _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
-    _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",
-    RESIDUAL_NOT_FINITE: "the residual is not a number",
-}
+    def _singular_mode(self) -> str:
+        """What is singular, in words."""
+        at = self.equilibrium
+        border = self._system.border
+        assert border is not None
+        assert border.singular is not None
+        level = at.drives.unknown[border.singular]
+        name = at.drives.names[level] if level < len(at.drives.names) else ""
+        of_drive = f" of the drive {name!r}" if name else ""
+        is_pressed = at.load > 0 and at.contact.n_active() > 0
+        what = "no stiffness is left" if is_pressed else "nothing resists the force"
+        return f"{what}{of_drive} (singular mode)"

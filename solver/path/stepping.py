@@ -64,11 +64,16 @@ class Step:
     @property
     def residual(self) -> float:
         """Residual over reaction of the last solve."""
-        return (
-            self.attempts[-1].residuals[-1]
-            if self.attempts and self.attempts[-1].residuals
-            else 0.0
-        )
+        residuals = self.attempts[-1].residuals if self.attempts else []
+        return residuals[-1] if residuals else 0.0
+
+    def note(self, result: Newton, coarse_iterations: int) -> None:
+        """Note an attempt."""
+        self.attempts.append(result)
+        self.iterations += result.iterations
+        self.coarse_iterations += coarse_iterations
+        self.substeps += result.converged
+        self.cutbacks += not result.converged
 
 
 def march(
@@ -86,61 +91,58 @@ def march(
     ``substep_done(load)`` follows every accepted step, ``target_done(step, position)`` every output
     target, ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
     """
-    at, rules = path.at, rules or StepRules()
+    at = path.at
+    rules = rules or StepRules()
     size = at.size or rules.initial
     for number in range(at.targets_done, len(targets)):
-        begun, target, passed, just_cut = at.load, targets[number], 0.0, False
+        begun = at.load
+        target = targets[number]
+        passed = 0.0  # part of the output step
+        just_cut = False
         record = Step(target)
         while passed < 1:
             end = passed + size if passed + size <= 1 - _SLIVER else 1.0
             load = target if end == 1 else begun + end * (target - begun)
             result = path.attempt(load)
-            record.iterations += result.iterations
-            record.coarse_iterations += path.coarse_iterations
-            record.attempts.append(result)
+            record.note(result, path.coarse_iterations)
             attempted(load, result.iterations)
-            if result.converged:
-                record.substeps += 1
-                if result.iterations <= rules.target_iterations and not just_cut:
-                    size = min(rules.maximum, rules.growth * size)
-                just_cut, passed, at.size = False, end, size
-                path.accept(load)
-                substep_done(load)
+            if not result.converged:
+                path.take_back()
+                if size <= rules.minimum:
+                    problem = path.equilibrium.problem
+                    raise StepFailure(_why(result, problem, load, at.load, size), record)
+                size = max(rules.minimum, rules.cutback * size)
+                just_cut = True
                 continue
-            record.cutbacks += 1
-            path.take_back()
-            if size <= rules.minimum:
-                raise StepFailure(
-                    _why(result, path.solver.equilibrium.problem, load, at.load, size), record
-                )
-            size, just_cut = max(rules.minimum, rules.cutback * size), True
+            if result.iterations <= rules.target_iterations and not just_cut:
+                size = min(rules.maximum, rules.growth * size)
+            just_cut = False
+            passed = end
+            at.size = size
+            path.accept(load)
+            substep_done(load)
         at.targets_done = number + 1
         target_done(record, at)
 
 
 def _why(result: Newton, problem: Problem, load: float, held: float, size: float) -> str:
-    name, by_force = problem.load_name, problem.by_force
-    where = (
-        ""
-        if result.worst is None
-        else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
-    )
-    last = (
-        f"{result.residuals[-1]:.1e}"
-        if result.residuals and np.isfinite(result.residuals[-1])
-        else "none"
-    )
-    cut = (
-        f"the step was cut to {size:.2g} of an output step"
-        if size < 1
-        else "no smaller step is allowed"
-    )
-    limit = (
-        "; if the bodies yield as a whole, the limit load is close"
-        if by_force and result.plastic_increment
-        else ""
-    )
+    """Why the step to ``load`` failed, in one sentence."""
+    name = problem.load_name
+    last = "none"
+    if result.residuals and np.isfinite(result.residuals[-1]):
+        last = f"{result.residuals[-1]:.1e}"
+    where = ""
+    if result.worst is not None:
+        place = ", ".join(f"{x:.4g}" for x in result.worst)
+        where = f", the largest residual at ({place})"
+    cut = "no smaller step is allowed"
+    if size < 1:
+        cut = f"the step was cut to {size:.2g} of an output step"
+    limit = ""
+    if problem.by_force and result.plastic_increment:
+        limit = "; if the bodies yield as a whole, the limit load is close"
     return (
-        f"no equilibrium at {name} = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
-        f"over reaction was {last}{where}; {cut}; the last load that held is {name} = {held:.6g}{limit}"
+        f"no equilibrium at {name} = {load:.6g}: {result.reason}; "
+        f"after {result.iterations} iterations the residual over reaction was {last}{where}; "
+        f"{cut}; the last load that held is {name} = {held:.6g}{limit}"
     )

@@ -74,7 +74,7 @@ def test_cells_turned_over_at_a_corner_are_told(strain):
     assert system.distortion().inside_out == 0
     cell = system.V.dofmap.list[0]
     corners = system.V.tabulate_dof_coordinates()[cell[:3], :2]
-    u = system.equilibrium.u.x.array.reshape(-1, 2)
+    u = system.equilibrium.unknowns.u.x.array.reshape(-1, 2)
     u[cell[0]] += 0.6 * (corners[1:].mean(axis=0) - corners[0])
     assert system.distortion().inside_out >= 1
     (said,) = (s for s in distortion_doubts(system, 0.0, small=False) if "inside out" in s)
@@ -85,7 +85,7 @@ def test_an_element_that_turns_is_told():
     """By 0.3 rad, which linear strain takes for a stretch of 4 %."""
     system = lug([0.1]).system
     x = system.V.tabulate_dof_coordinates()[:, :2]
-    system.equilibrium.u.x.array[:] = (0.3 * np.stack([-x[:, 1], x[:, 0]], axis=1)).ravel()
+    system.equilibrium.unknowns.u.x.array[:] = (0.3 * np.stack([-x[:, 1], x[:, 0]], axis=1)).ravel()
     (said,) = distortion_doubts(system, 0.0, small=True)
     assert "elements turn by 0.3 rad, which small-strain theory takes for a strain of 0.045" in said
 
@@ -146,7 +146,9 @@ def test_forces_after_unloading_balance_to_the_largest_force_of_the_run():
         system.solve([load])
         records.append(account.step([], Step(load), account.profiles(), 0.0, 0.0))
     rng = np.random.default_rng(0)
-    system.equilibrium.u.x.array[:] += 1e-9 * rng.random(len(system.equilibrium.u.x.array))
+    system.equilibrium.unknowns.u.x.array[:] += 1e-9 * rng.random(
+        len(system.equilibrium.unknowns.u.x.array)
+    )
     system.equilibrium.evaluate()
     largest, last = (abs(m["clamp x"]) for m in records)
     assert last < 1e-4 * largest

@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
-from archord.geometry.curve import lagrange
 from archord.geometry.basis import TRIANGLE
+from archord.geometry.curve import lagrange
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.output.files.step_file import step_name
 from archord.output.run import solve_scene

@@ -160,7 +160,7 @@ def test_means_alone_hold_a_body_on_any_ranks(comm):
     np.testing.assert_allclose(system.reaction("tip"), [force, 0], atol=1e-9 * force)
     np.testing.assert_allclose(system.reaction("left"), [-force, 0], atol=1e-9 * force)
     assert system.drive_names == list(paths)
-    assert len(system.equilibrium.levels) == len(paths) + 3
+    assert len(system.equilibrium.unknowns.levels) == len(paths) + 3
 
 
 def pressed(comm=MPI.COMM_SELF, **options) -> Problem:
@@ -196,25 +196,28 @@ def test_the_bordered_tangent_is_the_derivative_of_the_residual():
     equilibrium, rng = system.equilibrium, np.random.default_rng(0)
     equilibrium.load = 1.0
     state = 1e-3 * rng.normal(size=len(equilibrium.state()))
-    state[1 : 2 * equilibrium.n_local : 2] -= (
+    state[1 : 2 * equilibrium.unknowns.n_local : 2] -= (
         0.03 * coordinates(system.V)[:, 1]
     )  # pressed into the plastic range
-    state[2 * equilibrium.n_local + system.drive_names.index("disc y")] = 0.06
-    x = equilibrium.vector()
+    state[2 * equilibrium.unknowns.n_local + system.drive_names.index("disc y")] = 0.06
+    x = equilibrium.unknowns.vector()
     equilibrium.pack(state, x)
     f, at, product, direction = (x.duplicate() for _ in range(4))
     equilibrium.residual_of(x, f)
-    equilibrium.update_tangent()
+    equilibrium.linear.update()
     assert all(pair.active.any() for pair in system.contact.pairs)
     assert system.peeq()[0] > 0
     assert (
         len(equilibrium.drives.unknown) == 3 + 1 + 3
     )  # forces, a multiplier, and the anchors of its body
     n, sides = x.local_size, []
-    free = np.append(~equilibrium.fixed.ravel(), np.ones(n - equilibrium.fixed.size, dtype=bool))
+    free = np.append(
+        ~equilibrium.unknowns.fixed.ravel(),
+        np.ones(n - equilibrium.unknowns.fixed.size, dtype=bool),
+    )
     for _ in range(3):
         direction.array[:] = rng.normal(size=n) * free
-        equilibrium.border.last.mult(None, direction, product)
+        equilibrium.linear.border.last.mult(None, direction, product)
         sides = []
         for h in (1e-7, -1e-7):
             at.array[:] = x.array_r + h * direction.array_r
@@ -330,10 +333,12 @@ def test_forces_balance_to_the_forces_that_a_fit_presses_with():
     pressed = float(pair.pressure.mean()) * 2 * np.pi * 14.0
     assert 4 * system.contact.largest_pressed() == pytest.approx(pressed, rel=5e-3)
     rng = np.random.default_rng(0)
-    system.equilibrium.u.x.array[:] += 1e-7 * rng.random(len(system.equilibrium.u.x.array))
+    system.equilibrium.unknowns.u.x.array[:] += 1e-7 * rng.random(
+        len(system.equilibrium.unknowns.u.x.array)
+    )
     system.equilibrium.evaluate()
     left = [
-        4 * np.linalg.norm(system.equilibrium.residual_on(system.nodes_of(b)))
+        4 * np.linalg.norm(system.equilibrium.diagnostics.residual_on(system.nodes_of(b)))
         for b in system.problem.bodies
     ]
     assert system.force_balance() == pytest.approx(max(left) / pressed, rel=5e-3)

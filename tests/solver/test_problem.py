@@ -120,7 +120,7 @@ def test_a_load_is_spread_as_its_density_says():
         Problem(mesh, bodies, (), [Dirichlet("base", "base", 1)], [load])
     ).equilibrium
     assert equilibrium.drives.applied[0].sum(axis=0) == pytest.approx([3.0, 4.0], rel=1e-12)
-    x = coordinates(equilibrium.V)
+    x = coordinates(equilibrium.unknowns.V)
     assert equilibrium.drives.applied[0].T @ x == pytest.approx(
         np.outer([3, 4], [2 / 3, 2 / 3]), rel=1e-12
     )

@@ -24,7 +24,7 @@ def test_a_failed_step_leaves_no_trace():
     """Displacement and all history are what they were at the last accepted load."""
     joint = solve(scene(0.1, 2, yield_stress=0.002)).joint
     equilibrium = joint.equilibrium
-    points = joint.equilibrium.plastic_points()
+    points = joint.equilibrium.diagnostics.plastic_points()
     states = [p.state for p in points]
     before = [s.peeq.copy() for s in states]
     load, u = equilibrium.load, equilibrium.displacement()

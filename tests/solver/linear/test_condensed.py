@@ -35,7 +35,7 @@ def test_solves_are_those_with_the_whole_matrix():
     rng = np.random.default_rng(5)
     nodes = 20
     dense, A = stiffness(2 * nodes, rng)
-    condensed = Condensed(A, np.array([3, 4, 9, 17]), as_it_is)
+    condensed = Condensed(A, np.array([3, 4, 9, 17]), 2, as_it_is)
     r, x = A.createVecs()
     for places in ([], [(3, 4), (3, 5), (9, 9)], [(9, 2), (17, 0)], [(3, 3), (4, 3), (17, 17)]):
         blocks = rng.normal(size=(len(places), 2, 2))
@@ -56,7 +56,7 @@ def test_solves_are_those_with_the_whole_matrix():
 
 def test_a_singular_system_has_no_number_for_an_answer():
     dense, A = stiffness(4, np.random.default_rng(1))
-    condensed = Condensed(A, np.array([0]), as_it_is)
+    condensed = Condensed(A, np.array([0]), 2, as_it_is)
     condensed.occupy(np.array([0, 0]), np.array([0, 1]))
     condensed.update(-np.array([dense[:2, :2], dense[:2, 2:]]))
     r, x = A.createVecs()
@@ -69,7 +69,7 @@ def test_nothing_keeps_a_system_that_is_used_no_more():
     """Its responses are most of the memory of a run; sweeps solve thousands of runs in one
     process."""
     _, A = stiffness(8, np.random.default_rng(1))
-    condensed, ksp = Condensed(A, np.array([0, 2]), as_it_is), PETSc.KSP().create(MPI.COMM_SELF)
+    condensed, ksp = Condensed(A, np.array([0, 2]), 2, as_it_is), PETSc.KSP().create(MPI.COMM_SELF)
     condensed.attach(ksp)
     ksp.setUp()
     still = ref(condensed)
@@ -91,9 +91,9 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
     monkeypatch.setattr(choose, "LEFT_OUT", {"condensed", "look_ahead"})
     long = solve(scene)
     assert (
-        short.joint.equilibrium.tangent.factorisations
+        short.joint.equilibrium.linear.tangent.factorisations
         == 1
-        < long.joint.equilibrium.tangent.factorisations
+        < long.joint.equilibrium.linear.tangent.factorisations
     )
     counts = [[m.iterations for m in run.steps] for run in (short, long)]
     assert max(counts[0]) <= 4
@@ -109,13 +109,13 @@ def test_the_ranks_take_the_same_way(comm, pin):
     """Iterations, factorisations and points, on ranks without facets or cells, too."""
     scene = paper_joint(0.1, 3, pin=pin)
     many, one = solve(scene, comm), solve(scene, MPI.COMM_SELF)
-    assert many.joint.equilibrium.tangent.condensed is not None
+    assert many.joint.equilibrium.linear.tangent.condensed is not None
     for a, b in zip(many.steps, one.steps, strict=True):
         assert a.iterations == b.iterations
         assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-10)
     assert (
-        many.joint.equilibrium.tangent.factorisations
-        == one.joint.equilibrium.tangent.factorisations
+        many.joint.equilibrium.linear.tangent.factorisations
+        == one.joint.equilibrium.linear.tangent.factorisations
         == 1
     )
 
@@ -129,5 +129,7 @@ def test_only_joints_that_stay_elastic_and_held_are_condensed():
         paper_joint(0.02, 1),
         paper_joint(0.2, 1, analysis={"gamma_factor": 10.0}),
     ):
-        assert Joint(scene, MPI.COMM_SELF).equilibrium.tangent.condensed is None
-    assert Joint(paper_joint(0.2, 1), MPI.COMM_SELF).equilibrium.tangent.condensed is not None
+        assert Joint(scene, MPI.COMM_SELF).equilibrium.linear.tangent.condensed is None
+    assert (
+        Joint(paper_joint(0.2, 1), MPI.COMM_SELF).equilibrium.linear.tangent.condensed is not None
+    )

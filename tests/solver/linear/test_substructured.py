@@ -29,8 +29,8 @@ def pressed(degree=2):
     at = joint.equilibrium
     at.restore(0.004, joint.first_guess(0.004))
     at.evaluate()
-    at.update_tangent()
-    return joint, at.tangent.A
+    at.linear.update()
+    return joint, at.linear.tangent.A
 
 
 def solver_of(joint, A):

@@ -1,0 +1,201 @@
+"""Bodies that float until they touch, and where contact stops them.
+
+As if rigid, bodies go where contact and forces push them; from there the elastic ones find their
+equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.geometry.curve import ProjectionError
+from archord.solver.contact.contact import Contact
+from archord.solver.contact.tangent import point_rates
+from archord.solver.drives import MOVABLE, Drives
+from archord.solver.problem import Interaction, Rigid
+
+_MOST = 100  # iterations
+_AT_REST = 1e-3  # part of the forces that may be left
+_ROUND_OFF = 1e-9  # the same, of the largest forces on the way
+_DAMPING = 10.0  # ratio of one damping to the next
+_LOOSE = 1e-6  # part of a free motion that a body has at least which takes part in it
+
+
+class _Push(NamedTuple):
+    """What contact does to the free motions.
+
+    force : (r,) on each of them
+    stiffness : (r, r)
+    pressed : sum of the sizes of all contact forces
+    openings : of each pair (m, d, r) what the motions add to gap and slip
+    """
+
+    force: Array
+    stiffness: Array
+    pressed: float
+    openings: list[Array]
+
+
+class RigidMotions:
+    """The motions that supports, means and prescribed ``drives`` leave to bodies as if rigid.
+    Collective.
+
+    free : (r, n_local, d) displacements of the nodes
+    levels : (r, l) levels of unknown drives that go along
+    loose : bodies that take part in a free motion
+    """
+
+    def __init__(self, drives: Drives, contact: Contact) -> None:
+        self.drives = drives
+        self.contact = contact
+        self.comm = drives.comm
+        self.problem = drives.problem
+        bodies = self.problem.bodies
+        moving = drives.moving[drives.unknown]
+        self._modes = np.concatenate([drives.rigid_modes(body) for body in bodies])
+        k = len(self._modes)
+        of_modes = self._modes[:, drives.fixed].T
+        of_levels = drives.unknown_rate[moving][:, drives.fixed].T
+        self._prescribed = np.hstack([of_modes, -of_levels])
+        gram = self.comm.allreduce(self._prescribed.T @ self._prescribed)
+        means = drives.unknown_load[~moving] / drives.stiffness
+        along = self._on_bodies(self._modes, means)
+        gram[:k, :k] += along @ along.T
+        self._follow = np.linalg.pinv(gram, rcond=MOVABLE, hermitian=True)
+        sizes, vectors = np.linalg.eigh(gram)
+        free = vectors[:, sizes <= MOVABLE * sizes.max()]
+        self.free = np.tensordot(free[:k].T, self._modes, 1)
+        self.levels = np.zeros((free.shape[1], len(drives.rate)))
+        self.levels[:, drives.unknown[moving]] = free[k:].T * drives.weight[moving]
+        parts = np.abs(free[:k]).reshape(len(bodies), -1).max(axis=1, initial=0.0)
+        self.loose = [body for body, part in zip(bodies, parts, strict=True) if part > _LOOSE]
+        self._links = [self._linked(interface.interaction) for interface in contact.interfaces]
+
+    def _linked(self, interaction: Interaction) -> set[str]:
+        """The names of the bodies that the ``interaction`` links; a disc has none."""
+        return {
+            "" if isinstance(surface, Rigid) else self.problem.body_of(surface).name
+            for surface in interaction.surfaces
+        }
+
+    def all_reached(self, touching: Sequence[bool]) -> bool:
+        """Whether interfaces that are ``touching`` link every loose body to one that is held, or to
+        a disc."""
+        links = [link for link, touches in zip(self._links, touching, strict=True) if touches]
+        missing = {body.name for body in self.loose}
+        while missing:
+            reached = {name for link in links if link - missing for name in link & missing}
+            if not reached:
+                return False
+            missing -= reached
+        return True
+
+    def _on_bodies(self, motions: Array, forces: Array) -> Array:
+        """Work ``(k, m)`` of ``forces`` ``(m, n_owned, d)`` on nodes along ``motions`` ``(k,
+        n_local, d)``."""
+        own = motions[:, : self.drives.n_owned]
+        return self.comm.allreduce(np.tensordot(own, forces, ((1, 2), (1, 2))))
+
+    def at_rest(self, load: float, state: Array) -> Array:
+        """A ``state`` at ``load``, with bodies moved as their supports are, and loose ones to where
+        contact and forces push them; as it was where contact points find no partners on the way.
+
+        The contact law alone resists. Newton's method finds the least energy, damped while forces
+        are large (Levenberg 1944), in steps of a facet at most.
+        """
+        if not self.contact.pairs:
+            return state
+        u, levels = self._with_supports(load, state)
+        try:
+            u, levels = self._settled(load, u, levels)
+        except ProjectionError:
+            return state
+        return np.append(u, levels)
+
+    def _with_supports(self, load: float, state: Array) -> tuple[Array, Array]:
+        """Displacements and levels with bodies moved rigidly as their supports are."""
+        drives = self.drives
+        n = self._modes[0].size
+        u = state[:n].reshape(self._modes[0].shape).copy()
+        levels = drives.values(load)
+        levels[drives.unknown] = state[n:][drives.unknown]
+        prescribed = np.tensordot(levels, drives.rate, 1)
+        lacking = (prescribed - u)[drives.fixed]
+        followed = self._follow @ self.comm.allreduce(self._prescribed.T @ lacking)
+        u += np.tensordot(followed[: len(self._modes)], self._modes, 1)
+        return u, levels
+
+    def _settled(self, load: float, u: Array, levels: Array) -> tuple[Array, Array]:
+        """Displacements and levels where contact and forces balance. Raises `ProjectionError`."""
+        applied = self._applied(load, levels)
+        step: Array = np.zeros(len(self.free))
+        damping = self.drives.stiffness
+        least = np.inf
+        most = 0.0
+        for _ in range(_MOST):
+            push = self._push(u, levels, load)
+            left = push.force + applied
+            size = float(np.linalg.norm(left))
+            most = max(most, push.pressed)
+            if size > 2 * least:  # back to the place before, for a smaller step
+                u = u - np.tensordot(step, self.free, 1)
+                levels = levels - step @ self.levels
+                damping *= _DAMPING**2
+            else:
+                least = size
+                damping /= _DAMPING
+                best = push
+                best_left = left
+            scale = max(push.pressed, float(np.linalg.norm(applied)))
+            if size <= max(_AT_REST * scale, _ROUND_OFF * most):
+                break
+            damped = best.stiffness + damping * np.eye(len(step))
+            step = self._shortened(np.linalg.solve(damped, best_left), best.openings)
+            u = u + np.tensordot(step, self.free, 1)
+            levels = levels + step @ self.levels
+        return u, levels
+
+    def _applied(self, load: float, levels: Array) -> Array:
+        """Forces ``(r,)`` of drives and loads on the free motions."""
+        drives = self.drives
+        of_loads = np.tensordot(levels, drives.applied, 1)
+        of_drives = self.levels @ drives.values(load) / self.problem.whole
+        return of_drives + self._on_bodies(self.free, of_loads[None])[:, 0]
+
+    def _shortened(self, step: Array, openings: list[Array]) -> Array:
+        """The ``step``, in which no gap changes by more than a facet."""
+        facet = min(surface.facet_lengths().mean() for surface in self.contact.surfaces)
+        farthest = 0.0
+        for opening in openings:
+            farthest = max(farthest, float(np.abs(opening @ step).max(initial=0.0)))
+        farthest = self.comm.allreduce(farthest, op=MPI.MAX)
+        return step if farthest <= facet else step * (facet / farthest)
+
+    def _push(self, u: Array, levels: Array, load: float) -> _Push:
+        """What contact does at these displacements and levels. Raises `ProjectionError`."""
+        self.contact.move(levels, self.problem.fitted(load))
+        self.contact.evaluate(u, reach=False)
+        r = len(self.free)
+        force = np.zeros(r)
+        stiffness = np.zeros((r, r))
+        pressed = 0.0
+        openings: list[Array] = []
+        for pair in self.contact.pairs:
+            rates = [
+                point_rates(pair, *motion)[0] for motion in zip(self.free, self.levels, strict=True)
+            ]
+            opening = -np.stack(rates, axis=2) / pair.gamma[..., None]
+            weight = pair.share * pair.surface.weight.ravel()
+            force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
+            stiff = (weight[:, None] * pair.gamma)[:, None] * pair.by_trial
+            stiffness += np.tensordot(opening, stiff @ opening, ((0, 1), (0, 1)))
+            pressed += float(np.abs(pair.forces).sum())
+            openings.append(opening)
+        force = self.comm.allreduce(force)
+        stiffness = self.comm.allreduce(stiffness)
+        return _Push(force, stiffness, self.comm.allreduce(pressed), openings)

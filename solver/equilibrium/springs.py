@@ -1,0 +1,140 @@
+"""Weak springs that hold bodies where nothing touches them.
+
+Springs between bodies and their last accepted state hold what does not touch even where it has come
+to rest as if rigid. Each point of a body of area ``A`` is pulled back with `WEAK` times ``M / A``
+per displacement and area, ``M`` being the modulus of uniaxial strain, so that a force moves the
+body by about ``1 / WEAK`` times as much as it deforms it; rigid discs under forces, with `WEAK`
+``M``. Beside a far softer body ``M`` is `_STIFFER` times its shear modulus: springs are weak for
+all that carries.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array
+from archord.solver.bulk import assemble, matrix
+from archord.solver.contact.surface import RigidSurface
+from archord.solver.drives import Drives
+from archord.solver.equilibrium.rigid_motions import RigidMotions
+from archord.solver.problem import Body
+
+WEAK = 1e-8  # without influence, but well above the round-off of a factorisation
+_STIFFER = 100.0  # most of M over the smallest shear modulus
+# least of M over the own one: springs must stand out of the round-off of a factorisation
+_LEAST = 1e-5
+_LITTLE = 0.01  # part of the contact forces below which springs hold nothing
+
+
+def spring_modulus(own: float, softest: float) -> float:
+    """The modulus that the springs of a body take for ``M``: its ``own`` one where no body is far
+    softer; ``softest`` is the smallest shear modulus of all bodies."""
+    return max(min(own, _STIFFER * softest), _LEAST * own)
+
+
+class Springs:
+    """The springs of what ``rigid`` finds loose, bodies and discs; ``stiffness`` is that of discs.
+    Collective.
+
+    of_free : their matrix, without prescribed displacements
+    of_levels : (l,) stiffness of the springs of discs
+    last : displacements (n_owned dofs,) and levels (l,) of the last accepted state
+    forces : (n_owned dofs,) on bodies, at the last evaluation
+    on_levels : (l,) on discs
+    work : what the springs took up in the step, of the modelled part
+    energy : sum of the work over accepted states
+    works : work in the last accepted step, by the names of loose bodies and of interactions with a
+        disc
+    idle : whether the springs left all to contact in the last accepted state
+    """
+
+    def __init__(self, rigid: RigidMotions, stiffness: float) -> None:
+        drives = rigid.drives
+        self.rigid = rigid
+        self.comm = drives.comm
+        self._contact = rigid.contact
+        shear = [body.material.elastic_tangent[-1, -1] for body in drives.problem.bodies]
+        softest = float(min(shear))
+        forms = [_form(drives, body, softest) for body in rigid.loose]
+        self._matrix = matrix(drives.V, forms)
+        assemble(self._matrix, forms)
+        self._matrix.assemble()
+        self.of_free = self._matrix.copy()
+        first = self._matrix.getOwnershipRange()[0]
+        fixed = first + np.flatnonzero(drives.fixed[: drives.n_owned])
+        self.of_free.zeroRowsColumns(fixed.astype(PETSc.IntType), 0.0)
+        self._x, self._y = self._matrix.createVecs()
+        self.of_levels: Array = np.zeros(len(drives.rate))
+        for disc in rigid.contact.rigid:
+            self.of_levels += WEAK * spring_modulus(stiffness, softest) * (disc.rate**2).sum(axis=1)
+        n_dofs = drives.dimension * drives.n_owned
+        self.last: tuple[Array, Array] = np.zeros(n_dofs), np.zeros(len(drives.rate))
+        self.energy = 0.0
+        self.works: dict[str, float] = {}
+        self.idle = False
+
+    def pull(self, u: Array) -> Array:
+        """Forces ``(n_owned dofs,)`` of displacements ``u``, alike, on the bodies' springs."""
+        self._x.array[:] = u
+        self._matrix.mult(self._x, self._y)
+        return self._y.array_r.copy()
+
+    def evaluate(self, u: Array, levels: Array) -> None:
+        """Forces and work at the displacements ``u`` ``(n_owned dofs,)`` and drives' ``levels``
+        ``(l,)``."""
+        u_before, levels_before = self.last
+        self._now = u.copy(), levels.copy()
+        self._moved = u - u_before
+        self._turned = levels - levels_before
+        self.forces = self.pull(self._moved)
+        self.on_levels = self.of_levels * self._turned
+        on_bodies = self.comm.allreduce(float(self.forces @ self._moved))
+        self.work = (on_bodies + float(self.on_levels @ self._turned)) / 2
+
+    def commit(self) -> None:
+        """Accept the last evaluation: the springs rest there."""
+        self.last = self._now
+        self.energy += self.work
+        self.works = self._works()
+        self.look()
+
+    def _works(self) -> dict[str, float]:
+        """What they took up at the last evaluation, as ``works``."""
+        drives = self.rigid.drives
+        found: dict[str, float] = {}
+        on_dofs = self.forces * self._moved / 2
+        on_nodes = on_dofs.reshape(-1, drives.dimension).sum(axis=1)
+        for body in self.rigid.loose:
+            nodes = drives.nodes_of(body)
+            owned = nodes[nodes < drives.n_owned]
+            found[body.name] = self.comm.allreduce(float(on_nodes[owned].sum()))
+        on_levels = self.on_levels * self._turned / 2
+        for interface in self._contact.interfaces:
+            disc = interface.surfaces[0]
+            if isinstance(disc, RigidSurface):
+                moves = disc.rate.any(axis=1)
+                found[interface.interaction.name] = float(on_levels[moves].sum())
+        return found
+
+    def look(self) -> None:
+        """See whether they are `idle`."""
+        forces = [np.abs(self.forces).sum()]
+        for interface in self._contact.interfaces:
+            forces.append(sum(float(np.abs(pair.forces).sum()) for pair in interface.pairs))
+        pulled, *pressed = self.comm.allreduce(np.array(forces))
+        is_little = pulled + np.abs(self.on_levels).sum() < _LITTLE * sum(pressed)
+        self.idle = bool(is_little and self.rigid.all_reached([force > 0 for force in pressed]))
+
+
+def _form(drives: Drives, body: Body, softest: float) -> fem.Form:
+    """The bilinear form of the springs of a ``body``."""
+    V = drives.V
+    dx = drives.measure(body.cells or body.name)
+    area = drives.integral(fem.Constant(V.mesh, 1.0) * dx)
+    own = float(body.material.elastic_tangent[0, 0])
+    modulus = fem.Constant(V.mesh, WEAK * spring_modulus(own, softest) / area)
+    product = ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V))
+    return fem.form(modulus * drives.swept(product) * dx)

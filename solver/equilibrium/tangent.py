@@ -1,0 +1,267 @@
+"""The tangent of bulk and contact as one PETSc matrix, without rows and columns of prescribed
+displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array
+from archord.kernels.compat import ghosted_vector
+from archord.report.timer import BEFORE_SOLVING, Timer
+from archord.solver.bulk import assemble, matrix
+from archord.solver.equilibrium.evaluation import Evaluation
+from archord.solver.linear.condensed import Condensed, filled
+
+_SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+_SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+Revise = Callable[[Array], Array | None]
+
+
+class _Slots(NamedTuple):
+    """Where the blocks of the contact's tangent go, ``(k,)`` of them.
+
+    in_matrix : (k,) whether rows and columns are nodes of bodies, not rigid discs
+    is_free : (k, d, d) whether both displacements of an entry are free
+    row_rate : (k, d, m) prescribed displacements of the rows per unit of the unknown levels
+    column_rate : (k, d, m) the same of the columns
+    """
+
+    in_matrix: np.ndarray
+    is_free: np.ndarray
+    row_rate: Array
+    column_rate: Array
+
+
+class TangentMatrix:
+    """The tangent of the last ``evaluation``, assembled by `update`. Collective.
+
+    A : matrix of all displacements
+    condensed : where ``revise`` is given (see `Condensed`), for elastic bodies which their
+        supports hold: the contact, of which ``A`` is free then; else None
+    factorisations : number of factorisations of sparse matrices that `update` asked for
+    """
+
+    def __init__(self, evaluation: Evaluation, timer: Timer, revise: Revise | None) -> None:
+        unknowns = evaluation.unknowns
+        index_map = unknowns.V.dofmap.index_map
+        self.V = unknowns.V
+        self.bulk = evaluation.bulk
+        self.contact = evaluation.contact
+        self.drives = unknowns.drives
+        self.springs = evaluation.springs
+        self.timer = timer
+        self.dimension = unknowns.dimension
+        self.factorisations = 0
+        self._n_owned = unknowns.n_owned
+        self._start = index_map.local_range[0]
+        self._size = index_map.size_global
+        self._fixed = unknowns.fixed[: self._n_owned]
+        self._direction = fem.Function(self.V)
+        self._bcs = [self._held(axis) for axis in range(self.dimension)]
+        self._prescribed, self._rates = self._prescribed_rates()
+        self.A = PETSc.Mat()
+        self._elastic = PETSc.Mat()  # the constant part, with room for all
+        self._revised = PETSc.Mat()
+        self.condensed: Condensed | None = None
+        if revise is not None:
+            with timer(BEFORE_SOLVING):
+                self.condensed = self._condense(revise)
+        self.renew()
+
+    def _held(self, axis: int) -> fem.DirichletBC:
+        """The prescribed displacements along an ``axis``."""
+        nodes = np.flatnonzero(self.drives.fixed[:, axis]).astype(np.int32)
+        return fem.dirichletbc(0.0, self.dimension * nodes + axis, self.V.sub(axis))
+
+    def _prescribed_rates(self) -> tuple[np.ndarray, Array]:
+        """The prescribed dofs ``(p,)`` of all ranks, and then the dofs of rigid discs and one that
+        is none; and their displacements ``(p, m)`` per unit of the unknown levels."""
+        drives = self.drives
+        m = len(drives.unknown)
+        own = np.flatnonzero(self._fixed)
+        rate = drives.unknown_rate[:, : self._n_owned].reshape(m, self._fixed.size).T[own]
+        first = self.dimension * self._start
+        parts = self.V.mesh.comm.allgather((first + own, rate))
+        discs = [drives.weight[:, None] * disc.rate[drives.unknown] for disc in self.contact.rigid]
+        behind = np.hstack([*discs, np.zeros((m, 1))]).T
+        parts.append((self.dimension * self._size + np.arange(len(behind)), behind))
+        dofs, rates = zip(*parts, strict=True)
+        return np.concatenate(dofs), np.concatenate(rates)
+
+    def _condense(self, revise: Revise) -> Condensed:
+        self.A = self._allocated()
+        self.A.assemble()
+        self.A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
+        nodes = [surface.curve_dofs for surface in self.contact.surfaces]
+        return Condensed(self.A, np.unique(np.concatenate(nodes)), self.dimension, revise)
+
+    def _allocated(self, *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
+        """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this
+        rank."""
+        A = matrix(self.V, self.bulk.elastic_forms, *slots)
+        assemble(A, self.bulk.elastic_forms, self._bcs)
+        return A
+
+    def renew(self) -> None:
+        """Allocate every slot that bulk and contact may fill; in a condensed matrix, slots of
+        contact alone."""
+        tangent = self.contact.tangent
+        self._slots = self._slots_of(tangent.rows, tangent.columns)
+        self._contact_blocks: Array = np.zeros((len(tangent.rows), self.dimension, self.dimension))
+        if self.condensed is not None:
+            inside = self._slots.in_matrix
+            self.condensed.occupy(tangent.rows[inside], tangent.columns[inside])
+            return
+        self.A.destroy()
+        self._elastic.destroy()
+        self._revised.destroy()
+        rows, columns = self.contact.pattern()
+        mine = (rows >= self._start) & (rows < self._start + self._n_owned)
+        rows = rows[mine]
+        columns = columns[mine]
+        self.A = self._allocated((rows, columns))
+        # zeros into every other slot: what is not written before the first assembly is given back
+        self._add(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
+        self.A.assemble()
+        self.A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+        self._elastic = self.A.copy()
+
+    def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
+        in_matrix = (rows < self._size) & (columns < self._size)
+        row_is_free, row_rate = self._at(rows)
+        column_is_free, column_rate = self._at(columns)
+        is_free = row_is_free[:, :, None] * column_is_free[:, None, :]
+        return _Slots(in_matrix, is_free, row_rate, column_rate)
+
+    def _at(self, nodes: np.ndarray) -> tuple[np.ndarray, Array]:
+        """Which displacements of block dofs ``nodes`` ``(k,)`` are free ``(k, d)``; the others'
+        rates ``(k, d, m)``."""
+        dofs = self.dimension * nodes[:, None] + np.arange(self.dimension)
+        at = np.searchsorted(self._prescribed, dofs)
+        is_free = self._prescribed[at] != dofs
+        return is_free, np.where(is_free[..., None], 0.0, self._rates[at])
+
+    @staticmethod
+    def _add(A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: Array) -> None:
+        """Add blocks ``(k, d, d)`` at ``rows``, sorted, and ``columns`` to ``A``."""
+        if not len(rows):
+            return
+        start = np.flatnonzero(np.diff(rows, prepend=-1))
+        offsets = np.append(start, len(rows)).astype(PETSc.IntType)
+        A.setValuesBlockedIJV(
+            offsets,
+            columns.astype(PETSc.IntType),
+            values,
+            PETSc.InsertMode.ADD,
+            rows[start].astype(PETSc.IntType),
+        )
+
+    def _add_contact(self, A: PETSc.Mat, blocks: Array) -> None:
+        """Add ``blocks`` ``(k, d, d)`` in the slots of the contact to ``A``."""
+        tangent = self.contact.tangent
+        kept = filled(blocks)
+        kept = kept[self._slots.in_matrix[kept]]
+        values = blocks[kept] * self._slots.is_free[kept]
+        self._add(A, tangent.rows[kept], tangent.columns[kept], values)
+        A.assemble()
+
+    def update(self, *, factorise: bool = True) -> None:
+        """Assemble ``A``, to be factorised or not."""
+        if self.condensed is not None:
+            self._update_condensed(self.condensed)
+            return
+        self.factorisations += factorise
+        with self.timer("assemble bulk"):
+            self._elastic.copy(self.A, _SAME)
+            if self.springs:
+                self.A.axpy(1.0, self.springs.of_free, _SUBSET)
+            self.bulk.assemble_correction(self.A, self._bcs)
+        with self.timer("assemble contact"):
+            self._contact_blocks = self.contact.tangent.blocks()
+            self._add_contact(self.A, self._contact_blocks)
+
+    def _update_condensed(self, condensed: Condensed) -> None:
+        self.factorisations = 1
+        with self.timer("assemble contact"):
+            self._contact_blocks = self.contact.tangent.blocks()
+            inside = self._slots.in_matrix
+            condensed.update(self._contact_blocks[inside] * self._slots.is_free[inside])
+
+    def revised(self) -> tuple[PETSc.Mat, Array]:
+        """``A`` for the branches that contact points are on now, beside ``A`` of the last `update`
+        and valid until the next call; and the contact's blocks."""
+        with self.timer("assemble contact"):
+            blocks = self.contact.tangent.blocks()
+            if not self._revised:
+                self._revised = self.A.duplicate()
+            self.A.copy(self._revised, _SAME)
+            self._add_contact(self._revised, blocks - self._contact_blocks)
+        return self._revised, blocks
+
+    def border(self, blocks: Array | None = None) -> tuple[Array, Array, Array]:
+        """The border of the matrix, of the ``m`` unknown levels: derivatives ``B`` ``(n_owned dofs,
+        m)`` of the residual by the levels, ``C``, alike, of what the levels' equations prescribe by
+        the displacements, and ``D`` ``(m, m)``, of all ranks, by the levels.
+
+        With the contact's ``blocks``, without them those of the last `update`. The bulk's part of B
+        and C is the same where its tangent is symmetric, as of all materials without recovery of
+        back stresses.
+        """
+        blocks = self._contact_blocks if blocks is None else blocks
+        drives = self.drives
+        m = len(drives.unknown)
+        load = drives.unknown_load.reshape(m, -1)
+        rate = drives.unknown_rate[:, : self._n_owned].reshape(m, -1)
+        row_rate = self._slots.row_rate
+        on_rows = np.einsum("nij,njm->nim", blocks, self._slots.column_rate)
+        on_columns = np.einsum("nim,nij->njm", row_rate, blocks)
+        D = np.tensordot(row_rate, on_rows, ((0, 1), (0, 1))) - rate @ load.T + load @ rate.T
+        B = -load.T
+        C = load.T.copy()
+        for level in range(m):
+            of_bulk = self._bulk_along(level)
+            D[:, level] += rate @ of_bulk
+            B[:, level] += self._with_contact(
+                of_bulk, self.contact.tangent.rows, on_rows[..., level]
+            )
+            C[:, level] += self._with_contact(
+                of_bulk, self.contact.tangent.columns, on_columns[..., level]
+            )
+        D = self.V.mesh.comm.allreduce(D)
+        if self.springs:
+            D += np.diag(self.springs.of_levels[drives.unknown] * drives.weight**2)
+        is_free = ~self._fixed.reshape(-1, 1)
+        return B * is_free, C * is_free, D
+
+    def _bulk_along(self, level: int) -> Array:
+        """Forces ``(n_owned dofs,)`` of bulk and springs along the displacements of an unknown
+        ``level``."""
+        force = ghosted_vector(self.V.dofmap.index_map, self.dimension)
+        drives = self.drives
+        if drives.moving[drives.unknown[level]]:
+            self._direction.x.array[:] = drives.unknown_rate[level].ravel()
+            self.bulk.add_action(self._direction, force)
+            if self.springs:
+                own = self._direction.x.array[: self.dimension * self._n_owned]
+                force.array[:] += self.springs.pull(own)
+        found = force.array_r.copy()
+        force.destroy()
+        return found
+
+    def _with_contact(self, of_bulk: Array, nodes: np.ndarray, values: Array) -> Array:
+        """The bulk's forces and the ``values`` ``(k, d)`` of the contact at block dofs
+        ``nodes``."""
+        inside = nodes < self._size
+        total = ghosted_vector(self.V.dofmap.index_map, self.dimension)
+        total.array[:] = of_bulk
+        at = nodes[inside].astype(PETSc.IntType)
+        total.setValuesBlocked(at, np.ascontiguousarray(values[inside]), PETSc.InsertMode.ADD)
+        total.assemble()
+        found = total.array_r.copy()
+        total.destroy()
+        return found
