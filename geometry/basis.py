@@ -4,15 +4,13 @@ arrays."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import basix
 import numpy as np
 import numpy.typing as npt
 
 from archord.kernels.compat import cell_degree, cell_nodes
-from archord.kernels.compiled import library, pointer
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
@@ -100,29 +98,3 @@ def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
 def bulk_quadrature(cell: basix.CellType, degree: int) -> tuple[Array, Array]:
     """Points ``(q, 2)`` and weights ``(q,)`` of the bulk rule on the reference ``cell``."""
     return basix.make_quadrature(cell, bulk_quadrature_degree(cell, degree))
-
-
-def strain_matrix(gradient: Array) -> Array:
-    """``B`` ``(..., 3, 2 a)`` with ``B u = [eps_xx, eps_yy, gamma_xy]`` for nodal ``u = [ux0, uy0,
-    ux1, ...]``."""
-    B = np.zeros((*gradient.shape[:-2], 3, 2 * gradient.shape[-2]))
-    B[..., 0, 0::2] = B[..., 2, 1::2] = gradient[..., 0]
-    B[..., 1, 1::2] = B[..., 2, 0::2] = gradient[..., 1]
-    return B
-
-
-def displacement_gradient(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
-    """Displacement gradient ``(n, q, 4)``, ``[xx, yy, xy, yx]`` with xy that of the displacement
-    along x by y."""
-    (xx, yx), (xy, yy) = np.moveaxis(np.swapaxes(gradient, 2, 3) @ u[dofs][:, None], (2, 3), (0, 1))
-    return np.stack([xx, yy, xy, yx], axis=-1)
-
-
-def strain(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
-    """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal
-    displacements ``(nodes, 2)``."""
-    n, q, a, _ = gradient.shape
-    result = np.empty((n, q, 3))
-    arrays: tuple[npt.NDArray[Any], ...] = (gradient, dofs, u, result)
-    library(Path(__file__).with_name("strain.c")).strains(n, q, a, *map(pointer, arrays))
-    return result

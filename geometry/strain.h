@@ -1,5 +1,6 @@
 #include <stdint.h>
 
-/* strain (n q, 3) = [eps_xx, eps_yy, gamma_xy] from gradient (n, q, a, 2), dofs (n, a) and displacements u (nodes, 2) */
-void strains(int32_t n, int32_t q, int32_t a, const double *gradient, const int32_t *dofs,
-    const double *u, double *strain);
+/* strain (n q, k) from derivative (n, q, a, m), dofs (n, a) and displacements u (nodes, d); each of terms (n_terms, 3)
+ * is a component of the displacement, a derivative, and the component of the strain that gets their product. */
+void strains(int32_t n, int32_t q, int32_t a, int32_t m, int32_t d, int32_t n_terms, int32_t k, const int32_t *terms,
+    const double *derivative, const int32_t *dofs, const double *u, double *strain);

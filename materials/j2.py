@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening, LinearHardening
@@ -36,6 +37,10 @@ class J2Material(Elastic):
         if self.plane == "strain" and linear is not None:
             return radial_return(strain, state, self, *linear)
         return return_map(strain, state, self, self.hardening)
+
+    def flows(self, old: PlasticState, new: PlasticState) -> npt.NDArray[np.bool_]:
+        """The points ``(n,)`` whose PEEQ has grown."""
+        return new.peeq > old.peeq
 
     def centre(self, state: PlasticState) -> Array | float:
         """The middle of the elastic range, a deviator ``(n, 4)``."""

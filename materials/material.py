@@ -45,12 +45,17 @@ class Material(Protocol):
         """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n,
         3)`` from ``state``.
 
-        The tangent equals `elastic_tangent` to the bit at points that do not flow; it may be a
-        view, not to be written to. If it is not symmetric, `TangentMatrix.border` takes it as such
+        The tangent is the `elastic_tangent` at points that `flows` leaves out; it may be a view,
+        not to be written to. If it is not symmetric, `TangentMatrix.border` takes it as such
         under force control: more iterations, the same equilibrium. A stress that does not exist is
         not a number: the solver takes the step back.
         """
         ...
+
+    def flows(self, old: State, new: State) -> npt.NDArray[np.bool_] | bool:
+        """Which points ``(n,)`` left the `elastic_tangent` on the way from the ``old`` state to the
+        ``new`` one: all of them, where a material does not tell."""
+        return True
 
     def energy(self, stress: Array) -> Array:
         """Elastic energy density ``(n,)`` of stresses ``(n, 4)``."""
@@ -116,6 +121,11 @@ class Points:
         committed state."""
         stress, tangent, self.trial = self.acting.update(*strain, self.state)
         return stress, tangent
+
+    @property
+    def flows(self) -> npt.NDArray[np.bool_]:
+        """Which points ``(n,)`` left the elastic tangent at the last strain seen."""
+        return np.broadcast_to(self.acting.flows(self.state, self.trial), self.n)
 
     @property
     def peeq(self) -> Array:

@@ -17,12 +17,11 @@ from archord.geometry.basis import (
     Array,
     bulk_quadrature,
     cell_basis,
-    displacement_gradient,
-    strain,
-    strain_matrix,
 )
 from archord.geometry.curve import Curve, RigidCircle, in_pieces
+from archord.geometry.strain import PointStrain
 from archord.kernels.compat import cell_degree
+from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.materials.material import Material, Points
 
 _ASKEW = np.array(
@@ -44,8 +43,14 @@ class Surface:
     """
 
     def __init__(
-        self, V: fem.FunctionSpace, facets: np.ndarray, material: Material, name: str = ""
+        self,
+        V: fem.FunctionSpace,
+        facets: np.ndarray,
+        material: Material,
+        name: str = "",
+        kinematics: Kinematics = PLANE_STRAIN,
     ) -> None:
+        self.kinematics = kinematics
         self.V, self.comm, self.material, self.name = V, V.mesh.comm, material, name
         self.degree, index_map = V.element.basix_element.degree, V.dofmap.index_map
         cells, local_facets, within = _owned_facets(V.mesh, facets)
@@ -122,12 +127,12 @@ class Surface:
             self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1])
         )
         self.trace_shape = np.take_along_axis(self.shape, on_facet, axis=2)
-        self.points, (x, y) = Points(self.material, self.weight.size), self.outward.reshape(-1, 2).T
-        z = np.zeros_like(x)
-        rows = [[x, z, y, z], [z, y, z, x]] if self.material.finite else [[x, z, y], [z, y, x]]
-        self._cut = np.ascontiguousarray(
-            np.moveaxis(np.array(rows), -1, 0)
-        )  # takes a stress to the force on the edge
+        self.points = Points(self.material, self.weight.size)
+        large = self.material.finite
+        self._small_strain = PointStrain(self.kinematics, basis, self.cell_dofs)
+        self.strain = PointStrain(self.kinematics, basis, self.cell_dofs, large=large)
+        # takes a stress to the force on the edge
+        self._cut = self.kinematics.traction(self.outward.reshape(-1, 2), large=large)
 
     def _trace_inequality(self) -> Array:
         """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its
@@ -140,14 +145,14 @@ class Surface:
         C = self.material.elastic_tangent
         X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree)
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
-        B = strain_matrix(basis.gradient)
+        B = PointStrain(self.kinematics, basis, self.cell_dofs).matrix()
         energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.measure * w, B, C, B, optimize=True)
         x, y = np.moveaxis(self.outward, -1, 0)
         normal, shear = [x**2, y**2, 2 * x * y], [-x * y, x * y, x**2 - y**2]
         rows = np.einsum(
             "inqk,nqka->inqa",
             np.stack([normal, shear]).transpose(0, 2, 3, 1) @ C,
-            strain_matrix(self.gradient),
+            self._small_strain.matrix(),
         )
         traces = np.einsum("nq,inqa,inqb->inab", self.weight, rows, rows)
         value, vector = np.linalg.eigh(energy)
@@ -187,13 +192,13 @@ class Surface:
         """Own displacement ``(n q, 2)`` at the contact points, force of the own stress per
         undeformed area ``(n q, 2)``, and its derivative ``(n q, 2, 4)`` by the displacement
         gradient, ``[xx, yy, xy, yx]``."""
-        at, cut = (self.gradient, self.cell_dofs, u), self._cut
+        stress, moduli = self.points.update(self.strain(u).reshape(-1, self.strain.k))
+        by_strain = self._cut @ moduli
         if self.material.finite:
-            stress, moduli = self.points.update(displacement_gradient(*at).reshape(-1, 4))
-            return self.displacement(u), np.einsum("mij,mj->mi", cut, stress), cut @ moduli
-        stress, moduli = self.points.update(strain(*at).reshape(-1, 3))
-        force = np.einsum("mij,mj->mi", cut, stress[:, [0, 1, 3]])
-        return self.displacement(u), force, (cut @ moduli)[..., [0, 1, 2, 2]]
+            return self.displacement(u), np.einsum("mij,mj->mi", self._cut, stress), by_strain
+        working = stress[:, self.kinematics.working]
+        force = np.einsum("mij,mj->mi", self._cut, working)
+        return self.displacement(u), force, by_strain @ self.kinematics.small
 
     def displacement(self, u: Array) -> Array:
         """Own displacement ``(n q, 2)`` at the contact points."""

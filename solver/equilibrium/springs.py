@@ -16,7 +16,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.bulk import assemble, matrix
+from archord.solver.assembly import assemble, matrix
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.drives import Drives
 from archord.solver.equilibrium.rigid_motions import RigidMotions

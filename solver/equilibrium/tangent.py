@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.kernels.compat import ghosted_vector
 from archord.report.timer import BEFORE_SOLVING, Timer
-from archord.solver.bulk import assemble, matrix
+from archord.solver.assembly import assemble, matrix
 from archord.solver.equilibrium.evaluation import Evaluation
 from archord.solver.linear.condensed import Condensed, filled
 

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array, tabulate
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.materials.material import Points
-from archord.solver.bulk import PointFields
+from archord.solver.body_points import PointFields
 from archord.solver.path.system import System
 
 Arrays = dict[str, np.ndarray]

@@ -15,10 +15,11 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.kernels.compat import cell_degree
 from archord.report.timer import Timer
-from archord.solver.bulk import Bulk, Distortion
+from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
+from archord.solver.distortion import Distortion
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.expansion import expanded
 from archord.solver.path.load_path import Companion, LoadPath, Position
@@ -76,7 +77,7 @@ class System:
         problem = self.problem
         cells = {problem.tag(body): problem.cells_of(body) for body in problem.bodies}
         materials = {problem.tag(body): body.material for body in problem.bodies}
-        return Bulk(self.V, cells, materials)
+        return Bulk(self.V, cells, materials, self.problem.kinematics)
 
     def _interface(self, interaction: Interaction) -> Interface:
         surfaces = [self._surface(given, interaction.name) for given in interaction.surfaces]
@@ -88,7 +89,7 @@ class System:
         name = given if given not in self.sides else f"{given} ({interaction})"
         material = self.problem.body_of(given).material
         facets = self.problem.mesh.facets_in(given)
-        self.sides[name] = Surface(self.V, facets, material, name)
+        self.sides[name] = Surface(self.V, facets, material, name, self.problem.kinematics)
         return self.sides[name]
 
     def nodes_of(self, body: Body) -> np.ndarray:

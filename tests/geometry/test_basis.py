@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import (
@@ -10,10 +11,10 @@ from archord.geometry.basis import (
     bulk_quadrature,
     cell_basis,
     lagrange_element,
-    strain,
-    strain_matrix,
 )
 from archord.geometry.shapes.pin_in_block import quarter_joint
+from archord.geometry.strain import PointStrain
+from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN
 
 
 def mesh_and_basis(X):
@@ -41,7 +42,8 @@ def test_gradients_of_linear_fields_are_exact_on_curved_cells():
         u = nodes @ A.T + [1.0, 2.0]
         gradient = np.einsum("nqaj,nai->nqij", basis.gradient, u)
         np.testing.assert_allclose(gradient, np.broadcast_to(A, gradient.shape), atol=tolerance)
-        found = strain(basis.gradient, *cell_by_cell(u))
+        dofs, nodal = cell_by_cell(u)
+        found = PointStrain(PLANE_STRAIN, basis, dofs)(nodal)
         expected = np.broadcast_to([A[0, 0], A[1, 1], A[0, 1] + A[1, 0]], found.shape)
         np.testing.assert_allclose(found, expected, atol=1e-12)
     np.testing.assert_allclose(
@@ -65,10 +67,24 @@ def test_gradients_are_the_derivatives_of_the_shape_functions():
         )
 
 
-def test_strain_matrix_times_displacement_is_the_strain():
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize("kinematics", [PLANE_STRAIN, AXISYMMETRIC], ids=lambda k: k.name)
+def test_strain_matrix_times_displacement_is_the_strain(kinematics, large):
     """Both ways to the strain agree for any nodal displacement."""
     nodes, basis = mesh_and_basis(bulk_quadrature(TRIANGLE, 2)[0])
     u = np.random.default_rng(0).normal(size=nodes.shape)
-    expected = np.einsum("nqia,na->nqi", strain_matrix(basis.gradient), u.reshape(len(u), 12))
-    found = strain(basis.gradient, *cell_by_cell(u))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    dofs, nodal = cell_by_cell(u)
+    strain = PointStrain(kinematics, basis, dofs, large=large)
+    expected = np.einsum("nqia,na->nqi", strain.matrix(), u.reshape(len(u), 12))
+    np.testing.assert_allclose(strain(nodal), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_hoop_strain_is_the_radial_displacement_over_the_radius():
+    """At the points of cells, some of which touch the axis; on the axis it is the radial strain."""
+    nodes, basis = mesh_and_basis(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.3, 0.3]]))
+    r, z = np.moveaxis(nodes, -1, 0)
+    assert (np.abs(basis.point[..., 0]) < 1e-12).any()
+    dofs, nodal = cell_by_cell(np.stack([0.1 * r, 0.3 * r * z], axis=-1))
+    gradient = PointStrain(AXISYMMETRIC, basis, dofs, large=True)(nodal)
+    np.testing.assert_allclose(gradient[..., [0, 4]], 0.1, atol=1e-12)
+    np.testing.assert_allclose(gradient[..., 2], 0.0, atol=1e-12)

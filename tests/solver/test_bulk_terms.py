@@ -7,7 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import von_mises
-from archord.solver.bulk import Bulk, assemble, matrix
+from archord.solver.assembly import assemble, matrix
+from archord.solver.bulk import Bulk
 from tests.solver.parts import (
     ELASTIC,
     HARDENING,

@@ -17,8 +17,10 @@ from dolfinx.mesh import (
 )
 from mpi4py import MPI
 
-from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.geometry.curve import in_pieces
+from archord.geometry.strain import PointStrain
+from archord.materials.kinematics import PLANE_STRAIN
 from archord.solver.contact.surface import Surface
 from tests.geometry.shapes.measures import Facets
 from tests.solver.parts import (
@@ -56,13 +58,13 @@ def trace_forms(side):
     sigma_n, eps = [], []
     for unit in units:
         u, nodes = unit.copy(), np.tile(np.arange(6, dtype=np.int32), (len(side.cells), 1))
-        s = strain(side.gradient, nodes, u) @ C
+        s = PointStrain(PLANE_STRAIN, side, nodes)(u) @ C
         sigma_n.append(
             n[..., 0] ** 2 * s[..., 0]
             + n[..., 1] ** 2 * s[..., 1]
             + 2 * n[..., 0] * n[..., 1] * s[..., 2]
         )
-        eps.append(strain(basis.gradient, nodes, u))
+        eps.append(PointStrain(PLANE_STRAIN, basis, nodes)(u))
     sigma_n, eps = np.stack(sigma_n, axis=1), np.stack(eps, axis=1)
     trace = np.einsum("nq,naq,nbq->nab", side.weight, sigma_n, sigma_n)
     return trace, np.einsum("nq,naqi,ij,nbqj->nab", basis.measure * w, eps, C, eps)

@@ -1,0 +1,108 @@
+"""The integration points of one body: strains, stresses and history, and what is told of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import fem
+
+from archord.geometry.basis import Array, bulk_quadrature, cell_basis
+from archord.geometry.strain import PointStrain
+from archord.materials.kinematics import Kinematics
+from archord.materials.material import Material, Points
+
+
+class PointFields(NamedTuple):
+    """Fields at the ``q`` integration points of a body's ``n`` cells.
+
+    - ``cells`` ``(n,)``: local numbers
+    - ``coordinates`` ``(n, q, d)``
+    - ``weight`` ``(n, q)``: area of a plane, volume of a ring
+    - ``stress`` ``(n, q, 4)``: Cauchy's
+    - ``plastic_strain`` ``(n, q, 4)``
+    - ``peeq`` ``(n, q)``
+    """
+
+    cells: np.ndarray
+    coordinates: Array
+    weight: Array
+    stress: Array
+    plastic_strain: Array
+    peeq: Array
+
+
+class BodyPoints:
+    """The ``q`` integration points of each of ``n`` cells of a body, with ``k`` components of
+    strain.
+
+    - ``cells`` ``(n,)``: local numbers
+    - ``point`` ``(n, q, d)``: coordinates
+    - ``weight`` ``(n, q)``: area of a plane, volume of a ring
+    - ``elastic`` ``(k, k)``: the elastic tangent
+    - ``strain`` ``(n q, k)``: at the last update; a displacement gradient at large strain
+    - ``stress`` ``(n q, 4)``: at the last update; nominal ``(n q, k)`` at large strain
+    - ``flows`` ``(n,)``: whether a point of the cell has left its elastic tangent
+    """
+
+    def __init__(
+        self, V: fem.FunctionSpace, cells: np.ndarray, material: Material, kinematics: Kinematics
+    ) -> None:
+        degree = V.element.basix_element.degree
+        X, w = bulk_quadrature(V.mesh.basix_cell(), degree)
+        basis = cell_basis(V.mesh, degree, cells, X)
+        large = material.finite
+        self.cells = cells
+        self.point = basis.point
+        self.weight = basis.measure * w * kinematics.measure(basis.point)
+        self.measure = PointStrain(kinematics, basis, V.dofmap.list[cells], large=large)
+        self.points = Points(material, self.weight.size)
+        self.elastic = material.elastic_tangent
+        if large:
+            self.elastic = kinematics.small.T @ self.elastic @ kinematics.small
+        self._working = slice(None) if large else list(kinematics.working)
+        self.strain: Array = np.zeros((self.weight.size, self.measure.k))
+        self.stress: Array = np.zeros((self.weight.size, 4))
+        self.flows: np.ndarray = np.zeros(len(cells), dtype=bool)
+
+    @property
+    def flowing(self) -> np.ndarray:
+        """The cells ``(m,)`` with a point that has left its elastic tangent."""
+        return self.cells[self.flows]
+
+    def update(self, u: Array) -> Array:
+        """Keep strain, stress and trial history at the nodal displacements ``u``; returns the
+        tangent ``(n, q, k, k)``."""
+        k = self.measure.k
+        self.strain = self.measure(u).reshape(-1, k)
+        self.stress, tangent = self.points.update(self.strain)
+        self.flows = self.points.flows.reshape(self.weight.shape).any(axis=1)
+        return tangent.reshape(*self.weight.shape, k, k)
+
+    def forces(self) -> Array:
+        """What of the stress does work on the strain ``(n, q, k)``."""
+        return self.stress[:, self._working].reshape(*self.weight.shape, self.measure.k)
+
+    def energies(self) -> tuple[float, float]:
+        """Elastic energy and plastic dissipation at the last update."""
+        material = self.points.material
+        trial = self.points.trial
+        weight = self.weight.ravel()
+        stored = material.stored(self.strain, self.stress, trial)
+        dissipated = np.broadcast_to(material.dissipation(trial), weight.shape)
+        return float(weight @ stored), float(weight @ dissipated)
+
+    def fields(self) -> PointFields:
+        """The fields at the last update."""
+        n, q = self.weight.shape
+        trial = self.points.trial
+        stress = self.points.material.true_stress(self.strain, self.stress, trial)
+        plastic_strain = getattr(trial, "plastic_strain", np.zeros_like(stress))
+        return PointFields(
+            self.cells,
+            self.point,
+            self.weight,
+            stress.reshape(n, q, -1),
+            plastic_strain.reshape(n, q, -1),
+            self.points.peeq.reshape(n, q),
+        )
