@@ -76,7 +76,8 @@ class BodyPoints:
         k = self.measure.k
         self.strain = self.measure(u).reshape(-1, k)
         self.stress, tangent = self.points.update(self.strain)
-        self.flows = self.points.flows.reshape(self.weight.shape).any(axis=1)
+        flows = self.points.flows.reshape(self.weight.shape)
+        self.flows = np.logical_or.reduce(flows, axis=1)
         return tangent.reshape(*self.weight.shape, k, k)
 
     def forces(self) -> Array:
