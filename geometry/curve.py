@@ -19,13 +19,14 @@ from archord.materials.material import Array
 Index = npt.NDArray[np.integer]
 
 _END_MARGIN = (
-    0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
+    0.05  # part of its length by which a facet is continued beyond a free end of its curve
 )
-_CONTINUED = 0.5  # and a facet by this much where points are to stay on theirs
+_CONTINUED = 0.5  # the same of a facet where points are to stay on theirs
 _NEWTON_STEPS = 30
-# of an arc's size: how far points may be off its circle; and size over radius, below which it is a
-# line
-_ROUND = 1e-3
+_SAMPLES = 4  # points a facet, among which the nearest facet is searched
+_ROUND = (
+    1e-3  # over an arc's size, how far points may be off its circle; size over radius of a line
+)
 
 
 class ProjectionError(RuntimeError):
@@ -38,22 +39,33 @@ class Projection:
     needs.
 
     With ``n`` the outward normal of the opposite curve at ``y``, ``gap = (x - y) . n``: positive
-    when open.
+    when open. A point is not ``found`` if it lies beyond a free end of the curve, or faces away. A
+    closest point that is a vertex does not slide: ``xi`` stands still.
     """
 
-    found: npt.NDArray[
-        np.bool_
-    ]  # (m,) False: the point lies beyond a free end of the curve, or faces away
+    facet: Index  # (m,) facet of the opposite curve
+    xi: Array  # (m,) position on it
     point: Array  # (m, 2)
     normal: Array  # (m, 2) unit
     tangent: Array  # (m, 2) d y / d xi
     bend: Array  # (m,) n . d2y / d xi2
-    slides: npt.NDArray[np.bool_]  # (m,) False: the closest point is a vertex, xi stands still
-    nodes: Index  # (m, k) curve nodes that carry y (k = 0: rigid)
-    shape: Array  # (m, k) their shape functions
-    slope: Array  # (m, k) and the derivatives in xi
-    facet: Index  # (m,) facet of the opposite curve
-    xi: Array  # (m,) position on it
+    shape: Array  # (m, k) shape functions of the nodes that carry y
+    slope: Array  # (m, k) their derivatives in xi
+    slides: npt.NDArray[np.bool_]  # (m,)
+    found: npt.NDArray[np.bool_]  # (m,)
+    nodes: Index  # (m, k) the nodes that carry y
+
+    @classmethod
+    def empty(cls, m: int, k: int) -> Projection:
+        """Of ``m`` points, to be filled in."""
+        vectors = np.empty((3, m, 2))
+        numbers = np.empty((2, m))
+        of_nodes = np.empty((2, m, k))
+        flags = np.empty((2, m), dtype=bool)
+        facet = np.empty(m, dtype=np.int32)
+        nodes = np.empty((m, k), dtype=np.int32)
+        xi, bend = numbers
+        return cls(facet, xi, *vectors, bend, *of_nodes, *flags, nodes)
 
 
 def lagrange(degree: int) -> Array:
@@ -66,38 +78,44 @@ def lagrange(degree: int) -> Array:
 def in_pieces(start: np.ndarray, end: np.ndarray, height: Array) -> np.ndarray:
     """Order that links facets end to start: open pieces first, closed ones from their facet of
     least ``height`` on."""
-    by_start, ends = {int(s): i for i, s in enumerate(start)}, set(end.tolist())
-    firsts = np.argsort(height, kind="stable")
+    starting_at = {int(node): facet for facet, node in enumerate(start)}
+    ends = set(end.tolist())
+    lowest_first = np.argsort(height, kind="stable")
+    of_open_pieces = [facet for facet in lowest_first if int(start[facet]) not in ends]
     order: dict[int, None] = {}  # a set that keeps its order
-    for first in [*(i for i in firsts if int(start[i]) not in ends), *firsts]:
-        at: int | None = int(first)
-        while at is not None and at not in order:
-            order[at] = None
-            at = by_start.get(int(end[at]))
+    for first in [*of_open_pieces, *lowest_first]:
+        facet: int | None = int(first)
+        while facet is not None and facet not in order:
+            order[facet] = None
+            facet = starting_at.get(int(end[facet]))
     return np.array(list(order), dtype=np.int64)
 
 
 class Curve:
-    """``n`` polynomial facets with nodes ``X`` ``(m, 2)``, piece by piece in the direction of
-    travel.
+    """``n`` polynomial facets, piece by piece in the direction of travel.
 
-    ``connectivity`` ``(n, p + 1)`` holds the nodes along each facet; without it, facet ``k`` of one
-    open piece has the nodes ``k p .. (k + 1) p``. ``before`` and ``after`` ``(n,)`` are the facets
-    at both ends of each, -1 at free ends.
+    X : (nodes, 2) the nodes
+    connectivity : (n, degree + 1) the nodes along each facet; without it, facet ``k`` of one open
+        piece has the nodes ``k degree .. (k + 1) degree``
+    before, after : (n,) the facets at both ends of each, -1 at free ends
     """
 
     def __init__(self, X: Array, degree: int, connectivity: Index | None = None) -> None:
-        self.X, self.degree = X, degree
+        self.X = X
+        self.degree = degree
         if connectivity is None:
             connectivity = np.arange(0, len(X) - 1, degree)[:, None] + np.arange(degree + 1)
-        self.connectivity, self.n_facets = connectivity.astype(np.int32), len(connectivity)
-        first, last = self.connectivity[:, 0], self.connectivity[:, -1]
+        self.connectivity = connectivity.astype(np.int32)
+        self.n_facets = len(connectivity)
+        first = self.connectivity[:, 0]
+        last = self.connectivity[:, -1]
         starting, ending = np.full((2, len(X)), -1, dtype=np.int32)
-        starting[first] = ending[last] = np.arange(self.n_facets)
-        self.before, self.after = ending[first], starting[last]
-        self._first = (
-            np.flatnonzero(self.before[1:] != np.arange(self.n_facets - 1)) + 1
-        )  # of each piece but one
+        starting[first] = np.arange(self.n_facets)
+        ending[last] = np.arange(self.n_facets)
+        self.before = ending[first]
+        self.after = starting[last]
+        follows = self.before[1:] == np.arange(self.n_facets - 1)
+        self._first = np.flatnonzero(~follows) + 1  # facet of each piece but one
         self._coefficients = lagrange(degree)
 
     @property
@@ -106,25 +124,23 @@ class Curve:
         return 1 + len(self._first)
 
     def shapes(self, xi: Array) -> tuple[Array, Array]:
-        """Shape functions and their derivatives, each ``(..., p + 1)``, at ``xi`` ``(...)``."""
+        """Shape functions and their derivatives, ``(..., degree + 1)`` each, at ``xi``."""
         k = np.arange(self.degree + 1)
         powers = np.stack([xi[..., None] ** k, k * xi[..., None] ** np.maximum(k - 1, 0)])
         # one product of two matrices: numpy would multiply point by point
-        value, slope = (powers.reshape(-1, self.degree + 1) @ self._coefficients.T).reshape(
-            powers.shape
-        )
+        flat = powers.reshape(-1, self.degree + 1) @ self._coefficients.T
+        value, slope = flat.reshape(powers.shape)
         return value, slope
 
     def vertices(self) -> tuple[Array, Array]:
         """Where facets meet or the curve ends ``(k, 2)``, and the outward normals of the chords
         there."""
-        ends = self.X[self.connectivity[:, [0, -1]]]
-        earlier, free = (
-            np.where(self.before < 0, np.arange(self.n_facets), self.before),
-            self.after < 0,
-        )
-        x = np.concatenate([ends[:, 0], ends[free, 1]])
-        step = np.concatenate([ends[:, 1] - ends[earlier, 0], ends[free, 1] - ends[free, 0]])
+        start, end = self.X[self.connectivity[:, [0, -1]]].swapaxes(0, 1)
+        starts_free = self.before < 0
+        ends_free = self.after < 0
+        earlier = np.where(starts_free, np.arange(self.n_facets), self.before)
+        x = np.concatenate([start, end[ends_free]])
+        step = np.concatenate([end - start[earlier], (end - start)[ends_free]])
         outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
         return x, outward / np.linalg.norm(outward, axis=1)[:, None]
 
@@ -135,10 +151,8 @@ class Curve:
         ends = np.concatenate([xi, np.ones((self.n_facets, 1))], axis=1)
         q, w = np.polynomial.legendre.leggauss(8)
         _, slope = self.shapes(ends[..., None] * (q + 1) / 2)
-        speed = np.linalg.norm(
-            np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope), axis=-1
-        )
-        lengths = (speed @ w) * ends / 2
+        tangent = np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope)
+        lengths = (np.linalg.norm(tangent, axis=-1) @ w) * ends / 2
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
         for first in self._first:
             start[first:] -= start[first]
@@ -157,16 +171,17 @@ class Curve:
         return place, np.array(near)[ring, place]
 
     def nearest_facet(self, x: Array, displacement: Array) -> Index:
-        """Facet ``(m,)`` of the displaced curve whose four sample points come nearest to each of
+        """Facet ``(m,)`` of the displaced curve of whose sample points one comes nearest to each of
         ``x`` ``(m, 2)``."""
-        samples = (np.arange(4) + 0.5) / 4
+        places = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         nodes = (self.X + displacement)[self.connectivity]
-        sampled = np.einsum("qa,fai->fqi", self.shapes(samples)[0], nodes).reshape(-1, 2)
-        half_square = 0.5 * (sampled**2).sum(1)
+        samples = np.einsum("qa,fai->fqi", self.shapes(places)[0], nodes).reshape(-1, 2)
+        half_square = 0.5 * (samples**2).sum(1)
         nearest = np.empty(len(x), dtype=np.int64)
-        for part in np.array_split(np.arange(len(x)), 1 + len(x) * len(sampled) // 4_000_000):
-            nearest[part] = np.argmin(half_square - x[part] @ sampled.T, axis=1)
-        return nearest // 4
+        n_parts = 1 + len(x) * len(samples) // 4_000_000  # by their memory
+        for part in np.array_split(np.arange(len(x)), n_parts):
+            nearest[part] = np.argmin(half_square - x[part] @ samples.T, axis=1)
+        return nearest // _SAMPLES
 
     def closest_point(
         self, x: Array, outward: Array, displacement: Array, start: Index | None = None
@@ -182,28 +197,31 @@ class Curve:
         curve's ends gets no partner.
         """
         home = self.nearest_facet(x, displacement) if start is None else start
-        found = self._project(x, outward, displacement, home)
-        before, after = self.before[home], self.after[home]
-        back, forth = (
-            (found.facet == before) & (found.xi <= 0),
-            (found.facet == after) & (found.xi >= 1),
-        )
-        further = np.where(
-            back, self.before[found.facet], np.where(forth, self.after[found.facet], -1)
-        )
-        away = (further >= 0) & (further != before) & (further != home) & (further != after)
-        if away.any():
-            if start is None:
-                raise ProjectionError(
-                    f"{away.sum()} contact points have closest points beyond the facets searched"
-                )
+        partners = self._project(x, outward, displacement, home)
+        n_away = self._leaves(home, partners).sum()
+        if n_away and start is None:
+            raise ProjectionError(
+                f"{n_away} contact points have closest points beyond the facets searched"
+            )
+        if n_away:
             return self.closest_point(x, outward, displacement)
-        lost = ~found.found
+        lost = ~partners.found
         if start is not None and self.n_pieces > 1 and lost.any():
-            again = self.closest_point(x[lost], outward[lost], displacement)
-            for name, values in vars(found).items():
-                values[lost] = getattr(again, name)
-        return found
+            elsewhere = self.closest_point(x[lost], outward[lost], displacement)
+            for name, values in vars(partners).items():
+                values[lost] = getattr(elsewhere, name)
+        return partners
+
+    def _leaves(self, home: Index, partners: Projection) -> npt.NDArray[np.bool_]:
+        """Which points ``(m,)`` have partners at an end of the facets around ``home`` beyond which
+        the curve goes on."""
+        before = self.before[home]
+        after = self.after[home]
+        back = (partners.facet == before) & (partners.xi <= 0)
+        forth = (partners.facet == after) & (partners.xi >= 1)
+        beyond = np.where(forth, self.after[partners.facet], -1)
+        beyond = np.where(back, self.before[partners.facet], beyond)
+        return (beyond >= 0) & (beyond != before) & (beyond != home) & (beyond != after)
 
     def continued(self, x: Array, outward: Array, displacement: Array, facet: Index) -> Projection:
         """As `closest_point`, but on the given facets, each a polynomial continued beyond its ends:
@@ -219,72 +237,66 @@ class Curve:
         reach: int = 1,
         margin: float = 0.0,
     ) -> Projection:
-        m, k = len(x), self.degree + 1
-        facet, lost = np.empty(m, dtype=np.int32), np.zeros(1, dtype=np.int32)
-        (xi, bend), (shape, slope) = np.empty((2, m)), np.empty((2, m, k))
-        point, normal, tangent = np.empty((3, m, 2))
-        slides, found = np.empty((2, m), dtype=bool)
-        x, outward, home = (
-            np.ascontiguousarray(x),
-            np.ascontiguousarray(outward),
-            home.astype(np.int32, copy=False),
-        )
+        """Closest points on the facets ``home`` and, with ``reach`` 1, their neighbours, each
+        continued by ``margin``."""
+        partners = Projection.empty(len(x), self.degree + 1)
+        points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
         nodes = (self.X + displacement)[self.connectivity]
-        curve: tuple[np.ndarray, ...] = (nodes, self.before, self.after, self._coefficients, home)
-        results: tuple[np.ndarray, ...] = (
-            facet,
-            xi,
-            point,
-            normal,
-            tangent,
-            bend,
-            shape,
-            slope,
-            slides,
-            found,
-            lost,
+        start = home.astype(np.int32, copy=False)
+        curve = nodes, self.before, self.after, self._coefficients, start
+        *results, on_nodes = vars(partners).values()
+        first_lost = np.zeros(1, dtype=np.int32)
+        kernel = library(Path(__file__).with_name("closest_point.c")).closest_points
+        n_lost = kernel(
+            len(x),
+            *map(pointer, points),
+            self.degree,
+            *map(pointer, curve),
+            reach,
+            margin,
+            _END_MARGIN,
+            _NEWTON_STEPS,
+            *map(pointer, (*results, first_lost)),
         )
-        n_lost = library(Path(__file__).with_name("closest_point.c")).closest_points(
-            m, pointer(x), pointer(outward), self.degree, *map(pointer, curve), reach, margin, _END_MARGIN,
-            _NEWTON_STEPS, *map(pointer, results),
-        )  # fmt: skip
         if n_lost:
-            at = "({:g}, {:g})".format(*x[lost[0]])
+            at = "({:g}, {:g})".format(*x[first_lost[0]])
             raise ProjectionError(
                 f"{n_lost} contact points found no closest point, the first at {at}"
             )
-        of_facet = self.connectivity[facet]
-        return Projection(
-            found, point, normal, tangent, bend, slides, of_facet, shape, slope, facet, xi
-        )
+        on_nodes[:] = self.connectivity[partners.facet]
+        return partners
 
 
 def circle_through(x: Array) -> tuple[Array, float] | None:
     """Centre and radius of the circle that the points ``x`` ``(n, 2)`` lie on; None if there is
     none (Kasa 1976)."""
+    if len(x) < 4:
+        return None
     shift = x.mean(axis=0)
     y = x - shift
-    (a, b, c), *_ = np.linalg.lstsq(
-        np.column_stack([2 * y, np.ones(len(y))]), (y**2).sum(axis=1), rcond=None
-    )
+    rows = np.column_stack([2 * y, np.ones(len(y))])
+    (a, b, c), *_ = np.linalg.lstsq(rows, (y**2).sum(axis=1), rcond=None)
+    centre = np.array([a, b])
     radius = float(np.sqrt(max(c + a * a + b * b, 0.0)))
-    off = np.abs(np.linalg.norm(y - [a, b], axis=1) - radius).max()
     size = np.ptp(y, axis=0).max()
-    if len(x) < 4 or off > _ROUND * size or _ROUND * radius > size:
+    off = np.abs(np.linalg.norm(y - centre, axis=1) - radius).max()
+    is_line = _ROUND * radius > size
+    if off > _ROUND * size or is_line:
         return None
-    return shift + np.array([a, b]), radius
+    return shift + centre, radius
 
 
 class RigidCircle:
-    """A rigid disc of the given centre and radius, as an opposite curve of one facet with one node,
-    which moves it."""
+    """A rigid disc of the given ``centre`` ``(2,)`` and ``radius``, as an opposite curve of one
+    facet with one node, which moves it."""
 
     n_facets = 1
 
     def __init__(self, centre: Array, radius: float) -> None:
         self.centre = np.asarray(centre, dtype=float)
         self.radius = radius
-        self.X, self.connectivity = self.centre[None], np.zeros((1, 1), dtype=np.int32)
+        self.X = self.centre[None]
+        self.connectivity = np.zeros((1, 1), dtype=np.int32)
 
     def closest_point(
         self, x: Array, outward: Array, displacement: Array, start: Index | None = None
