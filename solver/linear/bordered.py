@@ -17,12 +17,10 @@ from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
 
-_SINGULAR = (
-    1e-9  # stiffness against a motion over ``stiffness`` below which nothing resists the force
-)
-_FORCED = (
-    1e-3  # part of a right-hand side along such a motion above which the system has no solution
-)
+# stiffness against a motion over ``stiffness`` below which nothing resists the force
+_SINGULAR = 1e-9
+# part of a right-hand side along such a motion above which the system has no solution
+_FORCED = 1e-3
 
 
 def why_not(facts: Facts) -> str | None:
@@ -31,18 +29,27 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Border:
-    """Python context of a matrix ``A`` with the border ``B`` and the transpose of ``C`` ``(n_owned
-    dofs, m)``, ``D`` ``(m, m)`` of all ranks; ``extra`` of its unknowns, the levels, are this
-    rank's. Collective."""
+    """Python context of the matrix ``[A B; C D]``. Collective.
+
+    B : (n_owned dofs, m)
+    C : (n_owned dofs, m) its transpose
+    D : (m, m) of all ranks
+    n, extra : numbers of this rank's displacements and levels
+    """
 
     def __init__(self, A: PETSc.Mat, B: Array, C: Array, D: Array) -> None:
-        self.comm, self.A, self.B, self.C, self.D = A.comm.tompi4py(), A, B, C, D
-        self.n, self.extra = len(B), len(D) if self.comm.rank == 0 else 0
+        self.comm = A.comm.tompi4py()
+        self.A = A
+        self.B = B
+        self.C = C
+        self.D = D
+        self.n = len(B)
+        self.extra = len(D) if self.comm.rank == 0 else 0
         self._x, self._y = A.createVecs()
 
     def matrix(self) -> PETSc.Mat:
         """The matrix."""
-        size = (self.n + self.extra, None)
+        size = self.n + self.extra, None
         matrix = PETSc.Mat().createPython((size, size), context=self, comm=self.comm)
         matrix.setUp()
         return matrix
@@ -53,14 +60,17 @@ class Border:
 
     def join(self, x: PETSc.Vec, u: Array, levels: Array) -> None:
         """Put ``u`` ``(n_owned dofs,)`` and ``levels`` ``(m,)`` into ``x``."""
-        x.array[: self.n], x.array[self.n :] = u, levels[: self.extra]
+        x.array[: self.n] = u
+        x.array[self.n :] = levels[: self.extra]
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = [A B; C D] x``, called by PETSc."""
-        s, u = self.levels(x), x.array_r[: self.n]
+        s = self.levels(x)
+        u = x.array_r[: self.n]
         self._x.array[:] = u
         self.A.mult(self._x, self._y)
-        self.join(y, self._y.array_r + self.B @ s, self.comm.allreduce(u @ self.C) + self.D @ s)
+        along = self.comm.allreduce(u @ self.C)
+        self.join(y, self._y.array_r + self.B @ s, along + self.D @ s)
 
 
 class Bordered(Strategy):
@@ -68,8 +78,8 @@ class Bordered(Strategy):
     that was factorised. Collective.
 
     The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance;
-    ``factoriser`` gives the strategy for ``A``. ``singular`` numbers the level that a force moves
-    most which nothing resists, or None.
+    ``factoriser`` gives the strategy for ``A``. ``last`` is the border as it was updated last.
+    ``singular`` numbers the level that a force moves most which nothing resists, or None.
     """
 
     def __init__(
@@ -79,20 +89,23 @@ class Bordered(Strategy):
         stiffness: float,
         factoriser: Callable[[PETSc.Mat], Strategy] = Direct,
     ) -> None:
-        self.comm, self._stiffness, self._factoriser = A.comm.tompi4py(), stiffness, factoriser
+        self.comm = A.comm.tompi4py()
+        self.singular: int | None = None
+        self._stiffness = stiffness
+        self._factoriser = factoriser
         zero: Array = np.zeros((A.getLocalSize()[0], m))
         self.last = Border(A, zero, zero, np.zeros((m, m)))
+        self.matrix = self.last.matrix()
         self._factorised = self.last.C, self.last.D  # with the matrix that the preconditioner is of
-        self._along_B = zero
-        self.singular: int | None = None
+        self._along_B = zero  # A^-1 B
         self._x, self._y = A.createVecs()
         self._ksp = PETSc.KSP()
-        self.matrix = self.last.matrix()
         self.replace(A)
 
     def replace(self, A: PETSc.Mat) -> None:
         """Border another matrix ``A`` of the same size."""
-        self.last.A, self._stale = A, True
+        self.last.A = A
+        self._stale = True
         self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
         self._factoriser(A).attach(self._ksp)
@@ -100,7 +113,9 @@ class Bordered(Strategy):
     def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
         """New border for a matrix with new values (see `Border`). Without ``factorise`` the
         preconditioner stays that of the last matrix that was factorised."""
-        self.last.B, self.last.C, self.last.D = B, C, D
+        self.last.B = B
+        self.last.C = C
+        self.last.D = D
         self._stale |= factorise
         self._ksp.getPC().setReusePreconditioner(not self._stale)
 
@@ -115,20 +130,31 @@ class Bordered(Strategy):
         last = self.last
         if self._stale:
             self._along_B = np.stack([self._solve(b) for b in last.B.T], axis=1)
-            self._factorised, self._stale = (last.C, last.D), False
-        rho, u = last.levels(r), self._solve(r.array_r[: last.n])
+            self._factorised = last.C, last.D
+            self._stale = False
+        rho = last.levels(r)
+        u = self._solve(r.array_r[: last.n])
         C, D = self._factorised
-        along_B, along_u = self.comm.allreduce(C.T @ self._along_B), self.comm.allreduce(u @ C)
-        if not np.isfinite(
-            along_B
-        ).all():  # the matrix could not be factorised: Newton's method sees the step fail
+        complement = D - self.comm.allreduce(C.T @ self._along_B)
+        lacking = rho - self.comm.allreduce(u @ C)
+        if not np.isfinite(complement).all():
+            # the matrix could not be factorised: Newton's method sees the step fail
             self.replace(last.A)
-            last.join(x, np.full_like(u, np.nan), np.full(len(rho), np.nan))
+            last.join(x, np.full_like(u, np.nan), np.full_like(rho, np.nan))
             return
-        left, resistance, right = np.linalg.svd(D - along_B)
-        forced, resisted = left.T @ (rho - along_u), resistance >= _SINGULAR * self._stiffness
-        s = right.T @ np.divide(forced, resistance, where=resisted, out=np.zeros_like(forced))
-        free = np.where(resisted, 0.0, np.abs(forced))
-        loose = free.max() > _FORCED * r.norm()
-        self.singular = int(np.argmax(np.abs(right[np.argmax(free)]))) if loose else None
+        s = self._levels(complement, lacking, r.norm())
         last.join(x, u - self._along_B @ s, s)
+
+    def _levels(self, complement: Array, lacking: Array, size: float) -> Array:
+        """The levels ``(m,)`` of the Schur ``complement``, for a right-hand side of this ``size``;
+        notes what is singular."""
+        left, resistance, right = np.linalg.svd(complement)
+        forced = left.T @ lacking
+        is_resisted = resistance >= _SINGULAR * self._stiffness
+        moved = np.divide(forced, resistance, where=is_resisted, out=np.zeros_like(forced))
+        unresisted = np.where(is_resisted, 0.0, np.abs(forced))
+        self.singular = None
+        if unresisted.max() > _FORCED * size:
+            mode = right[np.argmax(unresisted)]
+            self.singular = int(np.argmax(np.abs(mode)))
+        return right.T @ moved

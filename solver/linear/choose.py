@@ -41,12 +41,11 @@ class Choice:
     def words(self) -> dict[str, str | dict[str, str]]:
         """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the
         reasons."""
-        used = [name for name, reason in self.why_not.items() if reason is None]
-        used += [] if {*INSTEAD} & {*used} else ["direct"]
-        return {
-            "strategy": " + ".join(used),
-            "not_used": {n: r for n, r in self.why_not.items() if r is not None},
-        }
+        used = [name for name in self.why_not if self.uses(name)]
+        if not set(INSTEAD).intersection(used):
+            used.append("direct")
+        not_used = {name: said for name, said in self.why_not.items() if said is not None}
+        return {"strategy": " + ".join(used), "not_used": not_used}
 
 
 def choose(facts: Facts) -> Choice:
@@ -54,5 +53,7 @@ def choose(facts: Facts) -> Choice:
     reasons = {name: rule(facts) for name, rule in RULES.items()}
     reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
     fitting = [name for name in INSTEAD if reasons[name] is None]
-    given_way = [*fitting[1:], *(["lagged", "look_ahead"] if "condensed" in fitting else [])]
+    given_way = fitting[1:]
+    if "condensed" in fitting:
+        given_way += ["lagged", "look_ahead"]
     return Choice(reasons | {name: f"the system is {fitting[0]}" for name in given_way})

@@ -6,7 +6,10 @@ from petsc4py import PETSc
 
 from archord.solver.linear.strategy import Strategy
 
-_SPARE = 60  # per cent of MUMPS's workspace
+_WORKSPACE = 14  # number of MUMPS's setting
+_SPARE = 60  # per cent of it
+_SCALING = 8
+_BY_DIAGONAL = 1  # MUMPS's own choice takes a seventh of a factorisation
 
 
 class Direct(Strategy):
@@ -14,7 +17,8 @@ class Direct(Strategy):
     "cholesky". Collective."""
 
     def __init__(self, matrix: PETSc.Mat, kind: str = "lu") -> None:
-        self.matrix, self._kind = matrix, kind
+        self.matrix = matrix
+        self._kind = kind
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` factorise the matrix."""
@@ -25,7 +29,5 @@ class Direct(Strategy):
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         factors = pc.getFactorMatrix()
-        factors.setMumpsIcntl(14, _SPARE)
-        factors.setMumpsIcntl(
-            8, 1
-        )  # scale by the diagonal: MUMPS's own choice takes a seventh of a factorisation
+        factors.setMumpsIcntl(_WORKSPACE, _SPARE)
+        factors.setMumpsIcntl(_SCALING, _BY_DIAGONAL)

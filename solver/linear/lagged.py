@@ -21,7 +21,9 @@ def why_not(facts: Facts) -> str | None:
     """Why factorisations are not kept."""
     if facts.yields:
         return "bodies can yield, the matrix changes all over"
-    return None if facts.dofs >= _MANY_DOFS else f"fewer than {_MANY_DOFS} dofs"
+    if facts.dofs < _MANY_DOFS:
+        return f"fewer than {_MANY_DOFS} dofs"
+    return None
 
 
 class Lagged:
@@ -33,24 +35,23 @@ class Lagged:
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp``, which has a direct preconditioner, iterate."""
-        ksp.setType(
-            "fgmres"
-        )  # needs one solve less than GMRES: it keeps the preconditioned vectors
+        # one solve less than by GMRES: FGMRES keeps the preconditioned vectors
+        ksp.setType("fgmres")
         ksp.setConvergenceTest(self._test)
 
     def _test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
         """Done when the residual is small, or when a new factorisation would have been quicker."""
         if iteration == 0:
             self._right_side = norm
-        done = norm <= _TOLERANCE * self._right_side or iteration >= 2 * _MANY_SOLVES
-        return (
-            PETSc.KSP.ConvergedReason.CONVERGED_ITS if done else PETSc.KSP.ConvergedReason.ITERATING
-        )
+        if norm <= _TOLERANCE * self._right_side or iteration >= 2 * _MANY_SOLVES:
+            return PETSc.KSP.ConvergedReason.CONVERGED_ITS
+        return PETSc.KSP.ConvergedReason.ITERATING
 
     def factorises(self, iterations: int, changes: int, *, renewed: bool) -> bool:
         """Whether to factorise the next matrix: the last system took so many ``iterations``, there
         were ``changes`` of the active set since the last matrix, or it is ``renewed``."""
         self._changes += changes
         factorise = renewed or iterations > _MANY_SOLVES or self._changes > _MANY_CHANGES
-        self._changes = 0 if factorise else self._changes
+        if factorise:
+            self._changes = 0
         return factorise

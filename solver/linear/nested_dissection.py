@@ -14,8 +14,8 @@ from archord.geometry.basis import lagrange_element
 from archord.kernels.compat import METIS
 
 _PROTOTYPES = """
-int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights, int32_t *options, int32_t *order,
-                 int32_t *place);
+int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights,
+                 int32_t *options, int32_t *order, int32_t *place);
 """
 
 
@@ -42,7 +42,8 @@ def corners(V: fem.FunctionSpace) -> np.ndarray:
     index_map = V.dofmap.index_map
     found = np.zeros((index_map.size_local + index_map.num_ghosts, k), dtype=np.int32)
     found[V.dofmap.list] = V.dofmap.list[:, ends]
-    return index_map.local_to_global(found[: index_map.size_local].ravel()).reshape(-1, k)
+    owned = found[: index_map.size_local]
+    return index_map.local_to_global(owned.ravel()).reshape(-1, k)
 
 
 def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.ndarray) -> np.ndarray:
@@ -53,10 +54,9 @@ def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.nda
     alone = corner[:, 0] == np.arange(n)
     number = np.cumsum(alone) - 1
     both = alone[rows] & alone[columns]
+    order = nested_dissection(int(alone.sum()), number[rows[both]], number[columns[both]])
     place = np.full(n + 1, n)  # the last is that of no corner
-    place[:-1][alone] = nested_dissection(
-        int(alone.sum()), number[rows[both]], number[columns[both]]
-    )
+    place[:-1][alone] = order
     first = np.where(alone, place[:n], place[corner].min(axis=1, initial=n))
     found = np.empty(n, dtype=np.int32)
     found[np.lexsort((alone, first))] = np.arange(n)
@@ -67,24 +67,26 @@ def nested_dissection(n: int, rows: np.ndarray, columns: np.ndarray) -> np.ndarr
     """Places ``(n,)`` of ``n`` unknowns in an order with little fill-in; ``rows`` and ``columns``
     ``(k,)`` are coupled, one way or the other. Raises MemoryError if METIS does not get what it
     needs."""
-    apart = rows != columns
-    rows, columns = rows[apart].astype(np.int64), columns[apart].astype(np.int64)
-    row, column = np.divmod(
-        np.unique(np.concatenate([rows * n + columns, columns * n + rows])), max(n, 1)
-    )
     place = np.arange(n, dtype=np.int32)
-    if not len(row):
+    apart = rows != columns
+    row = rows[apart].astype(np.int64)
+    column = columns[apart].astype(np.int64)
+    pairs = np.unique(np.concatenate([row * n + column, column * n + row]))
+    if not len(pairs):
         return place
+    row, column = np.divmod(pairs, n)
     offsets = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
+    order = np.empty(n, dtype=np.int32)
     ffi, library = metis()
-    arrays = (
-        np.array([n], dtype=np.int32),
-        offsets,
-        column.astype(np.int32),
-        np.empty(n, dtype=np.int32),
-        place,
+    status = library.METIS_NodeND(
+        ffi.from_buffer("int32_t[]", np.array([n], dtype=np.int32)),
+        ffi.from_buffer("int32_t[]", offsets),
+        ffi.from_buffer("int32_t[]", column.astype(np.int32)),
+        ffi.NULL,
+        ffi.NULL,
+        ffi.from_buffer("int32_t[]", order),
+        ffi.from_buffer("int32_t[]", place),
     )
-    size, at, neighbours, order, places = (ffi.from_buffer("int32_t[]", a) for a in arrays)
-    if library.METIS_NodeND(size, at, neighbours, ffi.NULL, ffi.NULL, order, places) != 1:
+    if status != 1:
         raise MemoryError("METIS found no order of elimination")
     return place

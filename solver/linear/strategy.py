@@ -13,11 +13,17 @@ from petsc4py import PETSc
 
 @dataclass(frozen=True)
 class Facts:
-    """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``, surfaces have
-    ``friction``, or strains are large, as ``finite``; whether levels of drives are unknown, as
-    ``by_force``; ``gamma_factor``, the largest of its unilateral interactions, None without one or
-    with others; and ``held()``, whether supports alone keep every body from moving rigidly
-    (collective)."""
+    """What the choice of strategies for a problem depends on.
+
+    comm : its ranks
+    dofs : degrees of freedom on all ranks
+    yields : whether bodies can yield
+    friction : whether surfaces have friction
+    finite : whether strains are large
+    by_force : whether levels of drives are unknown
+    gamma_factor : the largest of its unilateral interactions; None without one or with others
+    held : tells whether supports alone keep every body from moving rigidly; collective
+    """
 
     comm: MPI.Comm
     dofs: int

@@ -62,19 +62,22 @@ def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
     """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several
     ranks, and of any others that are, as the contact's, the ones of the higher rank."""
     start, end = A.getOwnershipRange()
-
-    def union(dofs: np.ndarray) -> np.ndarray:
-        return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
-
     local = np.asarray(A.getLGMap()[0].indices)
-    shared = union(local[(local < start) | (local >= end)])
+    shared = _union(comm, local[(local < start) | (local >= end)])
     offsets, columns, _ = A.getValuesCSR()
     across = np.flatnonzero((columns < start) | (columns >= end))
-    rows, columns = start - 1 + np.searchsorted(offsets, across, side="right"), columns[across]
-    coupled = ~np.isin(rows, shared) & ~np.isin(columns, shared)
+    row = start - 1 + np.searchsorted(offsets, across, side="right")
+    column = columns[across]
+    is_coupled = ~np.isin(row, shared) & ~np.isin(column, shared)
+    higher = _union(comm, np.maximum(row, column)[is_coupled])
     size = A.getBlockSize()
-    blocks = np.unique(np.union1d(shared, union(np.maximum(rows, columns)[coupled])) // size)
+    blocks = np.unique(np.union1d(shared, higher) // size)
     return (size * blocks[:, None] + np.arange(size)).ravel()
+
+
+def _union(comm: MPI.Comm, dofs: np.ndarray) -> np.ndarray:
+    """The ``dofs`` of all ranks."""
+    return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
 
 
 def schur_kernels() -> Any:
@@ -85,44 +88,54 @@ def schur_kernels() -> Any:
 class Substructures(Strategy):
     """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose
     dofs ``interface`` ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in
-    `corners`. Collective."""
+    `corners`. Collective.
+
+    The local dofs of a rank are its own ones and the interface. Its arrays are
+
+    _own : places of the own dofs among the local ones
+    _mine : places of the own dofs of the interface, among these and among the own ones
+    _block : the matrix of the local dofs
+    _shared : its entries that are of the interface alone, which all ranks have
+    _arrays : rows, columns, interface and order of elimination for MUMPS, which counts from 1
+    _b : (local dofs,) right-hand side, then solution
+    _reduced : (m,) right-hand side, then solution of the interface
+    _complement : (m, m) the Schur complement of this rank, then of all
+    """
 
     def __init__(self, A: PETSc.Mat, interface: np.ndarray, corner: np.ndarray) -> None:
-        self.matrix, self.comm = A, A.comm.tompi4py()
+        self.matrix = A
+        self.comm = A.comm.tompi4py()
+        self.singular = False
         self._kernels = schur_kernels()
         start, end = A.getOwnershipRange()
         local = np.union1d(np.arange(start, end), interface)
         first = int(np.searchsorted(local, start))
-        self._own = slice(first, first + end - start)  # among the local ones
-        kept = np.searchsorted(local, interface)
-        mine = (interface >= start) & (interface < end)
-        self._mine = np.flatnonzero(mine), interface[mine] - start
+        self._own = slice(first, first + end - start)
+        is_mine = (interface >= start) & (interface < end)
+        self._mine = np.flatnonzero(is_mine), interface[is_mine] - start
         self._set = PETSc.IS().createGeneral(local.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         self._block = A.createSubMatrices(self._set)[0]
         offsets, columns, _ = self._block.getValuesCSR()
         rows = np.repeat(np.arange(len(local), dtype=np.int32), np.diff(offsets))
         last = np.isin(local, interface)
-        self._shared = np.flatnonzero(
-            last[rows] & last[columns]
-        )  # of the interface alone: all ranks have them
+        self._shared = np.flatnonzero(last[rows] & last[columns])
         size = A.getBlockSize()
         corner = np.searchsorted(local[::size] // size, corner)  # all are on cells of this rank
-        place = _places(rows, columns, last, corner, self._own.start // size, size)
-        self._arrays = (
-            rows + 1,
-            columns.astype(np.int32, copy=False) + 1,
-            kept.astype(np.int32) + 1,
-            place + 1,
+        place = _places(rows, columns, last, corner, first // size, size)
+        kept = np.flatnonzero(last)
+        self._arrays = tuple(
+            array.astype(np.int32, copy=False) + 1 for array in (rows, columns, kept, place)
         )
-        self._b = np.zeros(len(local))
         m = len(interface)
-        self._reduced, self._complement = np.zeros(m), np.zeros((m, m))
-        self._x, self._y = (PETSc.Vec().createSeq(m, comm=PETSc.COMM_SELF) for _ in range(2))
+        self._b = np.zeros(len(local))
+        self._reduced = np.zeros(m)
+        self._complement = np.zeros((m, m))
+        self._x = PETSc.Vec().createSeq(m, comm=PETSc.COMM_SELF)
+        self._y = self._x.duplicate()
         self._mumps: Any = None
         self._dense = PETSc.KSP().create(PETSc.COMM_SELF)
         self._dense.setType("preonly")
         self._dense.getPC().setType("lu")
-        self.singular = False
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factorise the matrix as it is now, called by PETSc."""
@@ -130,18 +143,8 @@ class Substructures(Strategy):
         A.createSubMatrices(self._set, submats=[self._block])
         values = self._block.getValuesCSR()[2]
         values[self._shared] /= self.comm.size
-        status = np.zeros(1, dtype=np.int32)
-        if self._mumps is None:
-            rows, columns, kept, place = map(pointer, self._arrays)
-            sizes = len(self._b), len(rows)
-            self._mumps = self._kernels.schur_create(
-                MPI.COMM_SELF.py2f(), *sizes, rows, columns, len(kept), kept, place, pointer(status)
-            )
-        if status[0] >= 0:
-            status[0] = self._kernels.schur_factorise(
-                self._mumps, pointer(values), pointer(self._complement)
-            )
-        self.singular = self.comm.allreduce(int(status[0]), op=MPI.MIN) < 0
+        status = self._factorise(values)
+        self.singular = self.comm.allreduce(status, op=MPI.MIN) < 0
         if self.singular:
             return
         self.comm.Allreduce(MPI.IN_PLACE, self._complement)
@@ -150,6 +153,29 @@ class Substructures(Strategy):
         S.assemble()
         self._dense.setOperators(S)
         self._dense.setUp()
+
+    def _factorise(self, values: np.ndarray) -> int:
+        """Eliminate the own dofs of the block of these ``values``; MUMPS's status, below 0 if that
+        fails."""
+        status = np.zeros(1, dtype=np.int32)
+        if self._mumps is None:
+            rows, columns, kept, place = self._arrays
+            self._mumps = self._kernels.schur_create(
+                MPI.COMM_SELF.py2f(),
+                len(self._b),
+                len(rows),
+                pointer(rows),
+                pointer(columns),
+                len(kept),
+                pointer(kept),
+                pointer(place),
+                pointer(status),
+            )
+        if status[0] < 0:
+            return int(status[0])
+        return int(
+            self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
+        )
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = A^-1 r``, called by PETSc; not a number if a block is singular."""
@@ -191,10 +217,10 @@ def _places(
     inner = np.flatnonzero(~last[::size])
     number = np.full(len(last) // size, -1)
     number[inner] = np.arange(len(inner))
-    one = (
-        (rows % size == 0) & (columns % size == 0) & ~last[rows] & ~last[columns]
-    )  # entry of each block
-    row, column = number[rows[one] // size], number[columns[one] // size]
+    is_first = (rows % size == 0) & (columns % size == 0)  # of the entries of a block
+    one = is_first & ~last[rows] & ~last[columns]
+    row = number[rows[one] // size]
+    column = number[columns[one] // size]
     place = np.empty(len(number), dtype=np.int32)
     place[inner] = before_corners(len(inner), row, column, number[corner[inner - start]])
     place[number < 0] = np.arange(len(inner), len(number))

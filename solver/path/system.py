@@ -31,14 +31,14 @@ from archord.solver.problem import Body, Problem
 _AT_REST = 10.0  # times the round-off: forces that are none
 
 
-def displacement_space(mesh: Mesh, degree: int, components: int = 2) -> fem.FunctionSpace:
+def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:
     """Displacements of ``degree`` on ``mesh``, by their values at evenly spaced nodes.
     Collective."""
     element = basix.ufl.element(
         "P",
         mesh.basix_cell(),
         degree,
-        shape=(components,),
+        shape=(mesh.topology.dim,),
         lagrange_variant=basix.LagrangeVariant.equispaced,
     )
     return fem.functionspace(mesh, element)
@@ -60,7 +60,7 @@ class System:
         mesh = problem.mesh.mesh
         self.comm = mesh.comm
         with self.timer("setup"):
-            self.V = displacement_space(mesh, problem.degree, problem.kinematics.dimension)
+            self.V = displacement_space(mesh, problem.degree)
             self.bulk = self._bulk()
             self.sides: dict[str, Surface] = {}
             self.contact = Contact(self.V, [self._interface(i) for i in problem.interactions])
