@@ -137,8 +137,9 @@ class Prescribed:
             if not s.moves:
                 continue
             if (*key, s.drive) in given:
+                axis = self._axes[s.axis]
                 raise ValueError(
-                    f"{s.name!r} gives {s.facets!r} two rates in {self._axes[s.axis]} by the drive {s.drive!r}"
+                    f"{s.name!r} gives {s.facets!r} two rates in {axis} by the drive {s.drive!r}"
                 )
             given.add((*key, s.drive))
             motion = found[key]
@@ -184,18 +185,18 @@ class Prescribed:
             axis, at = self._axes[motion.axis], _at(place)
             if not free[m]:
                 raise ValueError(
-                    f"{motion} moves nothing: supports fix all its nodes in {axis}, {fix} the one at {at}; "
-                    "move another set, or fix less"
+                    f"{motion} moves nothing: supports fix all its nodes in {axis}, "
+                    f"{fix} the one at {at}; move another set, or fix less"
                 )
             if motion.together:
                 raise ValueError(
-                    f"{fix} fixes the node at {at} in {axis}, which {motion} moves together with all its set: "
-                    f"fix what moves the set in {axis}, too, leave the node out of one of the sets, or load the set by "
-                    "a pressure or a distributing coupling"
+                    f"{fix} fixes the node at {at} in {axis}, which {motion} moves together "
+                    f"with all its set: fix what moves the set in {axis}, too, leave the node out "
+                    "of one of the sets, or load the set by a pressure or a distributing coupling"
                 )
             self.warnings.append(
-                f"{fix} fixes nodes that {motion} would move in {axis}, as at {at}: they stay where they are, and the "
-                "stress beside them grows as the mesh gets finer"
+                f"{fix} fixes nodes that {motion} would move in {axis}, as at {at}: "
+                "they stay where they are, and the stress beside them grows as the mesh gets finer"
             )
 
     def _require_alike(self, moving: list[_Motion], fixed: np.ndarray, round_off: Array) -> None:

@@ -1,1 +1,1 @@
-"""Static equilibrium at a given load: unknowns, forces, and the linear systems of Newton's method."""
+"""Static equilibrium at a given load: unknowns, forces, and linear systems."""
