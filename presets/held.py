@@ -11,8 +11,9 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.check import check_mesh, facets_within, gaps
 from archord.geometry.meshes.fenicsx import gathered
-from archord.geometry.meshes.motions import free_motions
+from archord.geometry.meshes.motions import AXISYMMETRIC, PLANE, free_motions
 from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.quality import beyond_axis
 from archord.materials.material import Array
 from archord.solver.conditions import Dirichlet
 from archord.solver.contact.interaction import Interaction
@@ -44,7 +45,9 @@ def check(problem: Problem) -> list[str]:
     failure = ""
     doubts = list[str]()
     if whole is not None:
+        around_axis = not problem.kinematics.is_plane
         faults = chain(
+            beyond_axis(whole.x) if around_axis else [],
             _shared(problem, whole),
             _half_loaded(problem, whole),
             _loose(problem, whole, cells, owner),
@@ -193,7 +196,8 @@ def _loose(
                 held[owner[names[0]]].append((middle, direction))
             else:
                 links.append((owner[names[0]], owner[names[1]], middle, direction))
-    moves = free_motions(held, links)
+    possible = PLANE if problem.kinematics.is_plane else AXISYMMETRIC
+    moves = free_motions(held, links, possible)
     touching = set(owner.values())
     for body, motions in moves.items():
         free = [motion for motion in motions if motion != "rotation" or body not in touching]

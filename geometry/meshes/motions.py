@@ -10,8 +10,8 @@ from scipy.linalg import null_space
 
 from archord.geometry.basis import Array
 
-PLANE = ("x", "y", "rotation")
-AXISYMMETRIC = ("y",)  # along the axis
+PLANE: Sequence[str] = ("x", "y", "rotation")
+AXISYMMETRIC: Sequence[str] = ("y",)  # along the axis
 _FREE = 1e-8  # singular value over the largest one, below which a motion is free
 
 Holds = Sequence[tuple[Array, Array]]
