@@ -181,8 +181,10 @@ class Prescribed:
                     )
         free = self._comm.allreduce(free)
         for m, f, place in self._everywhere(met):
-            motion, fix = moving[m], fixing[f]
-            axis, at = self._axes[motion.axis], _at(place)
+            motion = moving[m]
+            fix = fixing[f]
+            axis = self._axes[motion.axis]
+            at = _at(place)
             if not free[m]:
                 raise ValueError(
                     f"{motion} moves nothing: supports fix all its nodes in {axis}, "
@@ -203,7 +205,8 @@ class Prescribed:
         """Raise ValueError where two motions of a node that nothing fixes differ."""
         met: list[tuple[int, int, Place]] = []
         for a, b in combinations(range(len(moving)), 2):
-            first, second = moving[a], moving[b]
+            first = moving[a]
+            second = moving[b]
             if first.axis != second.axis:
                 continue
             common, i, j = np.intersect1d(first.nodes, second.nodes, return_indices=True)

@@ -3,14 +3,12 @@ path of its loads."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import reduce
+from collections.abc import Sequence
 
 import basix.ufl
 import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
-from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.kernels.compat import cell_degree
@@ -19,7 +17,6 @@ from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
-from archord.solver.distortion import Distortion
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.expansion import expanded
 from archord.solver.path.load_path import Companion, LoadPath, Position
@@ -28,7 +25,6 @@ from archord.solver.path.recovery import Recovery
 from archord.solver.path.stepping import StepRules, march
 from archord.solver.path.totals import Totals
 from archord.solver.problem import Body, Problem
-
 
 
 def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:

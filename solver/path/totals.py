@@ -40,7 +40,9 @@ class Totals:
         if not self.problem.kinematics.is_plane:
             return 0.0
         force_x, force_y = self.equilibrium.diagnostics.reaction(name).T
-        arm = self.equilibrium.unknowns.V.tabulate_dof_coordinates()[: len(force_x), :2] - np.asarray(point)
+        arm = self.equilibrium.unknowns.V.tabulate_dof_coordinates()[
+            : len(force_x), :2
+        ] - np.asarray(point)
         moment = float((arm[:, 0] * force_y - arm[:, 1] * force_x).sum())
         return self.problem.whole * self.comm.allreduce(moment)
 
@@ -142,7 +144,9 @@ class Totals:
         the force ``before``; 0 if all are round-off."""
         whole = self.problem.whole
         at = self.equilibrium
-        left = [at.diagnostics.residual_on(at.drives.nodes_of(body)) for body in self.problem.bodies]
+        left = [
+            at.diagnostics.residual_on(at.drives.nodes_of(body)) for body in self.problem.bodies
+        ]
         names = dict.fromkeys(support.name for support in self.problem.supports)
         reactions = [self.reaction(name) for name in names]
         of_supports = _largest(reactions)
