@@ -22,16 +22,19 @@ _OPEN = 1e-6  # of the largest force: nothing touches
 
 @dataclass(frozen=True)
 class RunSteps:
-    """Accepted steps of a run, ``(n,)``: displacement ``x`` over ``length`` and force ``y`` over
-    ``force``, positive where they press, energy ``dissipated`` over both, largest pressure ``peak``
-    over ``pressure`` and semi-angle ``angle`` [rad], nan if unknown.
+    """Accepted steps of a run. Units are dR, E* dR and E* dR/R of a joint, else the units of the
+    run; forces are of the run's thickness, per unit of it if it has none.
 
-    Units are dR, E* dR and E* dR/R of a joint, else those of the run; forces are of the run's
-    thickness, per unit of it if it has none.
+    - ``names``: of the columns of displacement and force
+    - ``x``, ``y`` ``(n,)``: displacement over ``length`` and force over ``force``, positive where
+      they press
+    - ``dissipated`` ``(n,)``: energy over both units
+    - ``peak`` ``(n,)``: largest pressure over ``pressure``, nan if unknown
+    - ``angle`` ``(n,)``: semi-angle [rad], nan if unknown
     """
 
     run: Run
-    names: tuple[str, str]  # of the columns of displacement and force
+    names: tuple[str, str]
     x: Array
     y: Array
     dissipated: Array
@@ -51,29 +54,39 @@ class RunSteps:
         """Indices of the steps that were deeper than all before."""
         return np.flatnonzero(on_first_loading(self.x, self.y))
 
-    def said(self, displacement: float | None = None, force: float | None = None) -> str:
-        """A displacement or force of the table with the run's unit."""
-        value, name = (displacement, self.names[0]) if force is None else (force, self.names[1])
-        scale = self.length if force is None else self.force
-        return f"{(value or 0.0) * scale:.6g} {self.run.units.get(name, '')}".rstrip()
+    def at(self, x: float) -> str:
+        """A displacement of the table with the run's unit."""
+        return self._with_unit(x * self.length, self.names[0])
+
+    def load(self, y: float) -> str:
+        """A force of the table with the run's unit."""
+        return self._with_unit(y * self.force, self.names[1])
+
+    def _with_unit(self, value: float, name: str) -> str:
+        return f"{value:.6g} {self.run.units.get(name, '')}".rstrip()
 
     @property
     def units(self) -> dict[str, Any]:
         """Units of x, y and peak as numbers, the names of their units, and the length that forces
         are of, as `JointCurve` has them."""
         length_unit, force_unit = (self.run.units.get(name, "-") for name in self.names)
-        numbers = {"length": self.length, "force": self.force, "pressure": self.pressure}
-        words = {"length_unit": length_unit, "force_unit": force_unit}
-        return numbers | words | {"pin_length": self.run.scene.thickness}
+        return {
+            "length": self.length,
+            "force": self.force,
+            "pressure": self.pressure,
+            "length_unit": length_unit,
+            "force_unit": force_unit,
+            "pin_length": self.run.scene.thickness,
+        }
 
     def require_rising(self, steps: np.ndarray) -> None:
         """Raise `InputError` if the force does not rise from each of the ``steps`` to the next."""
         for a, b in pairwise(steps):
             if not self.y[a] < self.y[b]:
-                ends = " to ".join(f"{self.said(self.x[k])} (step {k + 1})" for k in (a, b))
+                ends = [f"{self.at(self.x[i])} (step {i + 1})" for i in (a, b)]
                 raise InputError(
-                    f"{self.run.folder}: the force does not rise from {ends}, from {self.said(force=self.y[a])} to "
-                    f"{self.said(force=self.y[b])}; in a table it must."
+                    f"{self.run.folder}: the force does not rise from {' to '.join(ends)}, from "
+                    f"{self.load(self.y[a])} to {self.load(self.y[b])}; in a table it must."
                 )
 
     @property
@@ -85,32 +98,33 @@ class RunSteps:
 
     def mesh_error(self, slope: Array) -> Array | float:
         """`accuracy` as an error of y where its slope is ``slope``; 0 if unknown."""
-        of_displacement = self.run.scene.accurate == self.names[0]
-        return (self.accuracy or 0.0) * (self.x.max() * slope if of_displacement else self.y.max())
+        largest = self.y.max()
+        if self.run.scene.accurate == self.names[0]:
+            largest = self.x.max() * slope
+        return (self.accuracy or 0.0) * largest
 
     @property
     def about(self) -> dict[str, Any]:
         """What the table is of."""
-        run, scene = self.run, self.run.scene
+        run = self.run
+        scene = run.scene
         sha = hashlib.sha256(resolved(scene).encode()).hexdigest()[:16]
-        joint = (
-            {"R": scene.joint.radius, "dR": scene.joint.dR, "E*": scene.E_star}
-            if "P" in run.columns
-            else {}
-        )
-        thick, accuracy = scene.analysis.thickness, self.accuracy
+        made = run.summary["versions"].get("archord", "?")
         units = ", ".join(f"{name} in {run.units.get(name, '-')}" for name in self.names)
-        said = "unknown: the scene asks for no analysis.accuracy"
-        return {
+        thick = scene.analysis.thickness
+        of = "per unit thickness" if thick is None else f"of a thickness of {thick:g}"
+        error = "unknown: the scene asks for no analysis.accuracy"
+        if self.accuracy is not None:
+            error = f"{self.accuracy:.2g} of the largest (estimated)"
+        about = {
             "title": f"{self.names[1]} over {self.names[0]} of the run {run.folder.resolve().name}",
-            "made by": f"archord {VERSION}, fit --table; run of archord {run.summary['versions'].get('archord', '?')}",
+            "made by": f"archord {VERSION}, fit --table; run of archord {made}",
             "scene": f"sha256 {sha}; plane {scene.analysis.plane}",
-            "units": f"{units}, {'per unit thickness' if thick is None else f'of a thickness of {thick:g}'}",
-            **joint,
-            "error of mesh and steps": said
-            if accuracy is None
-            else f"{accuracy:.2g} of the largest (estimated)",
+            "units": f"{units}, {of}",
         }
+        if _is_of_joint(run):
+            about |= {"R": scene.joint.radius, "dR": scene.joint.dR, "E*": scene.E_star}
+        return about | {"error of mesh and steps": error}
 
 
 def read_steps(run: Run, of: str | None = None) -> RunSteps:
@@ -118,45 +132,69 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
     only one; where an interference arises first, from the end of that on. Raises `InputError` of a
     run without a step or contact, or such a load."""
     run.number(None)
-    scene, columns = run.scene, {name: np.array(values) for name, values in run.columns.items()}
-    columns["unknown"] = np.full(run.steps, np.nan)
     if not run.has_contact:
         raise InputError(f"{run.folder}: has no contact, and a table is of a joint's.")
-    if "P" in run.columns:
+    begin = 0  # steps before the load moves
+    length = force = pressure = 1.0
+    if _is_of_joint(run):
         if of is not None:
             raise InputError(
-                f"{run.folder}: is the run of a joint, which has one load; --of is for general scenes."
+                f"{run.folder}: is the run of a joint, which has one load; "
+                "--of is for general scenes."
             )
-        gap = abs(scene.joint.dR)
-        units = gap, scene.E_star * gap * scene.thickness, scene.E_star * gap / scene.joint.radius
-        known = scene.joint.dR > 0  # or the fit presses without a load
-        names, begin = ["delta", "P", *(("p0", "eps") if known else ("unknown", "unknown"))], 0
+        scene = run.scene
+        length = abs(scene.joint.dR)
+        force = scene.E_star * length * scene.thickness
+        pressure = scene.E_star * length / scene.joint.radius
+        names = ["delta", "P"]
+        if scene.joint.dR > 0:  # a fit presses without a load
+            names += ["p0", "eps"]
     else:
-        loads = [load.name for load in scene.load]
-        if of not in loads and (of or len(loads) > 1):
-            raise InputError(f"{run.folder}: --of must name one of its loads: {', '.join(loads)}.")
-        of, begin = of or loads[0], scene.path.fit_steps if scene.fits else 0
-        alone = len(scene.interaction) == 1 and not scene.fits
-        largest = f"{scene.interaction[0].name} largest pressure" if alone else "unknown"
-        names, units = [f"{of} displacement", f"{of} force", largest, "unknown"], (1.0, 1.0, 1.0)
-    names.append("plastic_dissipation")
-    delta, P, peak, angle, lost = (columns[name][begin:] for name in names)
+        begin = run.scene.path.fit_steps if run.scene.fits else 0
+        names = _columns_of_load(run, of)
+    values = [np.array(run.columns[name]) for name in [*names, "plastic_dissipation"]]
     if begin:  # what an interference does is none of the load's
-        was = [columns[name][:begin][-1] for name in names]
-        delta, lost = delta - was[0], lost - was[4]
-        if abs(was[1]) > _OPEN * np.abs(P).max(initial=0.0):
+        before, after = zip(
+            *((column[begin - 1], column[begin:]) for column in values), strict=True
+        )
+        if abs(before[1]) > _OPEN * np.abs(after[1]).max(initial=0.0):
             raise InputError(
-                f"{run.folder}: {names[1]} is {was[1]:.6g} before the load moves; a table begins at 0."
+                f"{run.folder}: {names[1]} is {before[1]:.6g} before the load moves; "
+                "a table begins at 0."
             )
+        values = [after[0] - before[0], *after[1:-1], after[-1] - before[-1]]
+    delta, P, *told, lost = values
+    unknown = np.full(len(delta), np.nan)
+    peak, angle = [*told, unknown, unknown][:2]
     sign = next((np.sign(d) for d in delta if d), 1.0)
-    x, y = sign * delta / units[0], sign * P / units[1]
     return RunSteps(
-        run,
-        (names[0], names[1]),
-        x,
-        y,
-        lost / (units[0] * units[1]),
-        peak / units[2],
-        angle,
-        *units,
+        run=run,
+        names=(names[0], names[1]),
+        x=sign * delta / length,
+        y=sign * P / force,
+        dissipated=lost / (length * force),
+        peak=peak / pressure,
+        angle=angle,
+        length=length,
+        force=force,
+        pressure=pressure,
     )
+
+
+def _is_of_joint(run: Run) -> bool:
+    """Whether the run tells force and displacement of a joint, not of loads by name."""
+    return "P" in run.columns
+
+
+def _columns_of_load(run: Run, of: str | None) -> list[str]:
+    """The columns of displacement and force of the load ``of``, and of the pressure of its only
+    interaction."""
+    scene = run.scene
+    loads = [load.name for load in scene.load]
+    if of not in loads and (of or len(loads) > 1):
+        raise InputError(f"{run.folder}: --of must name one of its loads: {', '.join(loads)}.")
+    of = of or loads[0]
+    names = [f"{of} displacement", f"{of} force"]
+    if len(scene.interaction) == 1 and not scene.fits:
+        names.append(f"{scene.interaction[0].name} largest pressure")
+    return names

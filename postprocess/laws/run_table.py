@@ -29,17 +29,17 @@ _ELASTIC = 1e-9  # of the largest force times displacement: nothing was dissipat
 _POWER = 1.2  # of the displacement in the force of first touch; contacts of lines have 1.1 to 1.3
 _AT_ONCE = 0.1  # of the first step with contact: what is found to begin before begins at 0
 _SAME = 1e-9  # of the range: nodes that are one
-_FEWEST, _FEWEST_BACK = 6, 3  # steps with contact
+_FEWEST = 6  # steps of first loading with contact
+_FEWEST_BACK = 3  # steps of unloading with contact
 # error of ways back that were not solved, over the force they begin at (docs/calibration.md)
 _UNSEEN = 0.03
 # error at first touch over that at the first step: 5 to 8 % of P against the logarithm of line
 # contact
 _FIRST = 4.0
-_WANTED, _EARLY = (
-    0.01,
-    0.1,
-)  # error of first loading to be asked for, and from which share of its end on
-_BISECTIONS, _LARGEST = 60, 7.0  # of ln(ratio)
+_WANTED = 0.01  # error of first loading to be asked for
+_EARLY = 0.1  # share of its end from which on it is
+_BISECTIONS = 60  # of ln(ratio)
+_LARGEST = 7.0  # ln(ratio)
 _SOFTER = 0.9  # slope of the way back where it opens over that up to the first step, at most
 _LEAST = 1e-3  # slope at an end over that of the last two nodes
 
@@ -57,8 +57,8 @@ class _Cubic(NamedTuple):
 
 
 class _WayBack(NamedTuple):
-    """The curve of unloading, its ratio at the nodes of first loading, and the unloading (indices)
-    that it is of."""
+    """The way back: ``curve`` of unloading, its ``ratio`` at the nodes of first loading, the
+    ``steps`` (indices) of the unloading that it is of, and what is ``said`` of it."""
 
     curve: _Cubic
     ratio: Array
@@ -75,45 +75,64 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
     does not rise on it, and if the run yields and does not unload.
     """
     steps = read_steps(run, of)
-    x, y, first = steps.x, steps.y, steps.first
-    k = first[steps.closed[first].argmax() :] if y.max(initial=0.0) > 0 else first[:0]
-    if len(k) < _FEWEST:
-        said = f"has {len(k)} steps of first loading with contact, and a table needs {_FEWEST}"
-        raise InputError(f"{run.folder}: {said}; press further, or in more steps.")
-    steps.require_rising(k)
-    start = _opening(x[k], y[k], x[first[: -len(k)]])
-    begin = np.unique([0.0, start if start > _AT_ONCE * x[k[0]] else 0.0])
-    loading = _cubic(np.append(begin, x[k]), np.append(0 * begin, y[k]), touching=len(begin) == 1)
+    k = _steps_of_loading(steps)
+    x = steps.x[k]
+    y = steps.y[k]
+    before = steps.x[steps.first[: -len(k)]]
+    start = _opening(x, y, before)
+    if start <= _AT_ONCE * x[0]:
+        start = 0.0
+    begin = np.unique([0.0, start])
+    loading = _cubic(np.append(begin, x), np.append(0 * begin, y), touching=len(begin) == 1)
     back = _way_back(steps, k, loading)
 
     tables = _tables(steps, k, loading, back)
     nodes = tables["x"]
-    left_out = _left_out(loading.x[-len(k) - 1 :] - begin[-1], loading.f[-len(k) - 1 :])[1:] / y[k]
-    mesh = np.interp(nodes, x[k], steps.mesh_error(loading.df[-len(k) :]) / y[k])
+    last = slice(-len(k) - 1, None)
+    left_out = _left_out(loading.x[last] - start, loading.f[last])[1:] / y
+    mesh = np.interp(nodes, x, steps.mesh_error(loading.df[-len(k) :]) / y)
     sizes = _around(np.abs(left_out))
-    error = np.interp(nodes, np.append(begin[-1], x[k]), np.append(_FIRST * sizes[0], sizes)) + mesh
+    error = np.interp(nodes, [start, *x], [_FIRST * sizes[0], *sizes]) + mesh
     curve = JointCurve(**tables, error=error, back_error=error)
     back_error, said = _errors_back(curve, steps, k, back)
     about = steps.about | {
-        "first loading": f"{len(k)} steps to {steps.said(x[k[-1]])}, {steps.said(force=y[k[-1]])}",
-        "contact begins at": steps.said(begin[-1]),
-        "error of first loading": f"{_sizes(left_out)} of P, by the cubic through every second step",
-        "steps for 1 %": _steps_asked(x[k], left_out),
+        "first loading": f"{len(k)} steps to {steps.at(x[-1])}, {steps.load(y[-1])}",
+        "contact begins at": steps.at(start),
+        "error of first loading": (
+            f"{_sizes(left_out)} of P, by the cubic through every second step"
+        ),
+        "steps for 1 %": _steps_asked(x, left_out),
         "way back": back.said,
         "error of the way back": said,
     }
-    return replace(
-        curve, back_error=error if back_error is None else back_error + mesh, about=about
-    )
+    if back_error is not None:
+        curve = replace(curve, back_error=back_error + mesh)
+    return replace(curve, about=about)
+
+
+def _steps_of_loading(steps: RunSteps) -> np.ndarray:
+    """Indices of the steps of first loading, from the first contact on."""
+    first = steps.first
+    touching = np.flatnonzero(steps.closed[first] & (steps.y.max(initial=0.0) > 0))
+    k = first[touching[0] :] if len(touching) else first[:0]
+    if len(k) < _FEWEST:
+        said = f"has {len(k)} steps of first loading with contact, and a table needs {_FEWEST}"
+        raise InputError(f"{steps.run.folder}: {said}; press further, or in more steps.")
+    steps.require_rising(k)
+    return k
 
 
 def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> dict[str, Any]:
     """All cubics at the nodes of both ways, by their names in `JointCurve`."""
     apart = np.abs(back.curve.x[:, None] - loading.x).min(axis=1) > _SAME * loading.x[-1]
-    nodes, touched = np.union1d(loading.x, back.curve.x[apart]), np.append(k[0], k)
-    x, root = np.append(0.0, steps.x[k]), np.sqrt(steps.y[touched])
-    cubics = {"y": loading, "back": back.curve, "ratio": _cubic(loading.x, back.ratio)}
-    cubics |= {
+    nodes = np.union1d(loading.x, back.curve.x[apart])
+    touched = np.append(k[0], k)
+    x = np.append(0.0, steps.x[k])
+    root = np.sqrt(steps.y[touched])
+    cubics = {
+        "y": loading,
+        "back": back.curve,
+        "ratio": _cubic(loading.x, back.ratio),
         "peak": _cubic(x, steps.peak[touched] / root),
         "angle": _cubic(x, steps.angle[touched] / root),
     }
@@ -124,78 +143,78 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
 
 
 def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
-    """That of the largest displacement that the run unloads from after yielding; first loading if
-    it does not yield. ``k`` are the steps of ``loading``."""
+    """The way back of the largest displacement that the run unloads from after yielding; first
+    loading if it does not yield. ``k`` are the steps of ``loading``."""
     start = loading.x[-len(k) - 1]
     least = _ELASTIC * np.ptp(steps.x) * steps.y.max()
     if steps.dissipated.max() <= least:
-        own = _Cubic(*(values[-len(k) - 1 :] for values in loading))
-        return _WayBack(
-            own._replace(x=own.x - start),
-            np.ones(len(loading.x)),
-            k[:0],
-            "along first loading: elastic",
-        )
-    folder, ways = (
-        steps.run.folder,
-        [way for way in _unloadings(steps, k) if steps.dissipated[way[0]] > least],
-    )
+        x, f, df = (values[-len(k) - 1 :] for values in loading)
+        ratio: Array = np.ones(len(loading.x))
+        return _WayBack(_Cubic(x - start, f, df), ratio, k[:0], "along first loading: elastic")
+    folder = steps.run.folder
+    ways = [way for way in _unloadings(steps, k) if steps.dissipated[way[0]] > least]
     if not ways:
         remedy = "a last target of 0 for the load, as load.displacement = [2.0, 0.0], gives it"
         raise InputError(
             f"{folder}: yields and never unloads after, so its way back is unknown; {remedy}."
         )
-    on, off = (ways[-1][mask] for mask in (steps.closed[ways[-1]], ~steps.closed[ways[-1]]))
+    way = ways[-1]
+    on = way[steps.closed[way]][::-1]
+    off = way[~steps.closed[way]]
     if len(on) < _FEWEST_BACK:
         raise InputError(
             f"{folder}: unloads in {len(on)} steps with contact, and a table needs {_FEWEST_BACK}."
         )
-    on = on[::-1]
     steps.require_rising(on)
-    x, y = steps.x[on], steps.y[on]
+    x = steps.x[on]
+    y = steps.y[on]
     z = _opening(x, y, steps.x[off])
     curve = _cubic(np.append(0.0, x - z), np.append(0.0, y), touching=True)
-    curve.df[0] = min(curve.df[0], _SOFTER * loading.f[-len(k)] / (loading.x[-len(k)] - start))
+    secant = loading.f[-len(k)] / (loading.x[-len(k)] - start)
+    curve.df[0] = min(curve.df[0], _SOFTER * secant)
     lost = np.append(np.zeros(len(loading.x) - len(k)), steps.dissipated[k])
-    shift = np.cumsum(
-        np.append(0.0, np.diff(lost) / ((loading.f[1:] + loading.f[:-1]) / 2).clip(_SAME * y[-1]))
-    )
+    between = (loading.f[1:] + loading.f[:-1]) / 2
+    shift = np.append(0.0, np.cumsum(np.diff(lost) / between.clip(_SAME * y[-1])))
     deepest = loading.x == x[-1]
-    ratio = _meeting(curve, loading.x - start - (z - start) * shift / shift[deepest], loading.f)
-    ratio[loading.x <= start], ratio[deepest] = ratio[loading.x > start][0], 1.0
-    said = f"from {steps.said(x[-1])} in {len(on)} steps, opens at {steps.said(z)}"
-    left = "" if len(off) else f", extended from {steps.said(force=y[0])} to none"
-    return _WayBack(curve, ratio, ways[-1], said + left)
+    travel = loading.x - start - (z - start) * shift / shift[deepest]
+    ratio = _meeting(curve, travel, loading.f)
+    ratio[loading.x <= start] = ratio[loading.x > start][0]
+    ratio[deepest] = 1.0
+    said = f"from {steps.at(x[-1])} in {len(on)} steps, opens at {steps.at(z)}"
+    if not len(off):
+        said += f", extended from {steps.load(y[0])} to none"
+    return _WayBack(curve, ratio, way, said)
 
 
 def _errors_back(
     curve: JointCurve, steps: RunSteps, k: np.ndarray, back: _WayBack
 ) -> tuple[Array | None, str]:
     """Errors at the nodes of the way back from there, over the force it begins at; None of what
-    does not yield. And in words those of the unloadings that ``curve`` is not made of."""
-    seen = {}
+    does not yield. And in words the errors of the unloadings that ``curve`` is not made of."""
+    errors: dict[float, Array] = {}  # by the displacement that a way back begins at
     for way in _unloadings(steps, k):
-        x, top = steps.x[way], steps.y[way[0]]
-        seen[x[0]] = (
-            curve.at(x * curve.length, x[:1] * curve.length).load / curve.force - steps.y[way]
-        ) / top
-    own, others = (
-        steps.x[back.steps[:1]],
-        [errors for x, errors in seen.items() if x not in steps.x[back.steps[:1]]],
-    )
-    said = (
-        f"{_sizes(np.concatenate(others))} of the force it begins at, in {len(others)} others"
-        if others
-        else ""
-    )
-    if not len(own):
+        x = steps.x[way]
+        y = steps.y[way]
+        told = curve.at(x * curve.length, x[0] * curve.length).load / curve.force
+        errors[x[0]] = (told - y) / y[0]
+    others = dict(errors)
+    if len(back.steps):
+        others.pop(steps.x[back.steps[0]])
+    said = ""
+    if others:
+        sizes = _sizes(np.concatenate([*others.values()]))
+        said = f"{sizes} of the force it begins at, in {len(others)} others"
+    if not len(back.steps):
         return None, said or "that of first loading"
-    seen[own[0]] = _left_out(back.curve.x, back.curve.f) / back.curve.f[-1]
-    worst = np.interp(curve.x, sorted(seen), [np.abs(seen[x]).max() for x in sorted(seen)])
-    unseen = (curve.x > own[0]) | (not others and curve.x < own[0])
-    return np.where(
-        unseen, _UNSEEN, worst
-    ), said or f"not measured, as there is no other: {_UNSEEN:.0%} assumed"
+    own = steps.x[back.steps[0]]
+    errors[own] = _left_out(back.curve.x, back.curve.f) / back.curve.f[-1]
+    known = sorted(errors)
+    worst = np.interp(curve.x, known, [np.abs(errors[x]).max() for x in known])
+    unseen = curve.x > own
+    if not others:
+        unseen |= curve.x < own
+        said = f"not measured, as there is no other: {_UNSEEN:.0%} assumed"
+    return np.where(unseen, _UNSEEN, worst), said
 
 
 def _unloadings(steps: RunSteps, k: np.ndarray) -> list[np.ndarray]:
@@ -217,9 +236,11 @@ def _meeting(curve: _Cubic, u: Array, y: Array) -> Array:
     low: Array = np.full(len(u), -_LARGEST)
     high: Array = -low
     for _ in range(_BISECTIONS):
-        r = np.exp((low + high) / 2)
+        middle = (low + high) / 2
+        r = np.exp(middle)
         stiff = r * curve.at(u / r)[0] > y
-        low, high = np.where(stiff, np.log(r), low), np.where(stiff, high, np.log(r))
+        low = np.where(stiff, middle, low)
+        high = np.where(stiff, high, middle)
     return np.exp((low + high) / 2)
 
 

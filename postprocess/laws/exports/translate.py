@@ -7,6 +7,7 @@ import ast
 import inspect
 import math
 import re
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,16 +21,22 @@ TABLES = {name for name in vars(algorithm) if name.isupper()}
 def select(wanted: list[str], flags: dict[str, bool]) -> tuple[list[ast.FunctionDef], set[str]]:
     """The functions that ``wanted`` ones call, less what ``flags`` switch off; and the names of the
     tables they use."""
-    todo, used, tables = list(wanted), dict[str, ast.FunctionDef](), set[str]()
+    todo = list(wanted)
+    used: dict[str, ast.FunctionDef] = {}
+    tables: set[str] = set()
     while todo:
         name = todo.pop()
-        used[name] = node = _Prune(flags).visit(ast.parse(ast.unparse(FUNCTIONS[name])).body[0])
-        names = {
-            n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)
-        }
+        used[name] = _Prune(flags).visit(deepcopy(FUNCTIONS[name]))
+        names = _names(used[name].body)
         tables |= names & TABLES
         todo += (names & FUNCTIONS.keys()) - used.keys() - {"warn_outside"}
     return [used[name] for name in FUNCTIONS if name in used], tables
+
+
+def _names(body: list[ast.stmt]) -> set[str]:
+    """All names in a block."""
+    nodes = (node for statement in body for node in ast.walk(statement))
+    return {node.id for node in nodes if isinstance(node, ast.Name)}
 
 
 class _Prune(ast.NodeTransformer):
@@ -112,32 +119,32 @@ class _Words(ast.NodeTransformer):
         self.language = language
 
     def visit_Name(self, node: ast.Name) -> ast.Name:
-        own = self.language
-        form = own.table if node.id in TABLES else own.function if node.id in FUNCTIONS else "{}"
-        return ast.Name(form.format(own.words.get(node.id, node.id)))
+        word = self.language.words.get(node.id, node.id)
+        if node.id in TABLES:
+            word = self.language.table.format(word)
+        elif node.id in FUNCTIONS:
+            word = self.language.function.format(word)
+        return ast.Name(word)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         return ast.Constant(math.pi) if node.attr == "pi" else ast.Name(node.attr)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
-        return (
-            ast.Name(self.language.half.format(ast.unparse(node.left)))
-            if isinstance(node.op, ast.FloorDiv)
-            else node
-        )
+        if isinstance(node.op, ast.FloorDiv):
+            return ast.Name(self.language.half.format(ast.unparse(node.left)))
+        return node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.Name:
-        table, place = (ast.unparse(self.visit(part)) for part in (node.value, node.slice))
-        start, _, more = place.partition(" + ")
-        number = int(more or 0) + self.language.base
-        place = (
-            f"{int(place) + self.language.base}"
-            if place.isdigit()
-            else f"{start} + {number}"
-            if number
-            else start
-        )
+        table = ast.unparse(self.visit(node.value))
+        base = self.language.base
+        match node.slice:
+            case ast.Constant(value=int(number)):
+                place = str(number + base)
+            case ast.BinOp(left=name, right=ast.Constant(value=int(number))):
+                place = f"{ast.unparse(self.visit(name))} + {number + base}"
+            case name:
+                place = ast.unparse(self.visit(name)) + (f" + {base}" if base else "")
         return ast.Name(self.language.entry.format(table, place))
 
 
@@ -178,25 +185,20 @@ def in_python(node: ast.FunctionDef, name: str) -> str:
 
 def in_c(node: ast.FunctionDef, name: str) -> str:
     """The function in C99; the second of two results by a pointer."""
-    prefix, f = f"{name}_", Signature.of(node)
-    c = _c(prefix)
+    f = Signature.of(node)
+    c = _c(f"{name}_")
     result, *more = f.outputs
-    inputs = [f"{c.types[kind]}{name}" for name, kind in f.inputs.items()] + [
-        f"double *{name}_out" for name in more
-    ]
+    inputs = [f"{c.types[kind]}{name}" for name, kind in f.inputs.items()]
+    inputs += [f"double *{name}_out" for name in more]
+    names_by_kind: dict[str, list[str]] = {}
+    for local, kind in f.locals.items():
+        names_by_kind.setdefault(kind, []).append(local)
     body = c.statements(f.body, "")
-    kinds = {
-        kind: [name for name, own in f.locals.items() if own == kind] for kind in f.locals.values()
-    }
-    lines = [f"{c.types[kind]}{', '.join(names)};" for kind, names in kinds.items()]
-    lines += [
-        f"(void){name};"
-        for name in f.inputs
-        if not any(re.search(rf"\b{name}\b", line) for line in body)
-    ]
+    lines = [f"{c.types[kind]}{', '.join(names)};" for kind, names in names_by_kind.items()]
+    lines += [f"(void){name};" for name in f.inputs if not re.search(rf"\b{name}\b", str(body))]
     lines += [*body, *(f"*{name}_out = {name};" for name in more), f"return {result};"]
-    head = f"/* {f.doc} */\nstatic inline {c.types[f.locals[result]]}{prefix}{f.name}({', '.join(inputs)}) {{\n"
-    return head + "".join(f"    {line}\n" for line in lines) + "}"
+    head = f"static inline {c.types[f.locals[result]]}{name}_{f.name}({', '.join(inputs)}) {{"
+    return "\n".join([f"/* {f.doc} */", head, *(f"    {line}" for line in lines), "}"])
 
 
 def in_modelica(node: ast.FunctionDef, name: str) -> str:
@@ -214,11 +216,9 @@ def in_modelica(node: ast.FunctionDef, name: str) -> str:
 def in_octave(node: ast.FunctionDef, name: str) -> str:
     """The function in Matlab and Octave; tables are a persistent structure ``T``."""
     f = Signature.of(node)
-    tables = {
-        n.id for statement in f.body for n in ast.walk(statement) if isinstance(n, ast.Name)
-    } & TABLES
     lines = [f"% {f.doc}"]
-    lines += ["persistent T", "if isempty(T)", "    T = tables();", "end"] if tables else []
+    if _names(f.body) & TABLES:
+        lines += ["persistent T", "if isempty(T)", "    T = tables();", "end"]
     lines += OCTAVE.statements(f.body, "")
     head = f"function [{', '.join(f.outputs)}] = {f.name}({', '.join(f.inputs)})\n"
     return head + "".join(f"    {line}\n" for line in lines) + "end"

@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.floating]
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
-_SOFTER, _SOFTEST = (
-    1.4,
-    2.5,
-)  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any
+# fall of P in a block of W, times (W/R)^2
+_SOFTER = 1.4  # of like elastic bodies
+_SOFTEST = 2.5  # of any
 
 
 @dataclass(frozen=True)
@@ -64,29 +63,19 @@ class LawJoint:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in (
-            "radius",
-            "clearance",
-            "E_star",
-            "k",
-            "c",
-            "pin_yield",
-            "block_yield",
-            "length",
-            "block_size",
-        ):
+        positive = "radius clearance E_star k c pin_yield block_yield length block_size"
+        for name in positive.split():
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value:g} must be a positive number.")
         if not 0 <= self.pin_share <= 1:
             raise ValueError(f"pin_share = {self.pin_share:g} must be between 0 and 1.")
-        for name, value in (("nu", self.nu), ("pin_nu", self.pin_nu)):
+        for name in ("nu", "pin_nu"):
+            value = getattr(self, name)
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
-        for name, value in (
-            ("pin_hardening", self.pin_hardening),
-            ("block_hardening", self.block_hardening),
-        ):
+        for name in ("pin_hardening", "block_hardening"):
+            value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value:g} must be a number that is not negative.")
         if self.plane not in (None, "strain", "stress"):
@@ -95,14 +84,14 @@ class LawJoint:
     @classmethod
     def from_scene(cls, scene: Scene) -> LawJoint:
         """The joint of ``scene``."""
-        plane, pin, block = scene.analysis.plane, scene.solids.get("pin"), scene.block
+        plane = scene.analysis.plane
+        pin = scene.solids.get("pin")
+        block = scene.block
         given: dict[str, Any] = {"pin_share": 0.0}
         if pin is not None:
-            ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(
-                block.E, block.nu, plane
-            )
+            stiffness = contact_modulus(pin.E, pin.nu, plane)
             given = {
-                "pin_share": 1 / (1 + ratio),
+                "pin_share": 1 / (1 + stiffness / contact_modulus(block.E, block.nu, plane)),
                 "pin_yield": pin.yield_stress,
                 "pin_hardening": _hardening(pin),
             }
@@ -137,10 +126,12 @@ class LawJoint:
     def yielding(self) -> str:
         """Which bodies yield: "none", "pin", "block", "both" at one stress, or "unlike", each at
         its own."""
-        pin, block = self.pin_yield, self.block_yield
-        if pin is None or block is None:
-            return "pin" if pin is not None else "block" if block is not None else "none"
-        return "both" if math.isclose(pin, block, rel_tol=1e-6) else "unlike"
+        if self.pin_yield is None:
+            return "none" if self.block_yield is None else "block"
+        if self.block_yield is None:
+            return "pin"
+        alike = math.isclose(self.pin_yield, self.block_yield, rel_tol=1e-6)
+        return "both" if alike else "unlike"
 
     @property
     def hardens(self) -> bool:
