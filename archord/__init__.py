@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from archord.geometry.curve import RigidCircle
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.geometry.meshes.formats.source import Mesh
+    from archord.geometry.shapes.rectangles import rectangles
     from archord.materials.elasticity import Elastic
     from archord.materials.finite import LargeStrain
     from archord.materials.hardening import (
@@ -31,39 +32,74 @@ if TYPE_CHECKING:
     )
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
+    from archord.materials.material import Material
     from archord.postprocess.pictures.pictures import draw_run
     from archord.scene.problem import ProblemScene
     from archord.scene.scene import Scene
     from archord.solver.contact.coulomb import Coulomb
+    from archord.solver.contact.law import ContactLaw, Quantity, Response
     from archord.solver.path.system import System
     from archord.solver.problem import Body, Coupling, Interaction, Load, Problem, Support
 
-
 __all__ = [
-    "Body", "Coulomb", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LargeStrain",
-    "LinearHardening", "Load", "Mesh", "Problem", "ProblemScene", "RigidCircle", "Run", "Scene", "Support", "Sweep", "SwiftHardening",
-    "System", "TabularHardening", "VoceHardening", "draw_run", "gmsh_to_mesh", "load", "load_scene", "solve",
-]  # fmt: skip
+    "Body",
+    "ContactLaw",
+    "Coulomb",
+    "Coupling",
+    "Elastic",
+    "InputError",
+    "Interaction",
+    "J2Material",
+    "KinematicMaterial",
+    "LargeStrain",
+    "LinearHardening",
+    "Load",
+    "Material",
+    "Mesh",
+    "Problem",
+    "ProblemScene",
+    "Quantity",
+    "Response",
+    "RigidCircle",
+    "Run",
+    "Scene",
+    "Support",
+    "Sweep",
+    "SwiftHardening",
+    "System",
+    "TabularHardening",
+    "VoceHardening",
+    "draw_run",
+    "gmsh_to_mesh",
+    "load",
+    "load_scene",
+    "rectangles",
+    "solve",
+]
 _HOME = {
-    "draw_run": "archord.postprocess.pictures.pictures",
-    "gmsh_to_mesh": "archord.geometry.meshes.fenicsx",
-    "Elastic": "archord.materials.elasticity",
-    "J2Material": "archord.materials.j2",
-    "LargeStrain": "archord.materials.finite",
-    "KinematicMaterial": "archord.materials.kinematic",
-    "System": "archord.solver.path.system",
-    **dict.fromkeys(
-        ("LinearHardening", "SwiftHardening", "TabularHardening", "VoceHardening"),
-        "archord.materials.hardening",
-    ),
-    "Scene": "archord.scene.scene",
-    "ProblemScene": "archord.scene.problem",
-    "Mesh": "archord.geometry.meshes.formats.source",
-    "RigidCircle": "archord.geometry.curve",
-    "Coulomb": "archord.solver.contact.coulomb",
-    **dict.fromkeys(
-        ("Body", "Coupling", "Interaction", "Load", "Problem", "Support"), "archord.solver.problem"
-    ),
+    "archord.api": ["InputError", "Run", "Sweep", "load", "load_scene", "solve"],
+    "archord.geometry.curve": ["RigidCircle"],
+    "archord.geometry.meshes.fenicsx": ["gmsh_to_mesh"],
+    "archord.geometry.meshes.formats.source": ["Mesh"],
+    "archord.geometry.shapes.rectangles": ["rectangles"],
+    "archord.materials.elasticity": ["Elastic"],
+    "archord.materials.finite": ["LargeStrain"],
+    "archord.materials.hardening": [
+        "LinearHardening",
+        "SwiftHardening",
+        "TabularHardening",
+        "VoceHardening",
+    ],
+    "archord.materials.j2": ["J2Material"],
+    "archord.materials.kinematic": ["KinematicMaterial"],
+    "archord.materials.material": ["Material"],
+    "archord.postprocess.pictures.pictures": ["draw_run"],
+    "archord.scene.problem": ["ProblemScene"],
+    "archord.scene.scene": ["Scene"],
+    "archord.solver.contact.coulomb": ["Coulomb"],
+    "archord.solver.contact.law": ["ContactLaw", "Quantity", "Response"],
+    "archord.solver.path.system": ["System"],
+    "archord.solver.problem": ["Body", "Coupling", "Interaction", "Load", "Problem", "Support"],
 }
 
 
@@ -73,7 +109,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    value = getattr(importlib.import_module(_HOME.get(name, "archord.api")), name)
+    module = next(module for module, names in _HOME.items() if name in names)
+    value = getattr(importlib.import_module(module), name)
     globals()[name] = value
     return value
 

@@ -1,41 +1,32 @@
-"""Three squares between walls, plane strain: the middle one yields, with pressure p = K strain +
-2/3 sigY (J2)."""
+"""Three squares between walls are pressed together: the middle one is soft, and yields."""
 
-from mpi4py import MPI
+from archord import Body, Elastic, Interaction, J2Material, LinearHardening, Load, Problem, Support
+from archord import rectangles, solve
 
-from archord import Elastic, J2Material, LinearHardening, System, gmsh_to_mesh
-from archord.solver.problem import Body, Dirichlet, Interaction, Problem
+E, nu, yield_stress, depth = 1.0, 0.3, 0.002, 0.02
 
-E, NU, SIGY, DEPTH, NAMES = 1.0, 0.3, 0.002, 0.02, ("lower", "middle", "upper")
-
-
-def squares(gmsh):
-    """Unit squares on top of each other, their sides named by bottom, right, top and left."""
-    for y, name in enumerate(NAMES):
-        face = gmsh.model.occ.addRectangle(0, y, 0, 1, 1)
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(2, [face], name=name)
-        for side, (_, line) in zip(
-            "brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True
-        ):
-            gmsh.model.mesh.setTransfiniteCurve(line, 3 + y)
-            gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
-
-
-steel, lead = Elastic(E, NU, "strain"), J2Material(E, NU, "strain", LinearHardening(SIGY))
-bodies = [Body(name, lead if name == "middle" else steel) for name in NAMES]
-contacts = [
-    Interaction("low", ("middle b", "lower t")),
-    Interaction("high", ("upper b", "middle t")),
-]
-walls = [Dirichlet("walls", f"{name} {side}", 0) for name in NAMES for side in "lr"]
-supports = [Dirichlet("base", "lower b", 1), Dirichlet("lid", "upper t", 1, rate=-1.0), *walls]
-(
-    system := System(Problem(gmsh_to_mesh(MPI.COMM_WORLD, squares), bodies, contacts, supports))
-).solve([DEPTH])
-K, M = (
-    E / (3 * (1 - 2 * NU)),
-    E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)),
-)  # moduli without and with shear
-pressure, exact = -system.reaction("lid")[1], (DEPTH + 2 * SIGY / (3 * K)) / (2 / M + 1 / K)
-print(f"pressure {pressure:.12g}, exact {exact:.12g}")
+mesh = rectangles({"lower": (0, 0, 1, 1), "middle": (0, 1, 1, 1), "upper": (0, 2, 1, 1)}, size=0.3)
+steel = Elastic(E, nu)
+lead = J2Material(E, nu, hardening=LinearHardening(yield_stress))
+problem = Problem(
+    mesh,
+    bodies=[Body("lower", steel), Body("middle", lead), Body("upper", steel)],
+    interactions=[
+        Interaction("low", ("middle bottom", "lower top")),
+        Interaction("high", ("upper bottom", "middle top")),
+    ],
+    supports=[
+        Support("lower bottom", fixed="y"),
+        Support("lower left", fixed="x"),
+        Support("lower right", fixed="x"),
+        Support("middle left", fixed="x"),
+        Support("middle right", fixed="x"),
+        Support("upper left", fixed="x"),
+        Support("upper right", fixed="x"),
+    ],
+    loads=[Load("lid", on="upper top", direction="y", displacement=-depth)],
+    steps=1,
+)
+run = solve(problem, "runs/three_stack", force=True)
+pressure = -run.columns["lid force"][-1]
+print(f"pressure {pressure:.12g}")

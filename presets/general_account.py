@@ -156,6 +156,8 @@ class GeneralAccount:
             if part.has_friction:
                 shear = max(float(np.abs(p.shear).max()) for p in met if p.shear is not None)
                 values += [system.contact_moment(part.name, (0.0, 0.0)), shear]
+            told = system.contact.interface(part.name).quantities()
+            values += [told[name][0] for name in part.quantities]
             area += float(np.mean(lengths))
         for body in system.problem.bodies:
             if body.material.yields:

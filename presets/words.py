@@ -159,7 +159,8 @@ def _law(law: Any) -> dict[str, Any]:
     """The keys of an interaction's section for a contact law."""
     if isinstance(law, str):
         return {"law": law}
-    return {"own": _own(law) | {"friction": bool(law.has_friction)}}
+    units = {name: quantity.unit for name, quantity in law.quantities(law.state(1)).items()}
+    return {"own": _own(law) | {"friction": bool(law.has_friction), "quantities": units}}
 
 
 def _load(load: Load) -> dict[str, Any]:

@@ -94,7 +94,9 @@ def _columns(scene: ProblemScene) -> Iterator[Column]:
         rubbed = (
             {"moment": moment, "largest shear": units.stress} if interaction.has_friction else {}
         )
-        for what, unit in (pressed | placed | {"arcs": ""} | rubbed).items():
+        for what, unit in (
+            pressed | placed | {"arcs": ""} | rubbed | interaction.quantities
+        ).items():
             yield "interaction", interaction.name, what, unit
     for body in scene.body:
         if body.plastic:

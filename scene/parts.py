@@ -81,6 +81,7 @@ class OwnLaw(OwnSection):
     """A contact law of a class of one's own."""
 
     friction: bool = key("whether it has shear", default=False)
+    quantities: dict[str, str] = key("units of what the law tells, by name", default={})
 
 
 class BodySection(Solid):
@@ -132,6 +133,11 @@ class InteractionSection(Section):
         "length",
         default=0.0,
     )
+
+    @property
+    def quantities(self) -> dict[str, str]:
+        """Units of what the law tells besides forces, by name."""
+        return self.own.quantities if self.own else {}
 
     @property
     def has_friction(self) -> bool:
