@@ -14,7 +14,7 @@ class Archard(archord.ContactLaw):
     """The depth of wear grows by k times pressure times slip, and opens the gap."""
 
     k: float
-    counts_slip = True
+    counts_slip = unilateral = True
 
     def state(self, n):
         return Worn(np.zeros(n))
@@ -31,7 +31,7 @@ class Archard(archord.ContactLaw):
 
 
 mesh = archord.rectangles({"block": (-4, -2, 8, 2)}, size=0.25)
-rub = archord.Interaction("rub", (archord.RigidCircle((0, 50), 50), "block top"), law=Archard(1e-5))
+rub = archord.Interaction("rub", (archord.RigidCircle((0, 50), 50), "block top"), law=Archard(1e-6))
 press = archord.Load("press", on="rub", direction="y", force=3 * [-500.0])
 slide = archord.Load("slide", on="rub", direction="x", displacement=[0.0, 0.5, -0.5])
 block = archord.Body("block", archord.Elastic(210e3, 0.3))

@@ -86,7 +86,7 @@ def test_an_own_law_wears_by_archard(run_of):
     run = run_of("own_law")
     slid = np.concatenate([np.zeros(4), np.linspace(0.05, 0.5, 10), np.linspace(0.55, 1.5, 20)])
     volume = run.columns["rub worn volume"]
-    assert volume[4:] == pytest.approx(1e-5 * 500 * slid[4:], rel=3e-3, abs=1e-5)
+    assert volume[4:] == pytest.approx(1e-6 * 500 * slid[4:], rel=3e-3, abs=1e-6)
     assert np.diff(volume).min() >= 0
 
 

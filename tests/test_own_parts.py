@@ -1,0 +1,151 @@
+"""Materials and contact laws of own classes: their runs have all that a scene's run has, and go on
+with the objects alone."""
+
+import re
+import shutil
+import signal
+from dataclasses import dataclass, make_dataclass
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import archord
+from archord import cli
+from archord.progress import Progress
+
+Worn = make_dataclass("Worn", ["depth"])
+
+
+class Soft(archord.Material):
+    """Hooke's law, without a representation of its own."""
+
+    hooke = archord.Elastic(1000.0, 0.3)
+    elastic_tangent = hooke.elastic_tangent
+
+    def update(self, strain, state):
+        return self.hooke.update(strain, state)
+
+    def energy(self, stress):
+        return self.hooke.energy(stress)
+
+
+@dataclass(frozen=True)
+class Wear(archord.ContactLaw):
+    """Archard's wear of what slides."""
+
+    k: float
+    counts_slip = True
+
+    def state(self, n):
+        return Worn(np.zeros(n))
+
+    def respond(self, opening, trial, gamma, state, dt):
+        pressure = np.maximum(trial[:, 0] - gamma[:, 0] * state.depth, 0.0)
+        touches = (pressure > 0).astype(int)
+        by_trial = touches[:, None, None] * np.diag([1.0, 0.0])
+        worn = Worn(state.depth + self.k * pressure * np.abs(opening[:, 1]))
+        return archord.Response(pressure[:, None] * [1, 0], by_trial, None, touches, worn)
+
+    def quantities(self, state):
+        return {"worn volume": archord.Quantity(state.depth, "mm2")}
+
+
+def sliding(comm, k=1e-3, **changes):
+    """A block of `Soft` that is pressed on another one and slides on it."""
+    mesh = archord.rectangles({"lower": (0, 0, 4, 1), "upper": (1, 1, 2, 1)}, 0.4, comm)
+    return archord.Problem(
+        mesh,
+        bodies=[archord.Body("lower", Soft()), archord.Body("upper", archord.Elastic(500.0, 0.3))],
+        interactions=[archord.Interaction("rub", ("upper bottom", "lower top"), law=Wear(k))],
+        supports=[archord.Support("lower bottom")],
+        loads=[
+            archord.Load("press", on="upper top", direction="y", displacement=[-0.01, -0.01]),
+            archord.Load("slide", on="upper top", direction="x", displacement=[0.0, 0.2]),
+        ],
+        **({"steps": [1, 3]} | changes),
+    )
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return archord.solve(sliding(MPI.COMM_SELF), tmp_path_factory.mktemp("own") / "run")
+
+
+@pytest.mark.mpi
+def test_a_run_goes_on_with_its_objects_on_any_number_of_ranks(comm, tmp_path, monkeypatch):
+    """To the numbers of one rank that was not interrupted, to 1e-9."""
+    folder = comm.bcast(tmp_path)
+    alone = archord.solve(sliding(MPI.COMM_SELF), folder / f"alone{comm.rank}", comm=MPI.COMM_SELF)
+
+    def stop(self, m):
+        if m.step == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Progress, "step", stop)
+        with pytest.raises(KeyboardInterrupt):
+            archord.solve(sliding(comm), folder / "run", comm=comm)
+    run = archord.solve(sliding(comm), folder / "run", restart=True, comm=comm)
+    assert (run.status, run.steps) == ("done", 4)
+    for name in ("press force", "slide force", "rub worn volume", "elastic_energy"):
+        scale = np.abs(alone.columns[name]).max()
+        np.testing.assert_allclose(run.columns[name], alone.columns[name], atol=1e-9 * scale)
+
+
+def test_the_folder_tells_of_the_objects(run):
+    """By class and representation, without addresses, which differ in every process."""
+    said = (run.folder / "scene.toml").read_text()
+    assert 'kind = "Soft"' in said
+    assert 'text = "Wear(k=0.001)"' in said
+    assert "0x" not in said
+    assert archord.load(run.folder).scene.body[0].own.text.endswith("Soft object>")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["show", "{run}"], ["report", "{run}", "-o", "{to}.pdf"], ["picture", "{run}", "-o", "{to}.png"],
+     ["probe", "{run}", "--edge", "lower top"], ["export", "{run}", "--csv", "{to}"]],
+)  # fmt: skip
+def test_a_run_of_own_objects_is_read_as_any_other(run, tmp_path, command, capsys):
+    words = [word.format(run=run.folder, to=tmp_path / "out") for word in command]
+    assert cli.run(words) == 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["{}/scene.toml", "-o", "{}/again"], ["{}", "--restart"]])
+def test_no_scene_is_solved_with_the_description_of_an_object(run, tmp_path, words, capsys):
+    """One sentence, exit code 2; what the run left stays."""
+    folder = shutil.copytree(run.folder, tmp_path / "run")
+    (folder / "history.csv").unlink()
+    assert cli.run(["solve", *(word.format(folder) for word in words)]) == 2
+    (said,) = capsys.readouterr().err.strip().splitlines()[-1:]
+    assert re.search(r'body "lower": has a material given from Python, .*Soft object>, which', said)
+    assert said.count("archord.solve(problem, ") == 1
+    assert (folder / "checkpoint.h5").exists()
+
+
+def test_another_object_does_not_continue_a_run(run):
+    with pytest.raises(archord.InputError, match="only"):
+        archord.solve(sliding(MPI.COMM_SELF, k=0.002), run.folder, restart=True)
+
+
+def test_an_extended_path_goes_on(run, tmp_path):
+    """More steps of further loads, after those of the run."""
+    folder = shutil.copytree(run.folder, tmp_path / "run")
+    problem = sliding(MPI.COMM_SELF)
+    loads = [
+        archord.Load(load.name, load.on, load.direction, displacement=[*load.stages, last])
+        for load, last in zip(problem.loads, (-0.01, 0.0), strict=True)
+    ]
+    longer = sliding(MPI.COMM_SELF, steps=[1, 3, 3])
+    longer = archord.Problem(
+        longer.mesh,
+        longer.bodies,
+        longer.interactions,
+        longer.supports,
+        loads,
+        steps=[1, 3, 3],
+    )
+    found = archord.solve(longer, folder, restart=True)
+    assert (found.status, found.steps) == ("done", 7)
+    assert found.columns["slide displacement"][-1] == pytest.approx(0.0, abs=1e-12)
