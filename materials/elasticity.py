@@ -1,4 +1,4 @@
-"""Isotropic linear elasticity in the plane; strains and stresses as in `Material`."""
+"""Isotropic linear elasticity; strains and stresses as in `Material`."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archord.materials.kinematics import Kinematics, kinematics
 from archord.materials.material import Array, Material, Plane, State
 
 
 def contact_modulus(E: float, nu: float, plane: Plane) -> float:
-    """Modulus that one body brings to the contact: ``E / (1 - nu^2)`` in plane strain, ``E`` in
-    plane stress."""
-    return E / (1 - nu**2) if plane == "strain" else E
+    """Modulus that one body brings to the contact: ``E / (1 - nu^2)``, in plane stress ``E``."""
+    return E if kinematics(plane).is_thin else E / (1 - nu**2)
 
 
 def von_mises(stress: Array) -> Array:
@@ -45,33 +45,48 @@ class Elastic(Material):
     plane: Plane = "strain"
 
     @property
+    def kinematics(self) -> Kinematics:
+        """The kinematics named by ``plane``."""
+        return kinematics(self.plane)
+
+    @property
+    def working(self) -> list[int]:
+        """Places in a stress of the components that do work on the strain."""
+        return list(self.kinematics.working)
+
+    @property
     def lame(self) -> tuple[float, float]:
         """Lame's constants ``(lambda, mu)``."""
         E, nu = self.E, self.nu
         return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
     @property
-    def elastic_tangent(self) -> Array:
-        """Moduli ``(3, 3)`` in the plane, in units of ``E``."""
+    def moduli(self) -> Array:
+        """Moduli ``(4, 4)`` of all components of the stress, with engineering shear; in plane
+        stress none out of the plane."""
         lam, mu = self.lame
-        if self.plane == "stress":
+        trace = np.array([1.0, 1.0, 1.0, 0.0])
+        shear = np.array([2 * mu, 2 * mu, 2 * mu, mu])
+        if self.kinematics.is_thin:
             lam = self.E * self.nu / (1 - self.nu**2)
-        return np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
+            trace[2] = shear[2] = 0.0
+        return lam * np.outer(trace, trace) + np.diag(shear)
+
+    @property
+    def elastic_tangent(self) -> Array:
+        """Moduli ``(k, k)`` of the components that do work on the strain."""
+        return self.moduli[np.ix_(self.working, self.working)]
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """Hooke's law, with the stress out of the plane."""
         moduli = self.elastic_tangent
-        stress = np.zeros((len(strain), 4))
-        stress[:, [0, 1, 3]] = strain @ moduli
-        if self.plane == "strain":
-            stress[:, 2] = self.nu * (stress[:, 0] + stress[:, 1])
-        return stress, np.broadcast_to(moduli, (len(strain), 3, 3)), state
+        stress = strain @ self.moduli[self.working]
+        return stress, np.broadcast_to(moduli, (len(strain), *moduli.shape)), state
 
     def energy(self, stress: Array) -> Array:
         """Half the stress times its elastic strain, in three dimensions."""
         _, mu = self.lame
-        bulk, mean = self.E / (3 * (1 - 2 * self.nu)), mean_stress(stress)
-        deviator = stress - mean[:, None] * np.array([1.0, 1.0, 1.0, 0.0])
-        return mean**2 / (2 * bulk) + (
-            (deviator[:, :3] ** 2).sum(axis=1) + 2 * deviator[:, 3] ** 2
-        ) / (4 * mu)
+        bulk = self.E / (3 * (1 - 2 * self.nu))
+        mean = mean_stress(stress)
+        volumetric = mean**2 / (2 * bulk)
+        return volumetric + von_mises(stress) ** 2 / (6 * mu)

@@ -4,14 +4,13 @@ Lambrecht 2002).
 The logarithmic strain is ``E = 1/2 ln C`` with ``C = F^T F``. The inner material makes of it the
 stress ``T`` that does work on it, along the principal axes Kirchhoff's: Hencky's elasticity, and
 plastic strains that add up as logarithms, which is multiplicative plasticity where the axes do not
-turn. The second Piola-Kirchhoff stress ``S = T : 2 dE/dC`` and its derivative follow by those of
-the logarithm, and the nominal stress is ``P = F S``. J2 materials yield by Cauchy's von Mises
-stress: their yield stress times ``J``, which elasticity alone changes, is Kirchhoff's. Back
-stresses are Kirchhoff's.
+turn. The nominal stress ``P = T : dE/dF`` and its derivative follow from the derivatives of the
+logarithm. J2 materials yield by Cauchy's von Mises stress: their yield stress times ``J``, which
+elasticity alone changes, is Kirchhoff's. Back stresses are Kirchhoff's.
 
-Gradients ``(n, 4)`` of the displacement and nominal stresses are ``[xx, yy, xy, yx]``, P_xy a force
-along x on a face that was normal to y. In plane stress forces are per undeformed thickness, and the
-thickness follows.
+Gradients ``(n, k)`` of the displacement and nominal stresses have the components of the kinematics:
+``[xx, yy, xy, yx]``, P_xy a force along x on a face that was normal to y, and around an axis ``[rr,
+zz, rz, zr, tt]``. In plane stress forces are per undeformed thickness, and the thickness follows.
 """
 
 from __future__ import annotations
@@ -39,9 +38,8 @@ class LargeStrain(Material):
     """The material ``inner`` of small strain at large strain, by logarithmic strains (Miehe, Apel
     and Lambrecht 2002).
 
-    It gets displacement gradients and gives nominal stresses, ``[xx, yy, xy, yx]``, in the unit of
-    ``inner``, whose states and moduli it has. All bodies of a problem that yield must be at large
-    strain if one is.
+    It gets displacement gradients and gives nominal stresses, in the unit of ``inner``, whose
+    states and moduli it has. All bodies of a problem that yield must be at large strain if one is.
     """
 
     finite: ClassVar[bool] = True
@@ -61,7 +59,7 @@ class LargeStrain(Material):
 
     @property
     def elastic_tangent(self) -> Array:
-        """That of small strains ``(3, 3)``."""
+        """The elastic tangent of small strains ``(k, k)``."""
         return self.inner.elastic_tangent
 
     def elastic(self) -> Material:
@@ -85,43 +83,37 @@ class LargeStrain(Material):
         return self.inner.peeq(state)
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
-        """Nominal stress ``(n, 4)``, its derivative ``(n, 4, 4)`` and the new state at displacement
-        gradients ``(n, 4)``; not a number at points that are turned inside out."""
-        F = _gradient(strain)
-        axes = _PrincipalAxes(strain)
-        T, moduli, new = self._logarithmic(axes.strain, state)
-        S, hessian = axes.back(T[:, [0, 1, 3]], moduli)
-        ((a, b), (c, d)), z, (xx, yy, xy) = np.moveaxis(F, 0, -1), np.zeros(len(F)), S.T
-        to_nominal = _table([[a, z, b], [z, d, c], [z, b, a], [c, z, d]])
-        dC = _table([[2 * a, z, z, 2 * c], [z, 2 * d, 2 * b, z], [b, c, a, d]])
-        turning = _table([[xx, z, xy, z], [z, yy, z, xy], [xy, z, yy, z], [z, xy, z, xx]])
-        return (to_nominal @ S[..., None])[..., 0], to_nominal @ hessian @ dC + turning, new
+        """Nominal stress ``(n, k)``, its derivative ``(n, k, k)`` and the new state at displacement
+        gradients ``(n, k)``; not a number at points that are turned inside out."""
+        logarithm = Logarithm(strain)
+        T, moduli, new = self._logarithmic(logarithm.strain, state)
+        stress, tangent = logarithm.nominal(T[:, logarithm.working], moduli)
+        return stress, tangent, new
 
     def _logarithmic(self, strain: Array, state: State) -> tuple[Array, Array, State]:
-        """The inner material at logarithmic strains ``(n, 3)``."""
+        """The inner material at logarithmic strains ``(n, k)``."""
         m = self.inner
         if not isinstance(m, J2Material):
             return m.update(strain, state)
-        if m.plane == "strain":
-            volume = strain[:, 0] + strain[:, 1]
-        else:  # it follows the stress, which hardly depends on it: its derivative is left out
-            volume = (1 - 2 * m.nu) / m.E * m.update(strain, state)[0][:, :2].sum(axis=1)
-        hardening = Scaled(m.hardening, np.exp(volume))
-        stress, moduli, new = replace(m, hardening=hardening).update(strain, state)
-        if (
-            m.plane == "strain" and new is not state
-        ):  # a yield stress that grows makes the deviator grow with it
-            deviator = stress - stress[:, :3].mean(axis=1)[:, None] * [1.0, 1.0, 1.0, 0.0]
-            deviator, slope = (
-                deviator - m.centre(new),
-                hardening.slope(new.peeq) + m.stiffening(state, new),
-            )
-            _, mu = m.lame
-            grown = (new.peeq > state.peeq) / (1 + slope / (3 * mu))
-            moduli = moduli + (grown[:, None] * deviator)[:, [0, 1, 3], None] * np.array(
-                [1.0, 1.0, 0.0]
-            )
-        return stress, moduli, new
+        normal = np.array([float(place < 3) for place in m.working])
+        if m.kinematics.is_thin:
+            # it follows the stress, which hardly depends on it: its derivative is left out
+            elastic_stress = m.update(strain, state)[0]
+            volume = (1 - 2 * m.nu) / m.E * elastic_stress[:, :2].sum(axis=1)
+        else:
+            volume = strain @ normal
+        scaled = replace(m, hardening=Scaled(m.hardening, np.exp(volume)))
+        stress, moduli, new = scaled.update(strain, state)
+        if m.kinematics.is_thin or new is state:
+            return stress, moduli, new
+        # a yield stress that grows makes the deviator grow with it
+        mean = stress[:, :3].mean(axis=1)
+        deviator = stress - mean[:, None] * [1.0, 1.0, 1.0, 0.0] - m.centre(new)
+        slope = scaled.hardening.slope(new.peeq) + m.stiffening(state, new)
+        _, mu = m.lame
+        grown = m.flows(state, new) / (1 + slope / (3 * mu))
+        by_volume = (grown[:, None] * deviator)[:, m.working]
+        return stress, moduli + by_volume[:, :, None] * normal, new
 
     def energy(self, stress: Array) -> Array:
         """Elastic energy density ``(n,)`` of stresses ``(n, 4)`` that do work on logarithmic
@@ -129,29 +121,34 @@ class LargeStrain(Material):
         return self.inner.energy(stress)
 
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
-        """Elastic energy per undeformed volume ``(n,)`` at gradients of which ``state`` is the new
-        one."""
-        return self.energy(self._logarithmic(_PrincipalAxes(strain).strain, state)[0])
+        """Elastic energy per undeformed volume ``(n,)`` after an update to the gradients ``strain``
+        and ``state``."""
+        return self.energy(self._logarithmic(Logarithm(strain).strain, state)[0])
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
-        """Cauchy's stress ``(n, 4)`` at gradients with the nominal ``stress``, of which ``state``
-        is the new one."""
-        F = _gradient(strain)
-        T = self._logarithmic(_PrincipalAxes(strain).strain, state)[0]
+        """Cauchy's stress ``(n, 4)`` after an update to the gradients ``strain``, the nominal
+        ``stress`` and ``state``."""
+        T = self._logarithmic(Logarithm(strain).strain, state)[0]
         J = np.exp((1 - 2 * self.inner.nu) / self.inner.E * T[:, :3].sum(axis=1))
-        ((a, b), (c, d)), (xx, yy, xy, yx) = np.moveaxis(F, 0, -1), stress.T
-        return (
-            np.stack([xx * a + xy * b, yx * c + yy * d, T[:, 2], xx * c + xy * d], axis=1)
-            / J[:, None]
-        )
+        F_xx, F_xy, F_yx, F_yy = _deformation(strain)
+        P_xx, P_yy, P_xy, P_yx = stress.T[:4]
+        kirchhoff = np.empty((len(strain), 4))
+        kirchhoff[:, 0] = P_xx * F_xx + P_xy * F_xy
+        kirchhoff[:, 1] = P_yx * F_yx + P_yy * F_yy
+        kirchhoff[:, 2] = T[:, 2]
+        kirchhoff[:, 3] = P_xx * F_yx + P_xy * F_yy
+        return kirchhoff / J[:, None]
 
 
-def _gradient(strain: Array) -> Array:
-    """``F`` ``(n, 2, 2)`` of displacement gradients; not a number where its determinant is not
-    positive."""
-    xx, yy, xy, yx = strain.T
-    F = _table([[1 + xx, xy], [yx, 1 + yy]])
-    return np.where(((1 + xx) * (1 + yy) > xy * yx)[:, None, None], F, np.nan)
+def _deformation(gradient: Array) -> tuple[Array, Array, Array, Array]:
+    """``F_xx, F_xy, F_yx, F_yy`` ``(n,)`` of displacement gradients; not a number where what is
+    deformed is turned inside out."""
+    xx, yy, xy, yx = gradient.T[:4]
+    is_right = (1 + xx) * (1 + yy) > xy * yx
+    for hoop in gradient.T[4:]:
+        is_right &= hoop > -1
+    one = np.where(is_right, 1.0, np.nan)
+    return one + xx, one * xy, one * yx, one + yy
 
 
 def _table(rows: list[list[Array]]) -> Array:
@@ -159,64 +156,145 @@ def _table(rows: list[list[Array]]) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-class _PrincipalAxes:
-    """Principal axes of ``C = F^T F`` at displacement gradients, the logarithmic ``strain`` ``(n,
-    3)`` and its derivatives.
+class Logarithm:
+    """The logarithmic strain of displacement gradients ``(n, k_gradient)``, with its derivatives.
 
-    With ``g = 1/2 ln`` and its divided differences, ``dE_ij = g[i, j] dC_ij`` and ``d2E_ij = sum
-    over k of g[i, k, j] (A_ik B_kj + B_ik A_kj)`` (Daleckii and Krein 1965; Higham 2008, theorem
-    3.11).
+    With ``g = 1/2 ln`` of the eigenvalues of C and its divided differences, ``dE_ij = g[i, j]
+    dC_ij`` and ``d2E_ij = sum over k of g[i, k, j] (A_ik B_kj + B_ik A_kj)`` along the principal
+    axes (Daleckii and Krein 1965; Higham 2008, theorem 3.11). Around an axis the hoop direction is
+    a principal one, with ``E = ln(1 + u_r / r)``.
+
+    - ``working`` ``(k,)``: places in a stress of the components that do work on the strain
+    - ``strain`` ``(n, k)``: the logarithmic strain, with engineering shear
+    - ``_to_axes`` ``(n, 3, 3)``: takes tensors [xx, yy, xy] to the principal axes, ``_back`` takes
+      them back
+    - ``_first``: g[1, 1], g[2, 2], g[1, 2], ``(n,)`` each
+    - ``_second``: g[1, 1, 1], g[2, 2, 2], g[1, 1, 2], g[1, 2, 2], ``(n,)`` each
     """
 
-    def __init__(self, strain: Array) -> None:
-        a, b, c, d = strain.T  # C is one and more, whose digits small strains need
-        xx, yy, xy = 2 * a + a**2 + d**2, 2 * b + b**2 + c**2, c + d + a * c + b * d
-        more, radius, angle = (
-            (xx + yy) / 2,
-            np.hypot((xx - yy) / 2, xy),
-            np.arctan2(2 * xy, xx - yy) / 2,
-        )
-        mean, one, two = 1 + more, 1 + more + radius, 1 + more - radius
-        c, s = np.cos(angle), np.sin(angle)
-        self._there, self._back = (
-            _table(
-                [
-                    [c * c, s * s, 2 * c * s],
-                    [s * s, c * c, -2 * c * s],
-                    [-c * s, c * s, c * c - s * s],
-                ]
-            )
-            for s in (s, -s)
-        )
+    def __init__(self, gradient: Array) -> None:
+        self._gradient = gradient
+        self.working = [0, 1, 3] if gradient.shape[1] == 4 else [0, 1, 2, 3]
+        a, b, c, d = gradient.T[:4]
+        # C is one and more, whose digits small strains need
+        xx = 2 * a + a**2 + d**2
+        yy = 2 * b + b**2 + c**2
+        xy = c + d + a * c + b * d
+        more = (xx + yy) / 2
+        radius = np.hypot((xx - yy) / 2, xy)
+        angle = np.arctan2(2 * xy, xx - yy) / 2
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        self._to_axes = _rotation(cos, sin)
+        self._back = _rotation(cos, -sin)
+        self._divide(1 + more, radius)
+        E_1 = 0.5 * np.log1p(more + radius)
+        E_2 = 0.5 * np.log1p(more - radius)
+        E_xx = cos**2 * E_1 + sin**2 * E_2
+        E_yy = sin**2 * E_1 + cos**2 * E_2
+        hoop = np.log1p(np.where(gradient.T[4:] > -1, gradient.T[4:], np.nan))
+        self.strain = np.stack([E_xx, E_yy, *hoop, 2 * cos * sin * (E_1 - E_2)], axis=1)
+
+    def _divide(self, mean: Array, radius: Array) -> None:
+        """Divided differences of the logarithm at the eigenvalues ``mean +- radius`` of C."""
+        one = mean + radius
+        two = mean - radius
         x = radius / mean
-        ratio, (mixed, swapped) = polyval(x, _RATIO), (polyval(y, _MIXED) for y in (x, -x))
+        ratio = polyval(x, _RATIO)
+        mixed = polyval(x, _MIXED)
+        swapped = polyval(-x, _MIXED)
         far = x >= _NEAR
         y = x[far]
         ratio[far] = np.arctanh(y) / y
-        mixed[far], swapped[far] = (1 / (1 + y) - ratio[far]) / y, (ratio[far] - 1 / (1 - y)) / y
-        self._first = 0.5 / one, 0.5 / two, 0.5 * ratio / mean  # g[1, 1], g[2, 2], g[1, 2]
+        mixed[far] = (1 / (1 + y) - ratio[far]) / y
+        swapped[far] = (ratio[far] - 1 / (1 - y)) / y
+        self._first = 0.5 / one, 0.5 / two, 0.5 * ratio / mean
         quarter = 0.25 / mean**2
-        self._second = (
-            -0.25 / one**2,
-            -0.25 / two**2,
-            quarter * mixed,
-            quarter * swapped,
-        )  # g[1, 1, 1], ..., g[1, 2, 2]
-        E, F = 0.5 * np.log1p(more + radius), 0.5 * np.log1p(more - radius)
-        self.strain = np.stack(
-            [c * c * E + s * s * F, s * s * E + c * c * F, 2 * c * s * (E - F)], axis=1
+        self._second = -0.25 / one**2, -0.25 / two**2, quarter * mixed, quarter * swapped
+
+    def nominal(self, T: Array, moduli: Array) -> tuple[Array, Array]:
+        """The nominal stress ``(n, k_gradient)`` and its derivative by the gradient, from ``T``
+        ``(n, k)`` and its derivative ``(n, k, k)`` by the logarithmic strain.
+
+        Along the principal axes ``P = Q^T (g T)`` with ``Q = dC/dF``, so that ``dP = Q^T (g M g +
+        T g') Q dF + dQ^T (g T)``.
+        """
+        Q = self._to_axes @ self._metric()
+        T_11, T_22, T_12 = np.einsum("nij,nj->in", self._to_axes, T[:, [0, 1, -1]])
+        g_11, g_22, g_12 = self._first
+        weight = np.stack(self._first, axis=1)
+        work = np.stack([g_11 * T_11, g_22 * T_22, 2 * g_12 * T_12], axis=1)
+        # takes strains along the axes to engineering ones along x and y
+        turn = self._back * np.array([1.0, 1.0, 2.0])[:, None]
+        slope = turn @ (weight[:, :, None] * Q)
+        in_plane = [0, 1, T.shape[1] - 1]
+        M = moduli[:, np.array(in_plane)[:, None], in_plane]
+        stress = np.einsum("nik,ni->nk", Q, work)
+        tangent = np.swapaxes(slope, 1, 2) @ M @ slope
+        tangent += np.swapaxes(Q, 1, 2) @ self._bent(T_11, T_22, T_12) @ Q
+        tangent += self._turning(g_11 * T_11, g_22 * T_22, g_12 * T_12)
+        if T.shape[1] == 3:
+            return stress, tangent
+        return self._with_hoop(stress, tangent, slope, T, moduli)
+
+    def _metric(self) -> Array:
+        """``dC/dF`` ``(n, 3, 4)``, of [C_xx, C_yy, C_xy]."""
+        F_xx, F_xy, F_yx, F_yy = _deformation(self._gradient)
+        zero = np.zeros_like(F_xx)
+        return _table(
+            [
+                [2 * F_xx, zero, zero, 2 * F_yx],
+                [zero, 2 * F_yy, 2 * F_xy, zero],
+                [F_xy, F_yx, F_xx, F_yy],
+            ]
         )
 
-    def back(self, T: Array, moduli: Array) -> tuple[Array, Array]:
-        """S ``(n, 3)``, ``[xx, yy, xy]``, and its derivative ``(n, 3, 3)`` by ``[C_xx, C_yy,
-        C_xy]``, from T ``(n, 3)`` and its derivative by the logarithmic strain."""
-        g, h, k = self._first
-        aaa, bbb, aab, abb = self._second
-        xx, yy, xy = np.einsum("nij,nj->in", self._there, T)
-        z, weights = np.zeros(len(T)), np.stack(self._first, axis=1)
-        S = np.stack([2 * g * xx, 2 * h * yy, 2 * k * xy], axis=1)
-        bent = _table([[4 * aaa * xx, z, 4 * aab * xy], [z, 4 * bbb * yy, 4 * abb * xy],
-                       [2 * aab * xy, 2 * abb * xy, 2 * (aab * xx + abb * yy)]])  # fmt: skip
-        own = self._there @ moduli @ np.swapaxes(self._there, 1, 2)
-        of_strain = 2 * weights[:, :, None] * own * (weights * [1, 1, 2])[:, None, :]
-        return np.einsum("nij,nj->ni", self._back, S), self._back @ (bent + of_strain) @ self._there
+    def _bent(self, T_11: Array, T_22: Array, T_12: Array) -> Array:
+        """``T : d2E/dC2`` ``(n, 3, 3)`` along the principal axes."""
+        g_111, g_222, g_112, g_122 = self._second
+        zero = np.zeros_like(T_11)
+        first = 2 * g_112 * T_12
+        second = 2 * g_122 * T_12
+        return _table(
+            [
+                [2 * g_111 * T_11, zero, first],
+                [zero, 2 * g_222 * T_22, second],
+                [first, second, 2 * (g_112 * T_11 + g_122 * T_22)],
+            ]
+        )
+
+    def _turning(self, S_11: Array, S_22: Array, S_12: Array) -> Array:
+        """The part ``(n, 4, 4)`` of the tangent from the second derivative of C, with the halved
+        second Piola-Kirchhoff stress along the principal axes."""
+        S = 2 * np.einsum("nij,jn->in", self._back, np.stack([S_11, S_22, S_12]))
+        xx, yy, xy = S
+        zero = np.zeros_like(xx)
+        return _table(
+            [[xx, zero, xy, zero], [zero, yy, zero, xy], [xy, zero, yy, zero], [zero, xy, zero, xx]]
+        )
+
+    def _with_hoop(
+        self, stress: Array, tangent: Array, slope: Array, T: Array, moduli: Array
+    ) -> tuple[Array, Array]:
+        """``stress`` and ``tangent`` in the plane, with the hoop component behind; ``slope`` ``(n,
+        3, 4)`` is the derivative of the strain in the plane."""
+        stretch = 1 + self._gradient[:, 4]
+        in_plane = [0, 1, 3]
+        P_tt = T[:, 2] / stretch
+        whole = np.empty((len(T), 5, 5))
+        whole[:, :4, :4] = tangent
+        whole[:, :4, 4] = np.einsum("nik,ni->nk", slope, moduli[:, in_plane, 2]) / stretch[:, None]
+        whole[:, 4, :4] = np.einsum("ni,nik->nk", moduli[:, 2, in_plane], slope) / stretch[:, None]
+        whole[:, 4, 4] = (moduli[:, 2, 2] / stretch - P_tt) / stretch
+        return np.column_stack([stress, P_tt]), whole
+
+
+def _rotation(cos: Array, sin: Array) -> Array:
+    """Takes the components [xx, yy, xy] of a tensor to axes that are turned, ``(n, 3, 3)``."""
+    return _table(
+        [
+            [cos * cos, sin * sin, 2 * cos * sin],
+            [sin * sin, cos * cos, -2 * cos * sin],
+            [-cos * sin, cos * sin, cos * cos - sin * sin],
+        ]
+    )

@@ -34,7 +34,7 @@ class J2Material(Elastic):
     def update(self, strain: Array, state: PlasticState) -> tuple[Array, Array, PlasticState]:
         """The return map, in C where it has a closed form."""
         linear = self.hardening.linear
-        if self.plane == "strain" and linear is not None:
+        if linear is not None and not self.kinematics.is_thin:
             return radial_return(strain, state, self, *linear)
         return return_map(strain, state, self, self.hardening)
 

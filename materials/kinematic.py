@@ -21,12 +21,17 @@ import numpy as np
 from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
 from archord.materials.material import Array, State
-from archord.materials.return_map import STEEP, PlasticState, beyond, bracketed_newton
+from archord.materials.return_map import (
+    ENGINEERING,
+    STEEP,
+    PlasticState,
+    beyond,
+    bracketed_newton,
+)
 
-_TWICE = np.array([1.0, 1.0, 1.0, 2.0])  # products of tensors; engineering over tensor shear
+_TWICE = ENGINEERING  # products of tensors count shear twice
 _TRACE = np.array([1.0, 1.0, 1.0, 0.0])
 _DEVIATOR = np.diag([1.0, 1.0, 1.0, 0.5]) - np.outer(_TRACE, _TRACE) / 3  # of engineering strains
-_PLANE = np.array([0, 1, 3])
 
 
 @dataclass(frozen=True)
@@ -67,20 +72,18 @@ class KinematicMaterial(J2Material):
     def update(self, strain: Array, state: State) -> tuple[Array, Array, KinematicState]:
         """The return map; in plane stress with the strain out of the plane as one more unknown."""
         whole = np.zeros((len(strain), 4))
-        whole[:, _PLANE] = strain
-        stress, tangent, new = (self._return if self.plane == "strain" else self._plane_stress)(
-            whole, state
-        )
-        flows = new.peeq > state.peeq
-        if self.plane == "stress":
+        whole[:, self.working] = strain
+        if self.kinematics.is_thin:
+            stress, tangent, new = self._plane_stress(whole, state)
             ratio = tangent[:, :, 2] / tangent[:, 2, 2, None]
             tangent = tangent - ratio[:, :, None] * tangent[:, 2, None]
-            stress = (
-                stress - ratio * stress[:, 2, None]
-            )  # all normal stresses share the pressure's round-off
-        in_plane = np.tile(self.elastic_tangent, (len(strain), 1, 1))
-        in_plane[flows] = tangent[flows][:, _PLANE[:, None], _PLANE]
-        return stress, in_plane, new
+            # all normal stresses share the pressure's round-off
+            stress = stress - ratio * stress[:, 2, None]
+        else:
+            stress, tangent, new = self._return(whole, state)
+        rows, columns = np.ix_(self.working, self.working)
+        flows = self.flows(state, new)[:, None, None]
+        return stress, np.where(flows, tangent[:, rows, columns], self.elastic_tangent), new
 
     def _plane_stress(
         self, strain: Array, old: KinematicState

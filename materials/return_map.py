@@ -1,5 +1,4 @@
-"""The return map of J2 plasticity with isotropic hardening, for plane strain and plane stress, on
-arrays of points.
+"""The return map of J2 plasticity with isotropic hardening, on arrays of points.
 
 Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity,
 1998, Boxes 3.2 and 3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P``
@@ -9,7 +8,7 @@ sigma``. The plastic strain grows by ``zeta P sigma``, ``zeta = 1.5 d_peeq / q``
 each eigencomponent of the trial stress shrinks alone, by ``1 + zeta C_k P_k``, and one scalar
 equation a point is left for ``zeta``.
 
-With linear hardening in plane strain it has a closed form, `radial_return`, computed in C.
+With linear hardening it has a closed form but for plane stress, `radial_return`, computed in C.
 """
 
 from __future__ import annotations
@@ -32,20 +31,23 @@ STEEP = (
 )
 _NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
 _STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
-# components of (n, 4) stresses and of strains that a plane has; eigenvectors and eigenvalues of P
-_PLANES = {
-    "stress": (
+# by whether there is a stress out of the plane (plane stress has none): the components of stresses
+# (n, 4) on which the map works, and the eigenvectors and eigenvalues of P on them
+_EIGENSYSTEM = {
+    False: (
         [0, 1, 3],
         np.array([[1, 1, 0], [-1, 1, 0], [0, 0, 1]]) / np.sqrt([[2], [2], [1]]),
         np.array([1 / 3, 1.0, 2.0]),
     ),
-    "strain": (
+    True: (
         [0, 1, 2, 3],
         np.array([[1, 1, 1, 0], [-1, 1, 0, 0], [1, 1, -2, 0], [0, 0, 0, 1]])
         / np.sqrt([[3], [2], [6], [1]]),
         np.array([0.0, 1.0, 1.0, 2.0]),
     ),
 }
+
+ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0])  # engineering strains over tensor strains
 
 
 @dataclass(frozen=True)
@@ -60,35 +62,38 @@ class PlasticState:
 def return_map(
     strain: Array, old: PlasticState, m: Elastic, hardening: Hardening
 ) -> tuple[Array, Array, PlasticState]:
-    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the
+    """Stress ``(n, 4)``, tangent ``(n, k, k)`` and new state at ``strain`` ``(n, k)`` from the
     ``old`` state, with the elasticity of ``m``."""
-    parts, Q, deviator = _PLANES[m.plane]
+    is_thin = m.kinematics.is_thin
+    parts, Q, deviator = _EIGENSYSTEM[not is_thin]
     lam, mu = m.lame
-    first = 3 * lam + 2 * mu if m.plane == "strain" else m.E / (1 - m.nu)
+    first = m.E / (1 - m.nu) if is_thin else 3 * lam + 2 * mu
     moduli = np.array([first, *[2 * mu] * (len(parts) - 2), mu])
-    C, P = Q.T * moduli @ Q, Q.T * deviator @ Q
-    shear = np.array([1.0, 1.0, 1.0, 2.0])  # engineering over tensor
-    elastic = -old.plastic_strain * shear
-    elastic[:, [0, 1, 3]] += strain
-    stress, tangent = np.zeros((len(strain), 4)), np.tile(m.elastic_tangent, (len(strain), 1, 1))
+    compliance = moduli * deviator
+    C = Q.T * moduli @ Q
+    P = Q.T * deviator @ Q
+    elastic = -old.plastic_strain * ENGINEERING
+    elastic[:, m.working] += strain
+    stress = np.zeros((len(strain), 4))
     stress[:, parts] = elastic[:, parts] @ C
-    a = stress[:, parts] @ Q.T
-    p = beyond(np.sqrt(1.5 * a**2 @ deviator), hardening, old.peeq)
+    tangent = np.tile(m.elastic_tangent, (len(strain), 1, 1))
+    trial = stress[:, parts] @ Q.T
+    p = beyond(np.sqrt(1.5 * trial**2 @ deviator), hardening, old.peeq)
     if not len(p):
         return stress, tangent, old
     hardening = hardening.at(p)
-    zeta, q = plastic_multiplier(a[p], 1.5 * deviator, moduli * deviator, hardening, old.peeq[p])
-    shrink = 1 + zeta[:, None] * (moduli * deviator)
-    sigma = (a[p] / shrink) @ Q
+    zeta, q = plastic_multiplier(trial[p], 1.5 * deviator, compliance, hardening, old.peeq[p])
+    shrink = 1 + zeta[:, None] * compliance
+    sigma = (trial[p] / shrink) @ Q
     stress[p[:, None], parts] = sigma
 
-    plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
-    peeq[p] += 2 / 3 * zeta * q
     flow = sigma @ P
-    grown = (
-        np.stack([flow[:, 0], flow[:, 1], -flow[:, 0] - flow[:, 1], flow[:, -1]], axis=1) / shear
-    )
+    xx, yy, xy = flow[:, 0], flow[:, 1], flow[:, -1]
+    grown = np.stack([xx, yy, -xx - yy, xy], axis=1) / ENGINEERING
+    plastic_strain = old.plastic_strain.copy()
     plastic_strain[p] += zeta[:, None] * grown
+    peeq = old.peeq.copy()
+    peeq[p] += 2 / 3 * zeta * q
 
     softened = np.einsum("ki,nk,kj->nij", Q, moduli / shrink, Q)  # (C^-1 + zeta P)^-1
     direction = np.einsum("nij,nj->ni", softened, flow)
@@ -96,8 +101,8 @@ def return_map(
     left = 1 - 2 / 3 * slope * zeta
     factor = left / (left * np.einsum("ni,ni->n", flow, direction) + 4 / 9 * slope * q**2)
     consistent = softened - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
-    in_plane = np.array([0, 1, len(parts) - 1])
-    tangent[p] = consistent[:, in_plane[:, None], in_plane]
+    kept = np.searchsorted(parts, m.working)
+    tangent[p] = consistent[:, kept[:, None], kept]
     return stress, tangent, PlasticState(plastic_strain, peeq)
 
 
@@ -172,15 +177,16 @@ def bracketed_newton(
 def radial_return(
     strain: Array, old: PlasticState, m: Elastic, yield_stress: float, modulus: float
 ) -> tuple[Array, Array, PlasticState]:
-    """`return_map` with linear hardening in plane strain: ``d_peeq = (q_trial - stress(PEEQ)) / (3
-    mu + H)``."""
-    n, strain = len(strain), np.ascontiguousarray(strain, dtype=float)
-    stress, tangent = np.empty((n, 4)), np.empty((n, 3, 3))
+    """`return_map` with linear hardening, but for plane stress: ``d_peeq = (q_trial - stress(PEEQ))
+    / (3 mu + H)``."""
+    n, k = strain.shape
+    places = np.array(m.working, dtype=np.int32)
+    stress = np.empty((n, 4))
+    tangent = np.empty((n, k, k))
     new = PlasticState(np.empty((n, 4)), np.empty(n))
-    inputs = map(pointer, (strain, old.plastic_strain, old.peeq))
-    outputs = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
+    given = places, np.ascontiguousarray(strain, dtype=float), old.plastic_strain, old.peeq
+    found = stress, tangent, new.plastic_strain, new.peeq
     kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
-    yielding = kernel(
-        n, *inputs, *m.lame, yield_stress, modulus, pointer(m.elastic_tangent), *outputs
-    )
+    constants = *m.lame, yield_stress, modulus, pointer(m.elastic_tangent)
+    yielding = kernel(n, k, *map(pointer, given), *constants, *map(pointer, found))
     return stress, tangent, new if yielding else old
