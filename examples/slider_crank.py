@@ -38,15 +38,19 @@ from archord.report.table import Table
 
 FOLDER = Path(__file__).with_suffix("")
 JOINT = LawJoint.from_scene(archord.load_scene(FOLDER / "joint.toml"))
-DR, WIDTH = JOINT.clearance, JOINT.length
-CRANK, ROD, SPEED, TURNS = 100.0, 250.0, 600 * 2 * pi / 60, 2
-ROD_MASS, SLIDER_MASS = 2e-3, 15e-3
+DR = JOINT.clearance
+WIDTH = JOINT.length
+CRANK = 100.0
+ROD = 250.0
+SPEED = 600 * 2 * pi / 60
+TURNS = 2
+ROD_MASS = 2e-3
+SLIDER_MASS = 15e-3
 ROD_INERTIA = ROD_MASS * ROD**2 / 12
 FILM = 0.002  # c [s/mm]: what comes at 100 mm/s goes back at 88
 STEPS = 40000  # a turn: 2.5 microseconds, 1/200 of an impact
-START = (
-    SLIDER_MASS * CRANK * SPEED**2 * (1 + CRANK / ROD) / WIDTH
-)  # P in the outer dead centre, where all begins
+# P in the outer dead centre, where all begins
+START = SLIDER_MASS * CRANK * SPEED**2 * (1 + CRANK / ROD) / WIDTH
 
 
 def mechanism(force, start):
@@ -71,10 +75,8 @@ def mechanism(force, start):
     def join(kind, *markers, **properties):
         return mbs.AddObject(kind(markerNumbers=list(markers), **properties))
 
-    fixed, ground = (
-        coordinate(mbs.AddNode(item.NodePointGround()), 0),
-        mbs.AddObject(item.ObjectGround()),
-    )
+    fixed = coordinate(mbs.AddNode(item.NodePointGround()), 0)
+    ground = mbs.AddObject(item.ObjectGround())
     shaft, crank = body(1.0, 1.0, 0, 0, SPEED)
     _, rod = body(ROD_MASS, ROD_INERTIA, CRANK + ROD / 2, CRANK * SPEED / 2, -CRANK * SPEED / ROD)
     guide = mbs.AddNode(
@@ -99,7 +101,11 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
     """Turn the crank with ``law(delta, deepest)`` [N/mm] in the joint, first at ``start``. Returns
     a column a step (time, e, its rate, deepest, torque, velocities), the seconds it took, those in
     the law, and its calls."""
-    deepest, columns, calls, seconds, kinds = start, [], 0, 0.0, exudyn.OutputVariableType
+    deepest = start
+    columns = []
+    calls = 0
+    seconds = 0.0
+    kinds = exudyn.OutputVariableType
 
     def force(mbs, t, number, e, rate, *unused):
         nonlocal calls, seconds
@@ -108,15 +114,16 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
             return [0, 0, 0]
         begin = perf_counter()
         P, _ = law(distance - DR, deepest)
-        calls, seconds = calls + 1, seconds + perf_counter() - begin
-        F = P * WIDTH * (1 + FILM * (e[0] * rate[0] + e[1] * rate[1]) / distance) / distance
+        seconds += perf_counter() - begin
+        calls += 1
+        opening = (e[0] * rate[0] + e[1] * rate[1]) / distance
+        F = P * WIDTH * (1 + FILM * opening) / distance
         return [F * e[0], F * e[1], 0]
 
     def accept(mbs, t):
         nonlocal deepest
-        e, rate = (
-            mbs.GetObjectOutput(joint, kind)[:2] for kind in (kinds.Displacement, kinds.Velocity)
-        )
+        e = mbs.GetObjectOutput(joint, kinds.Displacement)[:2]
+        rate = mbs.GetObjectOutput(joint, kinds.Velocity)[:2]
         torque = -mbs.GetObjectOutput(drive, kinds.Force)
         columns.append((t, *e, *rate, deepest, torque, *mbs.systemData.GetODE2Coordinates_t()))
         deepest = max(deepest, hypot(*e) - DR)
@@ -127,10 +134,8 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
     mbs.Assemble()
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False
-    settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = (
-        turns * 2 * pi / SPEED,
-        turns * steps,
-    )
+    settings.timeIntegration.endTime = turns * 2 * pi / SPEED
+    settings.timeIntegration.numberOfSteps = turns * steps
     begin = perf_counter()
     mbs.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.TrapezoidalIndex2)
     return np.array(columns).T, perf_counter() - begin, seconds, calls
@@ -140,27 +145,25 @@ def energies(columns, curve):
     """The force P [N] at all steps, and energies [N mm] by name, whose sum stays. What the joint
     has stored is what it gives back until it opens."""
     (t,), e, rate, (deepest,), (torque,), v = np.split(columns, [1, 3, 5, 6, 7])
-    distance, (points, weights) = np.hypot(*e), np.polynomial.legendre.leggauss(12)
+    distance = np.hypot(*e)
     delta = np.maximum(distance - DR, 0)
     P = curve.at(delta, deepest).load * WIDTH
     most, where = np.unique(np.maximum(deepest, delta), return_inverse=True)
     opens = curve.residual(most)[where]
     half = np.maximum(delta - opens, 0) / 2
-    stored = (
-        WIDTH * half * (weights @ curve.at(opens + half * (points[:, None] + 1), most[where]).load)
-    )
+    points, weights = np.polynomial.legendre.leggauss(12)
+    loads = curve.at(opens + half * (points[:, None] + 1), most[where]).load
+    stored = WIDTH * half * (weights @ loads)
     lost = stored[0] - stored + cumulative_trapezoid(P, delta, initial=0)
     film = cumulative_trapezoid(P * FILM * (e * rate).sum(0) / distance, delta, initial=0)
-    kinetic = (
-        np.array([0, 0, 0, ROD_MASS, ROD_MASS, ROD_INERTIA, SLIDER_MASS, SLIDER_MASS]) @ v**2 / 2
-    )
-    drive = -cumulative_trapezoid(torque * SPEED, t, initial=0)
+    rod = [ROD_MASS, ROD_MASS, ROD_INERTIA]
+    masses = np.array([0, 0, 0, *rod, SLIDER_MASS, SLIDER_MASS])
     return P, {
         "stored": stored,
         "lost, law": lost,
         "lost, film": film,
-        "kinetic": kinetic,
-        "drive": drive,
+        "kinetic": masses @ v**2 / 2,
+        "drive": -cumulative_trapezoid(torque * SPEED, t, initial=0),
     }
 
 
@@ -170,22 +173,38 @@ def table(law):
     x = np.concatenate([[0], np.geomspace(1e-3, 2, 80)])
     state = law.at_displacement(JOINT, x * DR, extrapolate=True)
     known = np.isfinite(state.load)
-    y, dy = state.load[known] / JOINT.unit, state.stiffness[known] * DR / JOINT.unit
-    one, none, unknown = np.ones_like(y), np.zeros_like(y), [np.full_like(y, np.nan)] * 4
+    y = state.load[known] / JOINT.unit
+    dy = state.stiffness[known] * DR / JOINT.unit
+    none = np.zeros_like(y)
+    unknown = np.full_like(y, np.nan)
     return JointCurve(
-        x[known], y, dy, y, dy, one, none, none, none[:0], *unknown, none, none, DR, JOINT.unit
+        x=x[known],
+        y=y,
+        dy=dy,
+        back=y,
+        dback=dy,
+        ratio=np.ones_like(y),
+        dratio=none,
+        toe=none,
+        touch=np.empty(0),
+        peak=unknown,
+        dpeak=unknown,
+        angle=unknown,
+        dangle=unknown,
+        error=none,
+        back_error=none,
+        length=DR,
+        force=JOINT.unit,
     )
 
 
 def study(curve, steps=STEPS, turns=TURNS):
     """The crank turned with a law, exported: columns of `simulate`, force, energies, and numbers by
     name."""
-    exec(
-        export_law(curve, Path("joint.py")), module := {"__name__": "joint"}
-    )  # `archord law --export` writes it
-    columns, whole, inside, calls = simulate(
-        module["force"], curve.displacement([START]).item(), steps, turns
-    )
+    module = {"__name__": "joint"}
+    exec(export_law(curve, Path("joint.py")), module)  # `archord law --export` writes it
+    start = float(curve.displacement(START))
+    columns, whole, inside, calls = simulate(module["force"], start, steps, turns)
     P, parts = energies(columns, curve)
     angle = columns[0] * SPEED
     return columns, P, parts, {
@@ -206,7 +225,8 @@ def draw(runs, target):
     impacts, orbit, energy = figure.subplots(1, 3)
     for name, (columns, P, *_) in runs.items():
         angle = np.degrees(columns[0] * SPEED)
-        first, second = (angle > 70) & (angle < 90), angle > 360
+        first = (angle > 70) & (angle < 90)
+        second = angle > 360
         impacts.plot(angle[first], P[first] / 1e3, lw=1, label=name)
         if name in ("elastic", "yielding"):
             orbit.plot(*columns[1:3, second] / DR, lw=0.7, label=name)

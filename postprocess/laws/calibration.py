@@ -61,7 +61,8 @@ def fit(
     section 2.1), for independent residuals. Raises ValueError where the data do not determine the
     parameters and their errors.
     """
-    m, n = len(starts[0]), len(data)
+    m = len(starts[0])
+    n = len(data)
     if n <= m:
         raise ValueError(f"{n} points cannot determine {m} parameters and their errors")
     tight = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
@@ -75,11 +76,10 @@ def fit(
     scaled = best.jac[:, felt] / size[felt]
     if np.linalg.cond(scaled) > 1e8:
         raise ValueError("the points do not determine the parameters")
+    inverse = np.linalg.inv(scaled.T @ scaled)
+    variance = best.fun @ best.fun
     errors = np.full(m, np.inf)
-    errors[felt] = (
-        np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)) * (best.fun @ best.fun) / (n - m))
-        / size[felt]
-    )
+    errors[felt] = np.sqrt(np.diag(inverse) * variance / (n - m)) / size[felt]
     return [*map(float, best.x)], [*map(float, errors)]
 
 
@@ -113,17 +113,12 @@ class CurveFit:
     def quality(self) -> tuple[float, float, float, int]:
         """Of all runs one after the other, the coefficient of determination, root mean square and
         largest (with its sign) of ``law/data - 1``, and the number of steps."""
-        data, law = (
-            np.concatenate([getattr(part, name) for part in self.residuals])
-            for name in ("data", "law")
-        )
-        off, r2 = law / data - 1, 1 - ((law - data) ** 2).sum() / ((data - data.mean()) ** 2).sum()
-        return (
-            float(r2),
-            float(np.sqrt(np.mean(off**2))),
-            float(off[np.abs(off).argmax()]),
-            len(off),
-        )
+        data = np.concatenate([part.data for part in self.residuals])
+        law = np.concatenate([part.law for part in self.residuals])
+        off = law / data - 1
+        r2 = 1 - ((law - data) ** 2).sum() / ((data - data.mean()) ** 2).sum()
+        rms = np.sqrt(np.mean(off**2))
+        return float(r2), float(rms), float(off[np.abs(off).argmax()]), len(off)
 
     @property
     def serial_correlation(self) -> float:
