@@ -46,22 +46,22 @@ def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
         return (
             f"{kind} joint, {plane}, dR/R = {dR / R:g}",
             [
-                ("delta/dR", "9.5g", lambda m: m.delta / dR),
+                ("delta/dR", "9.5g", lambda m: m["delta"] / dR),
                 (
                     "P/(E* R)",
                     "11.7f",
-                    lambda m: round(m.P / unit, 7) + 0.0,
+                    lambda m: round(m["P"] / unit, 7) + 0.0,
                 ),  # no minus before a zero
-                ("eps/deg", "8.3f", lambda m: math.degrees(m.eps)),
-                ("p0/E*", "9.6f", lambda m: m.p0 / E_star),
-                ("PEEQ max", "9.2e", lambda m: m.peeq_max),
-                ("at contact", "10.2e", lambda m: m.peeq.get("contact", [m.peeq_max])[0]),
+                ("eps/deg", "8.3f", lambda m: math.degrees(m["eps"])),
+                ("p0/E*", "9.6f", lambda m: m["p0"] / E_star),
+                ("PEEQ max", "9.2e", lambda m: m["peeq_max"]),
+                ("at contact", "10.2e", lambda m: m.values.get("contact peeq_max", m["peeq_max"])),
             ],
             *last,
         )
 
     def value(name: str) -> Column:
-        return name, f"{max(14, len(name))}.6g", lambda m: m.values[name]
+        return name, f"{max(14, len(name))}.6g", lambda m: m[name]
 
     def peeq(m: Any) -> float:
         return max(

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
+from archord.measures.record import Record
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome
 from archord.report.files import Row, write_report
@@ -132,20 +133,21 @@ def _without_none(keys: Any) -> Any:
     return {key: value for key, value in keys.items() if value is not None}
 
 
-def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
+def quantities(scene: AnyScene, last: Record) -> dict[str, float]:
     """What cases are compared by at the step ``last``: of a joint without units, of a general scene
     the columns."""
     if not isinstance(scene, Scene):
         return last.values
     E_star = scene.E_star
     R = scene.joint.radius
-    P = last.P / scene.thickness
+    P = last["P"] / scene.thickness
+    p0 = last["p0"]
     return {
         "P/(E* R)": P / (E_star * R),
-        "p0/E*": last.p0 / E_star,
-        "eps": last.eps,
-        "delta/dR": last.delta / scene.joint.dR,
-        "p0/P": last.p0 * R / P if P else 0.0,
+        "p0/E*": p0 / E_star,
+        "eps": last["eps"],
+        "delta/dR": last["delta"] / scene.joint.dR,
+        "p0/P": p0 * R / P if P else 0.0,
     }
 
 

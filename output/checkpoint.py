@@ -20,9 +20,10 @@ import h5py
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.measures.energies import Work
+from archord.measures.record import Record
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import all_arrays, hdf5_in_memory, image, put
-from archord.presets.measures import Work
 from archord.report.readable import require_file
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
@@ -51,20 +52,21 @@ class Checkpoint:
 
 
 def halt(
-    order: MeshOrder, scene: str, m: Any, step: Step, position: Position, work: Work
+    order: MeshOrder, scene: str, m: Record, step: Step, position: Position, work: Work
 ) -> Checkpoint:
     """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step``
     says, from which `resume` goes on. Collective."""
     system = order.system
+    springs = system.equilibrium.springs
     unknowns = system.equilibrium.unknowns
     u, levels = unknowns.split(unknowns.state())
     scalars = {
-        "measures": asdict(m),
+        "measures": m.plain(),
         "step": asdict(step),
         "work": asdict(work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": system.equilibrium.largest_reaction,
-        "stabilisation_energy": springs.energy if (springs := system.equilibrium.springs) else 0.0,
+        "stabilisation_energy": springs.energy if springs else 0.0,
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": levels.tolist(),
     }
@@ -79,9 +81,9 @@ def halt(
 
 def resume(
     order: MeshOrder, path: Path, checkpoint: Checkpoint | None
-) -> tuple[dict[str, Any], Step, Position, Work]:
+) -> tuple[Record, Step, Position, Work]:
     """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``);
-    returns what `halt` was given, the record of the step as a dictionary. Raises `InputError` if it
+    returns what `halt` was given. Raises `InputError` if it
     is of another mesh. Collective."""
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
@@ -98,25 +100,21 @@ def resume(
     position = Position(**scalars["position"])
     if "level_increment" in scalars:
         position.increment = state("fields/increment", "level_increment")
-    if springs := order.system.equilibrium.springs:
-        springs.energy = scalars["stabilisation_energy"]
-    order.system.solver.continues_gamma = scalars["gamma_by_and_by"]
-    order.system.equilibrium.resume(
-        position.load, state("fields/displacement", "level"), scalars["largest_reaction"]
-    )
+    system = order.system
+    if system.equilibrium.springs:
+        system.equilibrium.springs.energy = scalars["stabilisation_energy"]
+    system.solver.continues_gamma = scalars["gamma_by_and_by"]
+    solved = state("fields/displacement", "level")
+    system.equilibrium.resume(position.load, solved, scalars["largest_reaction"])
     step = Step(**scalars["step"])
     step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
-    return scalars["measures"], step, position, Work(**scalars["work"])
+    return Record.read(scalars["measures"]), step, position, Work(**scalars["work"])
 
 
 def _newton(attempt: dict[str, Any]) -> Newton:
     """A solve as a checkpoint holds it; version 0.1 called active-set changes flips."""
-    return Newton(
-        **{
-            "active_set_changes" if name == "flips" else name: value
-            for name, value in attempt.items()
-        }
-    )
+    names = {"flips": "active_set_changes"}
+    return Newton(**{names.get(name, name): value for name, value in attempt.items()})
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
@@ -157,6 +155,7 @@ def read(path: Path) -> Checkpoint:
             f"{path}: is damaged or of a newer archord, so that the run cannot be continued."
         )
     with h5py.File(io.BytesIO(body), "r") as file:
-        mesh, arrays = file.attrs["mesh"], dict(all_arrays(file))
+        mesh = file.attrs["mesh"]
+        arrays = dict(all_arrays(file))
     facts = json.loads(bytes(arrays.pop("facts")))
     return Checkpoint(facts["step"], facts["scene"], mesh, facts["scalars"], arrays)

@@ -8,18 +8,17 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from archord.measures.measure import Column
+from archord.measures.record import Record
 from archord.output.files.disk import replace_file
-
-if TYPE_CHECKING:
-    from archord.presets.account import Column
 
 _SAME = 1e-9  # relative difference of a number in history.csv, of 12 digits, and in run.json
 _NOTHING = 1e-290
 
 
-def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -> None:
+def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Record]) -> None:
     """Replace ``path`` by the table of ``steps`` in one move; whole numbers stay whole. Raises
     `OSError`."""
     text = io.StringIO(newline="")

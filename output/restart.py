@@ -5,18 +5,18 @@ from __future__ import annotations
 
 import tomllib
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from archord.measures.record import Record
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
 from archord.output.files.seal import TABLES, fault_of, read_report, require_intact
 from archord.output.finished import history_fault
 from archord.output.folder import CHECKPOINT
-from archord.presets.account import record_type
 from archord.report.readable import require_file
 from archord.scene.errors import InputError, toml_value
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
@@ -33,7 +33,7 @@ class Start:
 
     checkpoint: Checkpoint
     report: dict[str, Any]
-    done: list[Any]
+    done: list[Record]
 
 
 @dataclass
@@ -113,12 +113,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     path = folder / "run.json"
     try:
         report = read_report(path)
-        record = record_type(scene)
-        names = [field.name for field in fields(record)]
-        done = [
-            record(**{name: step[name] for name in names if name in step})
-            for step in report["steps"][: n - 1]
-        ]
+        done = [Record.read(step) for step in report["steps"][: n - 1]]
         if len(done) < n - 1 or not {"status", "started", "command", "warnings"} <= report.keys():
             raise KeyError("steps")
     except (OSError, ValueError, KeyError, TypeError):

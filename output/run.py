@@ -15,6 +15,10 @@ from mpi4py import MPI
 
 from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.kernels.stale_jit import without_stale_forms
+from archord.measures.account import Account
+from archord.measures.edge import EdgeProfile
+from archord.measures.energies import Work
+from archord.measures.record import Record
 from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
 from archord.output.files.disk import WriteError, replace_file
@@ -25,9 +29,7 @@ from archord.output.own_mesh import given_mesh, mesh_in_use, scene_text, write_m
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
-from archord.presets.account import Account, account_of
-from archord.presets.edge import EdgeProfile
-from archord.presets.measures import Work
+from archord.presets.account import account_of
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
 from archord.solver.path.coarse_start import coarse_start
@@ -54,7 +56,7 @@ class Outcome:
     folder: Path
     status: str
     message: str
-    steps: list[Any]
+    steps: list[Record]
     warnings: list[str]
     signal: int = 0
     accuracy: Any = None
@@ -70,7 +72,7 @@ def solve_scene(
     timer: Timer | None = None,
     interrupt: Interrupt | None = None,
     on_start: Callable[[System], None] = lambda system: None,
-    on_step: Callable[[Any], None] = lambda record: None,
+    on_step: Callable[[Record], None] = lambda record: None,
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
     on_iteration: Callable[[float, Newton], None] = lambda load, result: None,
 ) -> Outcome:
@@ -92,60 +94,67 @@ def solve_scene(
     with ExitStack() as stack:
         agreed(comm, lambda: bool(stack.enter_context(occupied(folder))))
         account = without_stale_forms(lambda: account_of(scene, comm, timer, problem))
-        system = account.system
-        system.solver.newton.watch = on_iteration
-        on_start(system)
+        account.system.solver.newton.watch = on_iteration
+        on_start(account.system)
         output = _Output(folder, account, begun, start, problem)
-        status, message, received = "done", "", 0
+        watched = nullcontext(interrupt) if interrupt else Interrupt()
+        status = "done"
+        message = ""
         failed: dict[str, Any] = {}
+        received = 0
         try:
-            with (
-                nullcontext(interrupt)
-                if interrupt
-                else Interrupt() as system.equilibrium.evaluation.interrupt
-            ):
-                position, work = output.begin()
-                # what a coarse mesh went through before a halt is not kept
-                coarse = coarse_start(system) if position is None else None
-
-                def target_done(step: Step, position: Position) -> None:
-                    on_step(output.add(step, position, work))
-                    if refused := account.refusal(output.steps):
-                        raise StepFailure(refused, step)
-
-                march(
-                    system.load_path(position, coarse),
-                    scene.targets,
-                    rules=StepRules(**scene.stepping.model_dump()),
-                    substep_done=lambda load: work.add(*account.driven()),
-                    target_done=target_done,
-                    attempted=on_attempt,
-                )
+            with watched as account.system.equilibrium.evaluation.interrupt:
+                _follow(account, output, on_step, on_attempt)
         except StepFailure as failure:
-            status, message, failed = (
-                "stopped",
-                str(failure),
-                {"failed_step": asdict(failure.attempt)},
-            )
+            status = "stopped"
+            message = str(failure)
+            failed["failed_step"] = asdict(failure.attempt)
         except WriteError as error:
-            status, message = "stopped", str(error)
+            status = "stopped"
+            message = str(error)
         except Interrupted as interrupted:
-            status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
+            status = "interrupted"
+            message = f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
-        told = account.work_doubts(output.steps)
+        warnings = account.work_doubts(output.steps)
         if status == "done":
-            message, ending = account.ending(output.steps)
-            told += ending
+            message, of_ending = account.ending(output.steps)
+            warnings += of_ending
             status = "stopped" if message else status
         try:
-            warnings = output.finish(told, status=status, message=message, **failed)
+            warnings = output.finish(warnings, status=status, message=message, **failed)
         except WriteError as error:
-            status, message, warnings = (
-                "stopped",
-                message if status == "stopped" else str(error),
-                [],
-            )
+            message = message if status == "stopped" else str(error)
+            status = "stopped"
+            warnings = []
         return Outcome(folder, status, message, output.steps, warnings, received)
+
+
+def _follow(
+    account: Account,
+    output: _Output,
+    on_step: Callable[[Record], None],
+    on_attempt: Callable[[float, int], None],
+) -> None:
+    """Follow the load path to its end, and write every output step. Collective."""
+    scene = account.scene
+    position, work = output.begin()
+    # what a coarse mesh went through before a halt is not kept
+    coarse = coarse_start(account.system) if position is None else None
+
+    def target_done(step: Step, position: Position) -> None:
+        on_step(output.add(step, position, work))
+        if refused := account.refusal(output.steps):
+            raise StepFailure(refused, step)
+
+    march(
+        account.system.load_path(position, coarse),
+        scene.targets,
+        rules=StepRules(**scene.stepping.model_dump()),
+        substep_done=lambda load: work.add(*account.driven()),
+        target_done=target_done,
+        attempted=on_attempt,
+    )
 
 
 class _Output:
@@ -164,29 +173,30 @@ class _Output:
         start: Start | None,
         problem: Problem | None,
     ) -> None:
+        self.folder = folder
+        self.account = account
+        self.system = account.system
         self._problem = problem
-        self.folder, self.account, self.system, self._start = folder, account, account.system, start
         comm = self.system.comm
+        self.steps: list[Record] = comm.bcast(start.done if start else [])
+        self._start = start
         self._on_root = partial(agreed, comm)
-        self._scene, self._last = scene_text(account.scene, folder), perf_counter()
-        self.steps: list[Any] = comm.bcast(start.done if start else [])
-        asked = account.scene.output
-        self._at_points = asked.fields in ("nodes", "points")
-        with self.system.timer("output"):
-            self._order = MeshOrder(self.system)
-            if asked.fields:
-                from archord.output import fields as of_fields
-
-                self._of_fields, self._mesh = (
-                    of_fields,
-                    of_fields.collect_mesh(self._order, self._at_points),
-                )
+        self._scene = scene_text(account.scene, folder)
+        self._last = perf_counter()
         self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
+        asked = account.scene.output.fields
+        self._at_points = asked in ("nodes", "points")
+        with self.system.timer("output"):
+            self._order = MeshOrder(self.system)
+            if asked:
+                from archord.output import fields
+
+                self._of_fields = fields
+                self._mesh = fields.collect_mesh(self._order, self._at_points)
         if comm.rank == 0:
-            self._report = Report(
-                folder / "run.json", account, begun, self.steps, start.report if start else {}
-            )
+            before = start.report if start else {}
+            self._report = Report(folder / "run.json", account, begun, self.steps, before)
 
     def begin(self) -> tuple[Position | None, Work]:
         """Make the files, or write the step that the run goes on from, and give its state to the
@@ -198,9 +208,9 @@ class _Output:
             return None, Work()
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
-            known, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
+            m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
         self._on_root(lambda: self._report.unseal())
-        self._write(self.account.record(**known), step, self.account.profiles())
+        self._write(m, step, self.account.profiles())
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return position, work
 
@@ -209,48 +219,58 @@ class _Output:
         if given is not None:
             write_mesh(given, self.folder)
         replace_file(self.folder / "scene.toml", self._scene)
-        write_history(self.folder / "history.csv", self.account.columns(), [])
+        write_history(self.folder / "history.csv", self.account.columns, [])
         self._report.write()
 
-    def add(self, step: Step, position: Position, work: Work) -> Any:
+    def add(self, step: Step, position: Position, work: Work) -> Record:
         """Write an accepted output step, and return its record. Collective."""
-        account = self.account
         with self.system.timer("output"):
-            profiles = account.profiles()
-            seconds, self._last = perf_counter() - self._last, perf_counter()
-            m = account.step(self.steps, step, profiles, work.total, seconds)
+            profiles = self.account.profiles()
+            now = perf_counter()
+            seconds = now - self._last
+            self._last = now
+            m = self.account.step(self.steps, step, profiles, work.total, seconds)
         with self.system.timer("checkpoint"):
             checkpoint = halt(self._order, self._scene, m, step, position, work)
             self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m
 
-    def _write(self, m: Any, step: Step, profiles: Mapping[str, EdgeProfile]) -> None:
+    def _write(self, m: Record, step: Step, profiles: Mapping[str, EdgeProfile]) -> None:
         """Make ``m`` the last step of all files but the checkpoint. Collective."""
-        account, after = self.account, len(self.steps)
-        scene = account.scene
+        account = self.account
+        before = len(self.steps)
         with self.system.timer("output"):
             warnings = account.step_warnings(m, profiles, step.residual, self.steps)
-            if scene.output.fields:
+            fields = None
+            if account.scene.output.fields:
                 fields = self._of_fields.collect_fields(self._order, self._at_points)
+            self.steps.append(m)
 
             def write() -> None:
-                if scene.output.fields:
-                    if not self._fields:
-                        points = scene.output.fields == "points"
-                        where = (self.folder, self._order, self._mesh)
-                        self._fields = self._of_fields.FieldWriter(*where, after, points=points)
-                    self._fields.write(m.at, fields)
-                if not self._contact:
-                    self._contact = StepFile(
-                        self.folder / "contact.h5", _arrays(profiles, account.fixed), after
-                    )
-                self._contact.write(m.at, _arrays(profiles, account.per_step))
-                write_history(self.folder / "history.csv", account.columns(), self.steps)
+                if account.scene.output.fields:
+                    self._write_fields(m.at, fields, before)
+                self._write_contact(m.at, profiles, before)
+                write_history(self.folder / "history.csv", account.columns, self.steps)
                 self._report.add(step, warnings)
 
-            self.steps.append(m)
             self._on_root(write)
+
+    def _write_fields(self, load: float, fields: Any, before: int) -> None:
+        """Add a step to the files of fields, which hold so many steps ``before`` it."""
+        if not self._fields:
+            points = self.account.scene.output.fields == "points"
+            where = (self.folder, self._order, self._mesh)
+            self._fields = self._of_fields.FieldWriter(*where, before, points=points)
+        self._fields.write(load, fields)
+
+    def _write_contact(self, load: float, profiles: Mapping[str, EdgeProfile], before: int) -> None:
+        """Add a step to contact.h5, which holds so many steps ``before`` it."""
+        account = self.account
+        if not self._contact:
+            fixed = _arrays(profiles, account.fixed)
+            self._contact = StepFile(self.folder / "contact.h5", fixed, before)
+        self._contact.write(load, _arrays(profiles, account.per_step))
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
         """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank

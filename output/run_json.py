@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from archord.kernels.compat import versions
+from archord.measures.account import Account
+from archord.measures.energies import WORK_OFF
+from archord.measures.record import Record
 from archord.output.files.disk import replace_file
 from archord.output.files.seal import report_text, seals_of
-from archord.presets.account import Account
-from archord.presets.joint_account import APART
-from archord.presets.measures import WORK_OFF
+from archord.presets.joint_doubts import APART
 from archord.report.doubts import Told, kind, tell
 from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
@@ -44,22 +45,27 @@ class Report:
     """
 
     def __init__(
-        self, path: Path, account: Account, begun: float, steps: list[Any], before: dict[str, Any]
+        self,
+        path: Path,
+        account: Account,
+        begun: float,
+        steps: list[Record],
+        before: dict[str, Any],
     ) -> None:
-        self.path, self.account, self.begun, self.steps, self._before = (
-            path,
-            account,
-            begun,
-            steps,
-            before,
-        )
+        self.path = path
+        self.account = account
         self.system = account.system
-        now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(steps), self.system.comm
-        restart = {"when": now, "after_step": n + 1, "ranks": comm.size, "command": sys.argv}
-        restarts = [*before.get("restarts", []), *([restart] if before else [])]
-        known = before.get("told", [])
-        told = [Told(**one) for one in known]
-        warnings = before.get("warnings", account.warnings())
+        self.begun = begun
+        self.steps = steps
+        self._before = before
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        n = len(steps)
+        ranks = self.system.comm.size
+        restarts = list(before.get("restarts", []))
+        if before:
+            restarts.append({"when": now, "after_step": n + 1, "ranks": ranks, "command": sys.argv})
+        told = [Told(**one) for one in before.get("told", [])]
+        warnings = before.get("warnings", account.warnings)
         warnings = [said for said in warnings if said not in map(str, told)]
         # the step after those done is noted once more
         self._told = {kind(one.said): one for one in told if one.first <= n}
@@ -77,7 +83,7 @@ class Report:
                 "numpy": np.__version__,
                 "python": platform.python_version(),
             },
-            "ranks": comm.size,
+            "ranks": ranks,
             "peak_memory": [],
             **account.facts(),
             "tolerances": {
@@ -101,7 +107,7 @@ class Report:
             "evaluations": sum(a.evaluations for a in step.attempts),
             "residuals": [a.residuals for a in step.attempts],
         }
-        self.content["steps"].append(_finite(asdict(m) | cost))
+        self.content["steps"].append(_finite(m.plain() | cost))
         self.write()
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
@@ -134,28 +140,29 @@ class Report:
             replace_file(self.path, report_text(before))
 
     def _totals(self) -> dict[str, int]:
-        counts, before = self.system.timer.counts, self._before.get("totals", {})
+        before = self._before.get("totals", {})
+        factorisations = self.system.equilibrium.linear.tangent.factorisations
+        evaluations = self.system.timer.counts.get("return mapping", 0)
         return {
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
-            "factorisations": self.system.equilibrium.linear.tangent.factorisations
-            + before.get("factorisations", 0),
-            "residual_evaluations": counts.get("return mapping", 0)
-            + before.get("residual_evaluations", 0),
+            "factorisations": factorisations + before.get("factorisations", 0),
+            "residual_evaluations": evaluations + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.steps),
         }
 
     def _seconds(self) -> dict[str, float]:
-        s = dict(self.system.timer.seconds)
-        before = s.pop(BEFORE_SOLVING, 0.0)
-        s["setup"] -= before
-        s["linear solve"] = before
-        if "solve" in s:
-            s["linear solve"] += s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
-        s["total"] = perf_counter() - self.begun
+        seconds = dict(self.system.timer.seconds)
+        before_solving = seconds.pop(BEFORE_SOLVING, 0.0)
+        seconds["setup"] -= before_solving
+        seconds["linear solve"] = before_solving
+        if "solve" in seconds:
+            inside = sum(seconds.get(name, 0.0) for name in _INSIDE_SOLVE)
+            seconds["linear solve"] += seconds.pop("solve") - inside
+        seconds["total"] = perf_counter() - self.begun
         for name, value in self._before.get("seconds", {}).items():
-            s[name] = s.get(name, 0.0) + value
-        return {name: round(value, 4) for name, value in s.items()}
+            seconds[name] = seconds.get(name, 0.0) + value
+        return {name: round(value, 4) for name, value in seconds.items()}
 
     def _errors(self) -> dict[str, float | None]:
         if not self.steps:
@@ -175,11 +182,8 @@ def peak_memory() -> int:
     process starts at zero.
     """
     try:
-        _, _, after = (
-            Path("/proc/self/status")
-            .read_text(encoding="ascii", errors="replace")
-            .partition("VmHWM:")
-        )
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        _, _, after = status.partition("VmHWM:")
         return 1024 * int(after.split()[0])
     except (OSError, IndexError, ValueError):
         return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

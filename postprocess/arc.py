@@ -11,10 +11,10 @@ import h5py
 import numpy as np
 
 from archord.materials.material import Array
+from archord.measures.edge import SurfaceProfile
 from archord.output.files.seal import require_intact
 from archord.output.files.step_file import step_name
 from archord.presets.arc import ArcProfile
-from archord.presets.edge import SurfaceProfile
 from archord.scene.errors import InputError
 
 _OF_ARCS = ("pin", "hole")

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from archord.materials.material import Array
-from archord.presets.edge import EdgeProfile, surface_profiles
+from archord.measures.edge import EdgeProfile, SurfaceProfile, surface_profiles
+from archord.scene.geometry import JointGeometry
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
-    from archord.presets.joint import Joint
+    from archord.solver.path.system import System
 
 SYMMETRY = 2.0  # the half that is modelled makes up a joint so many times
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
@@ -39,27 +40,38 @@ class ArcProfile(EdgeProfile):
     def facet_means(self) -> tuple[Array, Array]:
         """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter
         where it yields."""
-        angle, pressure = (
-            (self.weight * v).sum(axis=1) / self.width for v in (self.angle, self.pressure)
-        )
+        angle = (self.weight * self.angle).sum(axis=1) / self.width
+        pressure = (self.weight * self.pressure).sum(axis=1) / self.width
         return angle, pressure
 
 
-def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
-    """Contact state along the integrated arcs, by side, at the last evaluation. Collective."""
-    g, found = joint.scene.joint, {}
-    radius = {"pin": g.radius, "hole": g.radius + g.dR}
-    for name, edge in surface_profiles(joint).items():
-        s = joint.sides[name].arc_position(np.array([0.0, -radius["hole"]]))
-        order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
-        given = {
-            key: value for key, value in (vars(edge) | {"s": s}).items() if key not in ("X", "slip")
-        }
-        arrays = {key: value[order, along] for key, value in given.items() if value is not None}
-        if along.step < 0 and edge.shear is not None:  # s runs the other way
-            arrays["shear"] = 0.0 - arrays["shear"]
-        found[name] = ArcProfile(**arrays, radius=radius[name])
+def arc_profiles(joint: JointGeometry, system: System) -> dict[str, ArcProfile]:
+    """Contact state along the integrated arcs of a ``joint``, by side, at the last evaluation.
+    Collective."""
+    radii = {"pin": joint.radius, "hole": joint.radius + joint.dR}
+    lowest = np.array([0.0, -radii["hole"]])
+    found = {}
+    for name, edge in surface_profiles(system).items():
+        s = system.sides[name].arc_position(lowest)
+        found[name] = _from_the_axis(edge, s, radii[name])
     return found
+
+
+def _from_the_axis(edge: SurfaceProfile, s: Array, radius: float) -> ArcProfile:
+    """The profile with its facets and their points in the order of the arc lengths ``s`` ``(n, q)``
+    from the contact axis."""
+    order = np.argsort(s[:, 0])
+    backward = s[0, 0] > s[0, -1]
+    along = slice(None, None, -1 if backward else 1)
+    given = vars(edge) | {"s": s}
+    arrays = {
+        name: array[order, along]
+        for name, array in given.items()
+        if name not in ("X", "slip") and array is not None
+    }
+    if backward and edge.shear is not None:
+        arrays["shear"] = 0.0 - arrays["shear"]
+    return ArcProfile(**arrays, radius=radius)
 
 
 def semi_angle(profile: ArcProfile) -> float:
@@ -77,7 +89,9 @@ def semi_angle(profile: ArcProfile) -> float:
         return float((profile.in_contact * profile.width).sum() / profile.radius)
     start = np.concatenate([[0.0], np.cumsum(profile.width)]) / profile.radius
     at_edge = slice(max(0, last + 1 - _EDGE_FACETS), last + 1)
-    beyond, angle = np.cumsum(force[::-1])[::-1][at_edge] ** (2 / 3), start[at_edge]
+    force_beyond = np.cumsum(force[::-1])[::-1]
+    beyond = force_beyond[at_edge] ** (2 / 3)
+    angle = start[at_edge]
     slope, value = np.polyfit(angle - angle[-1], beyond, 1)
     edge = angle[-1] - value / slope
     return float(np.clip(edge, angle[-1], start[-1]))
@@ -88,11 +102,13 @@ def peak_pressure(profiles: list[ArcProfile], eps: float) -> float:
     near it."""
     near = []
     for p in profiles:
-        chosen = np.cumsum(p.width) <= max(_PEAK_FRACTION * eps * p.radius, 3.001 * p.width[0])
-        chosen &= p.in_contact == 1
+        reach = max(_PEAK_FRACTION * eps * p.radius, 3.001 * p.width[0])
+        chosen = (np.cumsum(p.width) <= reach) & (p.in_contact == 1)
         chosen[0] = True
         square = (p.weight * p.angle**2).sum(axis=1) / p.width
-        near.append(np.stack([np.sqrt(p.width), square, p.facet_force / p.width])[:, chosen])
+        mean = p.facet_force / p.width
+        near.append(np.stack([np.sqrt(p.width), square, mean])[:, chosen])
     w, square, mean = np.concatenate(near, axis=1)
-    A = np.stack([w, w * square], axis=1)[:, : 2 if len(w) > len(profiles) else 1]
+    terms = 2 if len(w) > len(profiles) else 1
+    A = np.stack([w, w * square], axis=1)[:, :terms]
     return float(np.linalg.lstsq(A, w * mean, rcond=None)[0][0])

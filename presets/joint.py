@@ -18,11 +18,9 @@ from archord.geometry.shapes.joint_mesh import refinements
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from archord.materials.kinematics import kinematics
 from archord.presets.arc import SYMMETRY
-from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
 from archord.solver.core_load import core_density
-from archord.solver.path.system import System
 from archord.solver.problem import (
     Body,
     DeadLoad,
@@ -139,29 +137,3 @@ def _coarser(scene: Scene) -> Scene:
         update={"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)}
     )
     return scene.model_copy(update={"joint": g.model_copy(update=sizes), "analysis": analysis})
-
-
-class Joint(System):
-    """The joint of ``scene``, ready to be solved. Collective over ``comm``; raises `InputError` as
-    `joint_problem`."""
-
-    def __init__(
-        self, scene: Scene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None
-    ) -> None:
-        self.scene, timer = scene, timer or Timer()
-        with timer("mesh"):
-            problem = joint_problem(scene, comm, partitioner)
-        super().__init__(problem, timer=timer)
-
-    def delta(self) -> float:
-        """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the
-        core."""
-        return self.drive_displacement("") - (
-            max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0
-        )
-
-    def forces(self) -> dict[str, float]:
-        """Downward force of the whole joint at pin, contact and block's support, per unit
-        thickness."""
-        contact, block = -self.contact_force("contact")[1], self.reaction("block")[1]
-        return {"pin": self.drive_force(""), "contact": contact, "block": block}

@@ -18,10 +18,38 @@ Column = tuple[
 ]  # section and name of the part, what its name is followed by, unit
 
 
-def part_columns(scene: ProblemScene) -> dict[str, str]:
-    """Units of the columns of loads, supports, interactions and bodies of ``scene``, by name and in
-    order."""
-    return {f"{part} {what}": unit for _, part, what, unit in _columns(scene)}
+def part_columns(scene: ProblemScene) -> Iterator[Column]:
+    """The columns of loads, supports, interactions and bodies of ``scene``, in order."""
+    units = scene.units
+    length = units.length
+    thickness = scene.analysis.thickness
+    force = units.force_of(thickness)
+    moment = units.energy_of(thickness)
+    area = f"{length}{3 if thickness else 2}"  # displaced, over the thickness a volume
+    for load in scene.load:
+        moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)
+        if load.kind == "pressure":
+            moved, by = area, units.stress
+        yield "load", load.name, "displacement", moved
+        yield "load", load.name, "force", by
+    couplings = {coupling.name for coupling in scene.coupling}
+    for name in supporting(scene):
+        section = "coupling" if name in couplings else "support"
+        for what, unit in (("x", force), ("y", force), ("moment", moment)):
+            yield section, name, what, unit
+    for interaction in scene.interaction:
+        pressed = {"force x": force, "force y": force, "largest pressure": units.stress}
+        placed = dict.fromkeys(("at x", "at y", "contact length", "largest slip"), length)
+        rubbed = {"moment": moment, "largest shear": units.stress}
+        if not interaction.has_friction:
+            rubbed = {}
+        of_law = interaction.quantities
+        for what, unit in (pressed | placed | {"arcs": ""} | rubbed | of_law).items():
+            yield "interaction", interaction.name, what, unit
+    for body in scene.body:
+        if body.plastic:
+            for what, unit in (("peeq_max", ""), ("at x", length), ("at y", length)):
+                yield "body", body.name, what, unit
 
 
 def supporting(scene: ProblemScene) -> list[str]:
@@ -35,7 +63,7 @@ def require_different(scene: ProblemScene) -> None:
     """Raise `Fault` where two parts of ``scene`` make one column, or a name is that of a coupling's
     motion."""
     first: dict[str, tuple[str, str]] = {}
-    for section, part, what, _ in _columns(scene):
+    for section, part, what, _ in part_columns(scene):
         column = f"{part} {what}"
         other = first.setdefault(column, (section, part))
         said = f"makes the column {column!r} of history.csv, as the {other[0]} {other[1]!r} does: rename one of them"
@@ -68,37 +96,3 @@ def _motions(scene: ProblemScene, coupling: CouplingSection) -> list[str]:
     }
     solved = held if coupling.kind == "distributing" else {*_FREEDOMS} - held
     return sorted(solved - loaded)
-
-
-def _columns(scene: ProblemScene) -> Iterator[Column]:
-    units = scene.units
-    length = units.length
-    thickness = scene.analysis.thickness
-    force = units.force_of(thickness)
-    moment = units.energy_of(thickness)
-    area = f"{length}{3 if thickness else 2}"  # displaced, over the thickness a volume
-    for load in scene.load:
-        moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)
-        if load.kind == "pressure":
-            moved, by = area, units.stress
-        yield "load", load.name, "displacement", moved
-        yield "load", load.name, "force", by
-    couplings = {coupling.name for coupling in scene.coupling}
-    for name in supporting(scene):
-        section = "coupling" if name in couplings else "support"
-        for what, unit in (("x", force), ("y", force), ("moment", moment)):
-            yield section, name, what, unit
-    for interaction in scene.interaction:
-        pressed = {"force x": force, "force y": force, "largest pressure": units.stress}
-        placed = dict.fromkeys(("at x", "at y", "contact length", "largest slip"), length)
-        rubbed = (
-            {"moment": moment, "largest shear": units.stress} if interaction.has_friction else {}
-        )
-        for what, unit in (
-            pressed | placed | {"arcs": ""} | rubbed | interaction.quantities
-        ).items():
-            yield "interaction", interaction.name, what, unit
-    for body in scene.body:
-        if body.plastic:
-            for what, unit in (("peeq_max", ""), ("at x", length), ("at y", length)):
-                yield "body", body.name, what, unit

@@ -26,7 +26,7 @@ from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
-from archord.presets.joint_account import UNSEEN
+from archord.presets.joint_doubts import UNSEEN
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from archord.presets.measures import Measures, Record
+from archord.measures.record import Record
 from archord.scene.file import AnyScene
 from archord.scene.geometry import JointGeometry
 from archord.scene.problem import ProblemScene
@@ -72,19 +72,19 @@ class MeshFamily:
         """Element size over R and growth of ``scene``."""
         return scene.joint.h / scene.joint.radius, scene.joint.growth
 
-    def curve(self, steps: Sequence[Measures]) -> list[float]:
+    def curve(self, steps: Sequence[Record]) -> list[float]:
         """P at every step, under a force delta; P is round-off where nothing touches."""
         if self.scene.force_controlled:
-            return [m.delta for m in steps]
+            return [m["delta"] for m in steps]
         touching = any(m.contact_area for m in steps)
-        return [m.P if touching else 0.0 for m in steps]
+        return [m["P"] if touching else 0.0 for m in steps]
 
-    def resolved(self, scene: Any, steps: Sequence[Measures]) -> bool:
+    def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
         """Whether enough facets are in contact to learn from, if any are to be."""
         area = max(m.contact_area for m in steps)
         joint = scene.joint
         facets = area / 2 / joint.h / max(1.0, joint.size_ratio)
-        return facets >= _FEWEST_FACETS or max(m.delta for m in steps) <= 0
+        return facets >= _FEWEST_FACETS or max(m["delta"] for m in steps) <= 0
 
 
 class ProblemFamily:
@@ -130,7 +130,7 @@ class ProblemFamily:
     def curve(self, steps: Sequence[Record]) -> list[float]:
         """The force of the last load at every step, or its displacement where it is a force or a
         pressure."""
-        return [m.values[self.scene.accurate] for m in steps]
+        return [m[self.scene.accurate] for m in steps]
 
     def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
         """Whether something is in contact at the end, if anything is to be."""

@@ -209,4 +209,4 @@ def test_parts_have_names_for_sets_unless_they_say_otherwise():
     assert archord.Support("clamp", fixed="y").fixed == ("y",)
     assert archord.Load("press", direction="x", force=np.array([1, 2])).stages == (1.0, 2.0)
     problem = archord.Problem("a.msh", [body], units=("m", "Pa"))
-    assert problem.bodies[0].material.E / 1e9 == pytest.approx(210)
+    assert pytest.approx(210) == problem.bodies[0].material.E / 1e9

@@ -27,6 +27,7 @@ ROOMS = [
     "solver",
     "solver.equilibrium",
     "solver.path",
+    "measures",
     "presets",
     "output.files",
     "output",

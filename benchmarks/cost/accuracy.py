@@ -105,4 +105,4 @@ def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarr
 
 
 def _curve(scene: Scene, outcome: Outcome) -> list[float]:
-    return [m.delta if scene.force_controlled else m.P for m in outcome.steps]
+    return [m["delta"] if scene.force_controlled else m["P"] for m in outcome.steps]

@@ -91,7 +91,7 @@ def solve_missing(
 
     def complaint(number: int) -> str:
         try:
-            P = wanted[number].solve(folder).steps[-1].P
+            P = wanted[number].solve(folder).steps[-1]["P"]
             said(f"{wanted[number].name}: P(2 dR)/(E* R) = {P:.6f}")
         except (RuntimeError, InputError) as error:
             return str(error).rstrip(".")

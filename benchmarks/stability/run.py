@@ -185,16 +185,11 @@ def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
     step on; a single step tells nothing."""
     if isinstance(scene, Scene):
         fits = scene.joint.dR < 0
-        path = np.array([[(m.P, m.delta)] for m in steps])
+        path = np.array([[(m["P"], m["delta"])] for m in steps])
     else:
         fits = scene.fits
         loads = [load.name for load in scene.load]
-        path = np.array(
-            [
-                [(m.values[f"{n} force"], m.values[f"{n} displacement"]) for n in loads]
-                for m in steps
-            ]
-        )
+        path = np.array([[(m[f"{n} force"], m[f"{n} displacement"]) for n in loads] for m in steps])
     if fits and len(steps) == 1:
         return math.inf
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)

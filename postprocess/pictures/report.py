@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from archord.measures.energies import ENERGIES
 from archord.output.user_file import check_target, writing
 from archord.postprocess.fields import Fields
 from archord.postprocess.pictures.pictures import panels_of
@@ -24,7 +25,6 @@ from archord.postprocess.tables import (
     history_table,
     peaks_of,
 )
-from archord.presets.measures import ENERGIES
 from archord.report.figure import new_figure
 from archord.report.table import Table
 from archord.report.version import VERSION

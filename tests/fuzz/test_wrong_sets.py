@@ -8,7 +8,7 @@ import tomli_w
 from mpi4py import MPI
 
 from archord.cli import run
-from archord.presets.general_account import GeneralAccount
+from archord.presets.account import account_of
 from archord.scene.file import load_scene
 from tests.fuzz.mutations import GENERAL
 from tests.fuzz.test_wrong_scenes import BETWEEN, FLOOR, PRESS, SIDE
@@ -29,7 +29,7 @@ def written(folder, old, new, **changes):
 
 
 def warned(path):
-    return GeneralAccount(load_scene(path), MPI.COMM_SELF).warnings()
+    return account_of(load_scene(path), MPI.COMM_SELF).warnings
 
 
 def test_sets_as_meant_have_nothing_said_of_them(tmp_path):

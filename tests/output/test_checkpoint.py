@@ -8,15 +8,14 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
+from archord.measures.energies import Work
 from archord.output import checkpoint
-from archord.presets.joint import Joint
-from archord.presets.measures import Measures, Work
 from archord.scene.errors import InputError
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.stepping import Step
 from tests.solver.contact.test_ranks import CUTS
-from tests.solver.solving import scene, solve
+from tests.solver.solving import joint_system, scene, solve
 
 PROBLEM = scene(0.15, 3, yield_stress=0.002)
 
@@ -55,8 +54,8 @@ def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def test_the_state_comes_back_on_any_ranks(comm, pressed, cut):
     """From one rank on all: every point has its number, also on facets that run against the curve,
     and collected again the state is the very same bytes, of the points that yielded alone."""
-    one = point_numbers(MeshOrder(Joint(PROBLEM, MPI.COMM_SELF)))
-    joint = Joint(PROBLEM, comm, partitioner=CUTS[cut])
+    one = point_numbers(MeshOrder(joint_system(PROBLEM, MPI.COMM_SELF)))
+    joint = joint_system(PROBLEM, comm, partitioner=CUTS[cut])
     assert (
         comm.allreduce(
             sum(int((side.trace[:, 0] > side.trace[:, -1]).sum()) for side in joint.sides.values())
@@ -71,8 +70,8 @@ def test_the_state_comes_back_on_any_ranks(comm, pressed, cut):
         assert (np.diff(number) > 0).all()
         assert np.array_equal(together[place][0], number)
         assert together[place][1] == pytest.approx(x, abs=1e-12)
-    measures, *rest = checkpoint.resume(order, "path", pressed if comm.rank == 0 else None)
-    again = checkpoint.halt(order, "scene", Measures(**measures), *rest)
+    known = checkpoint.resume(order, "path", pressed if comm.rank == 0 else None)
+    again = checkpoint.halt(order, "scene", *known)
     if comm.rank == 0:
         assert (again.mesh, again.scalars, set(again.arrays)) == (
             pressed.mesh,
@@ -91,7 +90,7 @@ def test_an_elastic_joint_stores_no_history():
 
 def test_another_mesh_is_refused(pressed):
     """The same joint with other elements."""
-    other = MeshOrder(Joint(scene(0.16, 3, yield_stress=0.002), MPI.COMM_SELF))
+    other = MeshOrder(joint_system(scene(0.16, 3, yield_stress=0.002), MPI.COMM_SELF))
     with pytest.raises(InputError, match=r"run/checkpoint.h5: belongs to another mesh"):
         checkpoint.resume(other, "run/checkpoint.h5", pressed)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from archord.presets.edge import SurfaceProfile
+from archord.measures.edge import SurfaceProfile
 
 
 def profile(chords: list[tuple[float, float]], pressed: list[bool]) -> SurfaceProfile:

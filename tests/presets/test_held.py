@@ -4,7 +4,8 @@ import gmsh
 import pytest
 from mpi4py import MPI
 
-from archord.presets.general_account import GeneralAccount
+from archord.measures.account import Account
+from archord.presets.account import account_of
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 
@@ -32,7 +33,7 @@ def squares(tmp_path_factory):
     return path
 
 
-def account(file: str, **changes) -> GeneralAccount:
+def account(file: str, **changes) -> Account:
     data = {
         "mesh": {},
         "body": [{"name": "lower"} | STEEL, {"name": "upper"} | STEEL],
@@ -44,11 +45,11 @@ def account(file: str, **changes) -> GeneralAccount:
         "load": [{"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}],
     }
     data["mesh"] = {"file": file, **changes.pop("mesh", {})}
-    return GeneralAccount(parse_any(data | changes), MPI.COMM_SELF)
+    return account_of(parse_any(data | changes), MPI.COMM_SELF)
 
 
 def test_two_squares_are_no_fault(squares):
-    assert account(squares).warnings() == []
+    assert account(squares).warnings == []
 
 
 @pytest.mark.parametrize(
@@ -100,7 +101,7 @@ def test_a_hinge_does_not_hold_a_rotation(squares, turned):
     load = [{"name": "turn", "on": "hinge", "direction": "rotation"} | turn]
     given = {"interaction": [], "coupling": [hinge], "support": supports, "load": load}
     if turned:
-        assert account(squares, **given).warnings() == []
+        assert account(squares, **given).warnings == []
     else:
         with pytest.raises(
             InputError, match="nothing holds the body 'lower': it is free in rotation"
@@ -117,10 +118,10 @@ def test_an_overlap_that_is_not_drawn_is_told(squares):
     }
     load = [{"name": "press", "on": "disc", "direction": "y", "displacement": -0.1}]
     tie = {"name": "contact", "surfaces": ["lower t", "upper b"], "law": "tied"}
-    (said,) = account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings()
+    (said,) = account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings
     assert said == "the surfaces of 'disc' are drawn 0.05 apart, but its overlap is 0.01"
     disc["rigid"]["centre"][1] = 20019.99
-    assert account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings() == []
+    assert account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings == []
 
 
 def test_a_file_that_is_not_there():
@@ -131,7 +132,7 @@ def test_a_file_that_is_not_there():
 def test_a_tie_holds_in_both_directions(squares):
     tie = [{"name": "tie", "surfaces": ["lower t", "upper b"], "law": "tied"}]
     support = [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]
-    assert account(squares, interaction=tie, support=support).warnings() == []
+    assert account(squares, interaction=tie, support=support).warnings == []
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +162,7 @@ def drawn(tmp_path_factory):
     return mesh
 
 
-def fit(file: str, **fits) -> GeneralAccount:
+def fit(file: str, **fits) -> Account:
     return account(file, interaction=[{"name": "fit", "surfaces": ["lower t", "upper b"]} | fits])
 
 
@@ -206,7 +207,7 @@ def test_a_fit_is_not_counted_twice(drawn, gap, fits, said):
     ],
 )
 def test_a_fit_that_is_not_as_drawn_is_said(drawn, gap, fits, said):
-    warnings = fit(drawn(gap), **fits).warnings()
+    warnings = fit(drawn(gap), **fits).warnings
     assert len(warnings) == len(said)
     assert all(part in warning for part, warning in zip(said, warnings, strict=True))
 
@@ -232,7 +233,7 @@ def test_a_force_on_an_edge_that_a_support_ends_is_refused(squares, order):
 def test_a_displacement_of_a_body_leaves_its_support_at_rest(squares, order):
     loads = [{"name": "all", "on": "upper", "direction": "x", "displacement": 0.1}]
     loads += [{"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}]
-    (said,) = account(squares, load=loads[::order]).warnings()
+    (said,) = account(squares, load=loads[::order]).warnings
     assert said.startswith(
         "'wall' (on 'upper l') fixes nodes that 'all' (on 'upper') would move in x, as at (0, 10)"
     )
@@ -250,7 +251,7 @@ def test_a_displacement_beyond_the_mesh_is_refused_before_the_solve(squares):
     ("friction", "asked"), [(0.3, False), (1.5, False), (15.0, True), (1e3, False)]
 )
 def test_friction_in_per_cent_is_asked_about(squares, friction, asked):
-    warnings = fit(squares, friction=friction).warnings()
+    warnings = fit(squares, friction=friction).warnings
     assert [warning.endswith("is it in per cent? Then give 0.15") for warning in warnings] == [
         True
     ][:asked]
@@ -303,7 +304,7 @@ def test_a_force_on_a_bent_edge_is_told_to_stiffen_it(tmp_path):
     said = {
         on: account(
             path, **parts, load=[{"name": "pull", "on": on, "direction": "x", "force": 1.0}]
-        ).warnings()
+        ).warnings
         for on in ("right", "bore")
     }
     assert said["right"] == []

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
-from archord.presets.general_account import GeneralAccount
+from archord.presets.account import account_of
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.shapes import general_joint
@@ -51,7 +51,7 @@ def solved(
             "analysis": {"symmetry": 2 if half else 1},
         }
     )
-    account = GeneralAccount(scene, MPI.COMM_SELF)
+    account = account_of(scene, MPI.COMM_SELF)
     records = []
 
     def done(step, position):
@@ -208,14 +208,14 @@ def test_a_joint_stands_for_a_general_scene(changes):
     interference arises."""
     scene = paper_joint(0.2, 2, **changes)
     general = parse_any(general_joint(scene))
-    account, steps = GeneralAccount(general, MPI.COMM_SELF), []
+    account, steps = account_of(general, MPI.COMM_SELF), []
 
     def done(step, position):
         q, force = account.driven()
         steps.append((-q[0], -force[0]))
 
     march(account.system.load_path(), general.targets, target_done=done)
-    expected = [(m.delta, m.P) for m in solve(scene).steps]
+    expected = [(m["delta"], m["P"]) for m in solve(scene).steps]
     assert np.array(steps)[general.fits :] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
 
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.presets.general_account import GeneralAccount
-from archord.presets.measures import Measures, distortion_doubts, told_of_facets, work_doubts
+from archord.measures.doubts import distortion_doubts, told_of_facets
+from archord.measures.energies import work_doubts
+from archord.measures.record import Record
+from archord.presets.account import account_of
 from archord.scene.file import parse_any
 from archord.solver.path.stepping import Step, march
 
@@ -21,6 +23,20 @@ SHAPE = {
     "edge_distance": 20.0,
     "length": 60.0,
 }
+
+ZERO = Record(
+    step=1,
+    at=0.0,
+    values={},
+    contact_area=0.0,
+    elastic_energy=0.0,
+    plastic_dissipation=0.0,
+    work=0.0,
+    force_balance=0.0,
+    iterations=0,
+    cutbacks=0,
+    seconds=0.0,
+)
 
 
 def lug(pull, E=210000.0, **analysis):
@@ -37,7 +53,7 @@ def lug(pull, E=210000.0, **analysis):
         "path": {"steps": 1},
         "analysis": {"symmetry": 2} | analysis,
     }
-    return GeneralAccount(parse_any(data), MPI.COMM_SELF)
+    return account_of(parse_any(data), MPI.COMM_SELF)
 
 
 def warnings_of(account):
@@ -93,10 +109,7 @@ def test_an_element_that_turns_is_told():
 def test_work_that_the_energies_do_not_bear_out_is_told():
     """Friction that reverses within a step, of which trapezoids count nothing. One per cent is
     borne."""
-    zeros = dict.fromkeys(
-        Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0
-    )
-    slid = Measures(**zeros | {"work": 10.0, "contact_area": 1.0}, friction_dissipation=10.0)
+    slid = replace(ZERO, work=10.0, contact_area=1.0, friction_dissipation=10.0)
     assert work_doubts([replace(slid, friction_dissipation=10.09)]) == []
     (said,) = work_doubts([slid, replace(slid, friction_dissipation=12.0)])
     assert "differ by 20 % of the largest work" in said
@@ -105,14 +118,11 @@ def test_work_that_the_energies_do_not_bear_out_is_told():
 
 def test_work_that_is_round_off_is_not_told():
     """Of loads that move nothing beside a press fit, and of a body that turns without a strain."""
-    zeros = dict.fromkeys(
-        Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0
-    )
-    fit = Measures(**zeros | {"elastic_energy": 100.0, "contact_area": 1.0})
+    fit = replace(ZERO, elastic_energy=100.0, contact_area=1.0)
     loaded = replace(fit, elastic_energy=100.0 + 1e-7, work=1e-12)
     assert work_doubts([fit, loaded], fit=1) == []
     assert work_doubts([fit, replace(fit, elastic_energy=100.1, work=0.05)], fit=1) != []
-    turned = Measures(**zeros | {"elastic_energy": 2e-12, "work": 1e-12})
+    turned = replace(ZERO, elastic_energy=2e-12, work=1e-12)
     assert work_doubts([turned], contact=False) != []
     assert work_doubts([turned], contact=False, round_off=1e-10) == []
 
@@ -128,11 +138,8 @@ def test_facets_that_unloading_leaves_in_contact_are_not_told():
 def test_the_work_after_the_contact_opened_counts():
     """A fit that opened: only the work of its stage counted, which is none, and it differed by 1e24
     per cent."""
-    zeros = dict.fromkeys(
-        Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0
-    )
-    fit = Measures(**zeros | {"work": -1e-25, "contact_area": 1.0, "elastic_energy": 1.0})
-    opened = Measures(**zeros | {"work": -2.0})
+    fit = replace(ZERO, work=-1e-25, contact_area=1.0, elastic_energy=1.0)
+    opened = replace(ZERO, work=-2.0)
     (said,) = work_doubts([fit, opened], fit=1)
     assert "differ by 50 % of the largest work" in said
     assert work_doubts([replace(fit, contact_area=0.0)]) == []

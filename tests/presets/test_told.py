@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import archord
 from archord.output.run import solve_scene
-from archord.presets.general_account import GeneralAccount
+from archord.presets.account import account_of
 from archord.presets.words import words_of
 from archord.scene.errors import InputError
 from archord.scene.file import parse_scene
@@ -89,7 +89,7 @@ def problem(interactions, gap=0.0, **changes):
 
 def told_first(problem):
     words = words_of(problem, "mesh.npz")
-    return GeneralAccount(words, MPI.COMM_SELF, given=problem).warnings()
+    return account_of(words, MPI.COMM_SELF, given=problem).warnings
 
 
 def told_of(problem, folder):

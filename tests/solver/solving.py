@@ -9,16 +9,18 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import E, paper_joint
 from archord.kernels.compiled import CompilerError
+from archord.measures.energies import Work
+from archord.measures.record import Record
 from archord.presets.arc import ArcProfile
-from archord.presets.joint import Joint
-from archord.presets.joint_account import JointAccount
-from archord.presets.measures import Measures, Work
+from archord.presets.joint import joint_problem
+from archord.presets.joint_measures import JointMeasures, joint_account
 from archord.scene.scene import Scene
 from archord.solver.linear.substructured import schur_kernels
 from archord.solver.path.coarse_start import coarse_start
 from archord.solver.path.stepping import march
+from archord.solver.path.system import System
 
-__all__ = ["SEVERAL", "E", "Solution", "scene", "solve"]
+__all__ = ["SEVERAL", "E", "Solution", "joint_system", "scene", "solve"]
 
 try:
     schur_kernels()
@@ -34,15 +36,27 @@ scene = paper_joint
 
 @dataclass
 class Solution:
-    joint: Joint
-    steps: list[Measures]
+    scene: Scene
+    joint: System
+    steps: list[Record]
     profiles: list[dict[str, ArcProfile]]
+
+    def forces(self) -> dict[str, float]:
+        """Forces at pin, contact and block."""
+        return JointMeasures(self.scene, self.joint).forces()
+
+
+def joint_system(scene: Scene, comm: MPI.Comm, partitioner=None) -> System:
+    """The joint of ``scene``, ready to be solved."""
+    return System(joint_problem(scene, comm, partitioner))
 
 
 def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Solution:
     """Solve without writing anything."""
-    joint = Joint(scene, comm, partitioner=partitioner)
-    account, solution, work = JointAccount(joint), Solution(joint, [], []), Work()
+    account = joint_account(scene, comm, partitioner=partitioner)
+    joint = account.system
+    solution = Solution(scene, joint, [], [])
+    work = Work()
 
     def target_done(step, position):
         profiles = account.profiles()

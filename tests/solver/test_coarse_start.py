@@ -12,7 +12,7 @@ from archord.output.run import solve_scene
 from archord.presets import joint as preset
 from archord.scene.sections import Stepping
 from archord.solver.path import coarse_start
-from tests.solver.solving import SEVERAL
+from tests.solver.solving import SEVERAL, joint_system
 
 SOFT = {"rigid": True}
 SCENES = {
@@ -86,14 +86,14 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
         update={"analysis": make(s).analysis.model_copy(update=few)}
     )
     monkeypatch.setattr(preset, "_coarser", coarser)
-    assert [m.P for m in run(scene, tmp_path / "left")[0]] == pytest.approx(
-        [m.P for m in plain], rel=1e-8
+    assert [m["P"] for m in run(scene, tmp_path / "left")[0]] == pytest.approx(
+        [m["P"] for m in plain], rel=1e-8
     )
 
 
 def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):
     """The fine joint is solved as if there were none."""
-    joint, asked = preset.Joint(SCENES["elastic"], MPI.COMM_SELF), []
+    joint, asked = joint_system(SCENES["elastic"], MPI.COMM_SELF), []
 
     def too_coarse(problem):
         asked.append(problem.mesh.mesh.topology.index_map(2).size_global)
@@ -111,7 +111,7 @@ def test_cut_steps_take_the_coarse_joint_back_too(tmp_path, monkeypatch, always)
     scene = scene.model_copy(update={"stepping": Stepping(minimum=0.01)})
     steps, _ = run(scene, tmp_path / "cut")
     assert sum(m.cutbacks for m in steps) > 0
-    assert all(np.isfinite(m.P) for m in steps)
+    assert all(np.isfinite(m["P"]) for m in steps)
 
 
 @pytest.mark.mpi
@@ -121,5 +121,5 @@ def test_ranks_find_the_same_guess(name, tmp_path, always):
     comm = MPI.COMM_WORLD
     together, _ = run(SCENES[name], tmp_path / "together", comm)
     alone = comm.bcast(run(SCENES[name], tmp_path / "alone") if comm.rank == 0 else None)
-    assert [m.P for m in together] == pytest.approx([m.P for m in alone[0]], rel=1e-8)
+    assert [m["P"] for m in together] == pytest.approx([m["P"] for m in alone[0]], rel=1e-8)
     assert [m.iterations for m in together] == [m.iterations for m in alone[0]]

@@ -19,7 +19,7 @@ def test_both_degrees_find_the_same_joint():
     """At 0.1 R, elements of second and third order agree in P within 2e-4, and the third are nearer
     to a fine mesh."""
     second, third, fine = (
-        solve(scene(h, 2, joint={"growth": growth}, analysis={"degree": degree})).steps[-1].P
+        solve(scene(h, 2, joint={"growth": growth}, analysis={"degree": degree})).steps[-1]["P"]
         for h, growth, degree in ((0.1, 0.3, 2), (0.1, 0.3, 3), (0.05, 0.15, 3))
     )
     assert abs(third / fine - 1) < 4e-5 < abs(second / fine - 1) < 5e-4

@@ -9,12 +9,12 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
-from archord.presets.joint import Joint
 from archord.scene.scene import Scene
 from archord.solver.contact.named import LAWS, contact_law
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
 from tests.solver.parts import blocks, solve
+from tests.solver.solving import joint_system
 
 pytestmark = pytest.mark.mpi
 
@@ -284,11 +284,12 @@ def test_the_joint_of_the_paper_with_friction():
         analysis={"friction": 0.1},
         load={"displacement": 2.0, "steps": 20},
     )
-    joint = Joint(scene, MPI.COMM_WORLD)
+    joint = joint_system(scene, MPI.COMM_WORLD)
     work, last = 0.0, (0.0, 0.0)
     for load in scene.targets:
         joint.solve([load])
-        delta, P = joint.delta(), joint.drive_force("")
+        delta = joint.drive_displacement("")
+        P = joint.drive_force("")
         work += (delta - last[0]) * (P + last[1]) / 2
         last = delta, P
         if load == pytest.approx(0.005):

@@ -15,7 +15,7 @@ from archord.materials.finite import LargeStrain
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.materials.material import Array, Material
-from archord.presets.joint import Joint, joint_problem
+from archord.presets.joint import joint_problem
 from archord.scene.scene import Scene
 from archord.solver.bulk import Bulk
 from archord.solver.path.system import System
@@ -34,6 +34,7 @@ from tests.solver.parts import (
     quarter_annulus,
     space,
 )
+from tests.solver.solving import joint_system
 from tests.solver.test_bulk_terms import stiffness, warped_annulus
 
 
@@ -131,9 +132,9 @@ def joint_scene(strain: str, clearance: float = 0.005, plane: str = "strain") ->
     )
 
 
-def joint(*options: object, **more) -> Joint:
+def joint(*options: object, **more) -> System:
     scene = joint_scene(*options, **more)
-    solved = Joint(scene, MPI.COMM_WORLD)
+    solved = joint_system(scene, MPI.COMM_WORLD)
     solved.solve(scene.targets)
     return solved
 

@@ -4,7 +4,7 @@ import csv
 from pathlib import Path
 
 from archord.cli import run
-from archord.presets import joint
+from archord.presets import joint_measures
 
 BASE = """
 [base]
@@ -47,11 +47,11 @@ def sweep(*arguments: str | Path) -> int:
 
 def break_mesh(monkeypatch, message: str, below: float) -> None:
     """Let every case fail whose pin has less than this E."""
-    true_problem = joint.joint_problem
+    true_problem = joint_measures.joint_problem
 
     def broken(scene, *rest):
         if below > scene.pin.E:
             raise ValueError(message)
         return true_problem(scene, *rest)
 
-    monkeypatch.setattr(joint, "joint_problem", broken)
+    monkeypatch.setattr(joint_measures, "joint_problem", broken)

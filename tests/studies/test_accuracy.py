@@ -72,7 +72,7 @@ def elastic(tmp_path_factory):
 def test_an_elastic_joint_is_as_accurate_as_asked(elastic):
     """The estimate is below what was asked, and the true error below the estimate."""
     found = elastic.accuracy
-    true = abs(elastic.steps[-1].P / known_force("elastic") - 1)
+    true = abs(elastic.steps[-1]["P"] / known_force("elastic") - 1)
     assert elastic.status == "done"
     assert true < found.estimated <= found.asked == 1e-3
     assert found.substeps == 1
@@ -110,7 +110,7 @@ def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
     assert outcome.status == "done"
     assert found.estimated == found.mesh_error + found.step_error <= 6e-3
     assert 0 < found.step_error <= 3e-3
-    assert abs(outcome.steps[-1].P / known_force("plastic") - 1) < 6e-3
+    assert abs(outcome.steps[-1]["P"] / known_force("plastic") - 1) < 6e-3
     tried = {level.substeps for level in found.levels if level.mesh == 1}
     assert {found.substeps, 2 * found.substeps} <= tried or {
         found.substeps,
@@ -122,8 +122,8 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
     """The force that belongs to 2 dR presses the pin by 2 dR."""
     load = {"displacement": None, "relative_force": known_force("elastic")}
     outcome = accurate(open_scene(3e-3, load=load), tmp_path)
-    assert outcome.steps[-1].delta == pytest.approx(0.01, rel=3e-3)
-    assert outcome.accuracy.levels[-1].last == outcome.steps[-1].delta
+    assert outcome.steps[-1]["delta"] == pytest.approx(0.01, rel=3e-3)
+    assert outcome.accuracy.levels[-1].last == outcome.steps[-1]["delta"]
 
 
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
@@ -131,7 +131,7 @@ def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
     to that of many."""
     plane, short = {"plane": "stress"}, {"initial": 1 / 16, "maximum": 1 / 16}
     many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
-    known = Case("many", many).solve(tmp_path).steps[-1].P
+    known = Case("many", many).solve(tmp_path).steps[-1]["P"]
     taken, errors = [], []
     for asked in (0.1, 0.04):
         scene = open_scene(asked, 2, 0.002, analysis=plane, output={"fields": False})
@@ -309,9 +309,9 @@ def test_ranks_choose_the_same_meshes(tmp_path, comm):
     together, alone = accurate(scene, folder / "together", comm), None
     if comm.rank == 0:
         alone = accurate(scene, folder / "alone")
-        alone = [m.P for m in alone.steps], alone.accuracy
+        alone = [m["P"] for m in alone.steps], alone.accuracy
     forces, found = comm.bcast(alone)
-    assert [m.P for m in together.steps] == pytest.approx(forces, rel=1e-8)
+    assert [m["P"] for m in together.steps] == pytest.approx(forces, rel=1e-8)
     assert together.accuracy.estimated == pytest.approx(found.estimated, rel=1e-4)
     for a, b in zip(together.accuracy.levels, found.levels, strict=True):
         assert (a.mesh, a.element_size, a.substeps, a.dofs) == (

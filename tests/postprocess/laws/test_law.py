@@ -284,7 +284,7 @@ def test_a_small_block_is_as_soft_as_is_said(width, sections):
     """P of archord's solutions falls by what the joint tells: that share, and up to twice as much
     for other bodies."""
     blocks = [scene(0.1, 2, joint={"block_size": size}, **sections) for size in (width, LARGE)]
-    small, wide = ([m.P for m in solve(problem).steps] for problem in blocks)
+    small, wide = ([m["P"] for m in solve(problem).steps] for problem in blocks)
     fall = 1 - np.array(small) / wide
     about, most = LawJoint.from_scene(blocks[0]).softer
     assert (fall < most).all()

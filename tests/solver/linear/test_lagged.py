@@ -32,7 +32,9 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
     monkeypatch.setattr(lagged, "_MANY_DOFS", 10**9)
     direct = solve(scene)
     for a, b in zip(iterative.steps, direct.steps, strict=True):
-        assert (a.P, a.delta, a.p0, a.eps) == pytest.approx((b.P, b.delta, b.p0, b.eps), rel=1e-8)
+        assert (a["P"], a["delta"], a["p0"], a["eps"]) == pytest.approx(
+            (b["P"], b["delta"], b["p0"], b["eps"]), rel=1e-8
+        )
     iterations = sum(m.iterations for m in iterative.steps)
     assert iterative.joint.equilibrium.linear.tangent.factorisations < 0.75 * iterations
     assert iterations <= 2 * sum(m.iterations for m in direct.steps)
@@ -50,7 +52,7 @@ def test_many_solves_or_changes_of_the_contact_bring_a_new_factorisation(
         often.joint.equilibrium.linear.tangent.factorisations
         > usual.joint.equilibrium.linear.tangent.factorisations
     )
-    assert pytest.approx(usual.steps[-1].P, rel=1e-9) == often.steps[-1].P
+    assert pytest.approx(usual.steps[-1]["P"], rel=1e-9) == often.steps[-1]["P"]
 
 
 def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):

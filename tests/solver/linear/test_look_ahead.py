@@ -30,8 +30,8 @@ def test_the_states_are_those_without_it_in_fewer_iterations(name, comm, monkeyp
     monkeypatch.setattr(choose, "LEFT_OUT", {"look_ahead"})
     long = solve(SCENES[name])
     for a, b, c in zip(short.steps, alone.steps, long.steps, strict=True):
-        assert (a.P, a.p0, a.eps) == pytest.approx((c.P, c.p0, c.eps), rel=1e-8)
-        assert (a.P, a.iterations) == pytest.approx((b.P, b.iterations), rel=1e-9)
+        assert (a["P"], a["p0"], a["eps"]) == pytest.approx((c["P"], c["p0"], c["eps"]), rel=1e-8)
+        assert (a["P"], a.iterations) == pytest.approx((b["P"], b.iterations), rel=1e-9)
     assert sum(m.iterations for m in short.steps) < 0.9 * sum(m.iterations for m in long.steps)
 
 
@@ -79,7 +79,7 @@ def test_an_old_factorisation_preconditions_as_well(monkeypatch):
         < usual.joint.equilibrium.linear.tangent.factorisations
     )
     for a, b in zip(kept.steps, usual.steps, strict=True):
-        assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-8)
+        assert (a["P"], a["p0"], a["eps"]) == pytest.approx((b["P"], b["p0"], b["eps"]), rel=1e-8)
 
 
 def test_a_scene_gives_the_same_digits_wherever_memory_lies():
@@ -88,4 +88,4 @@ def test_a_scene_gives_the_same_digits_wherever_memory_lies():
     for size in (1, 1001, 17, 4099):
         held.append(np.zeros(size))
         last.append(solve(scene).steps[-1])
-    assert len({(m.P, m.p0, m.eps) for m in last}) == 1
+    assert len({(m["P"], m["p0"], m["eps"]) for m in last}) == 1

@@ -55,6 +55,11 @@ class EdgeProfile:
         """Share ``(n,)`` of each facet that carries pressure."""
         return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.width
 
+    @property
+    def contact_length(self) -> float:
+        """Length of the surface under pressure."""
+        return float((self.in_contact * self.width).sum())
+
 
 @dataclass(frozen=True)
 class SurfaceProfile(EdgeProfile):
@@ -70,9 +75,9 @@ class SurfaceProfile(EdgeProfile):
         return float(np.abs(self.slip[self.raw_pressure > 0]).max(initial=0.0))
 
     @property
-    def contact_length(self) -> float:
-        """Length of the surface under pressure."""
-        return float((self.in_contact * self.width).sum())
+    def largest_shear(self) -> float:
+        """Largest shear, whichever way, on a surface with friction."""
+        return float(np.abs(self.shear).max()) if self.shear is not None else 0.0
 
     @property
     def largest(self) -> tuple[float, Array]:

@@ -1,0 +1,1 @@
+"""What is measured of every accepted step, and what its user is warned of."""

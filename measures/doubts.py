@@ -1,0 +1,91 @@
+"""What to warn of after a step of any problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from archord.measures.measure import Accepted
+from archord.measures.record import Record
+from archord.report.doubts import Doubt
+
+if TYPE_CHECKING:
+    from archord.solver.path.system import System
+    from archord.solver.problem import Body
+
+Check = Callable[[Accepted, Record], Iterable[str]]  # what to warn of after a step; collective
+
+LARGE_STRAIN = 0.05
+LARGE = 'analysis.strain = "large" is for that'
+_PLASTIC = 0.5  # PEEQ over the strain from which the strain is that of yielding
+_OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
+_LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
+_FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
+_BALANCED = 1e-8  # force that is left, or residual, over the largest force
+
+
+def contrast_doubts(bodies: Sequence[Body]) -> list[str]:
+    """A warning where the moduli of two ``bodies`` are so far apart that they may be given in
+    different units."""
+    moduli = {body.name: float(body.material.elastic_tangent[2, 2]) for body in bodies}
+    softest = min(moduli, key=lambda name: moduli[name])
+    stiffest = max(moduli, key=lambda name: moduli[name])
+    ratio = moduli[stiffest] / moduli[softest]
+    if ratio < _OTHER_UNIT:
+        return []
+    return [
+        f"{stiffest!r} is {ratio:.1e} times as stiff as {softest!r}: look whether their E have the same unit"
+    ]
+
+
+def told_of_facets(pressure: float, before: Sequence[float]) -> bool:
+    """Whether a warning of few facets in contact is worth a word under this largest ``pressure``,
+    after those ``before``: what unloading leaves of a contact decides on nothing."""
+    return pressure > _LEFT * max(before, default=0.0)
+
+
+def few_facets(touching: int, least: int, where: str, cure: str) -> list[str]:
+    """A warning where fewer facets than the ``least`` are in contact."""
+    if touching >= least:
+        return []
+    facets = "facet" if touching == 1 else "facets"
+    return [
+        Doubt(f"only {touching} {facets} {where}in contact; {cure} would resolve it", -touching)
+    ]
+
+
+def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
+    """What to warn of where cells are strained or turned far in the last accepted state, by
+    ``small`` strain, or turned over, by any; ``peeq``, which has a warning of its own, is the
+    largest. Collective."""
+    strain, tag, angle, inside_out = system.distortion()
+    said = list[str]()
+    if inside_out:
+        cells = "1 element is" if inside_out == 1 else f"{inside_out} elements are"
+        text = f"{cells} turned inside out: stresses and forces mean nothing"
+        said.append(Doubt(text, inside_out))
+    if not small:
+        return said
+    if strain > LARGE_STRAIN and peeq < _PLASTIC * strain:
+        name = next(body.name for body in system.problem.bodies if system.problem.tag(body) == tag)
+        off = f"which makes stresses and forces wrong by about {100 * strain:.2g} %"
+        text = f"the strain reaches {strain:.2g} in {name!r}, too much for small-strain theory, {off}; {LARGE}"
+        said.append(Doubt(text, strain))
+    if angle > _FAR_TURN:
+        text = f"elements turn by {angle:.2g} rad, which small-strain theory takes for a strain of {angle**2 / 2:.2g}"
+        said.append(Doubt(f"{text}; {LARGE}", angle))
+    return said
+
+
+def round_off_doubts(state: Accepted, tolerance: float) -> list[str]:
+    """A warning where round-off keeps the residual of a loaded state above the ``tolerance``."""
+    residual = state.residual
+    if residual <= max(_BALANCED, tolerance):
+        return []
+    return [Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual)]
+
+
+def balance_doubts(m: Record, sentence: str) -> list[str]:
+    """A warning, the ``sentence`` with the number, where forces do not balance."""
+    left = m.force_balance
+    return [Doubt(sentence.format(left), left)] if left > _BALANCED else []

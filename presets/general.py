@@ -1,0 +1,130 @@
+"""A general problem, ready to be solved, with the account of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.measures.account import Account, Driven, Values, sizes
+from archord.measures.doubts import contrast_doubts
+from archord.measures.edge import per_step, surface_profiles
+from archord.measures.energies import ENERGIES
+from archord.measures.measure import Accepted, Column, column
+from archord.measures.parts import part_measures
+from archord.presets.general_doubts import ending, refusal, step_checks
+from archord.presets.problem import as_input_error, general_problem, mesh_name, require_mirrored
+from archord.report.timer import Timer
+from archord.scene.columns import supporting
+from archord.scene.problem import ProblemScene
+from archord.scene.sections import friction_doubts
+from archord.solver.path.system import System
+from archord.solver.problem import Problem
+
+
+def general_account(
+    scene: ProblemScene, comm: MPI.Comm, timer: Timer, given: Problem | None = None
+) -> Account:
+    """The problem of ``scene``, or the one that was ``given`` from Python, of which the scene tells,
+    ready to be solved, and its account, whose measures are those of its parts. Collective over
+    ``comm``; raises `InputError`."""
+    name = given.mesh_name if given else mesh_name(scene)
+    file = given.mesh_file if given else scene.mesh.file
+    with timer("mesh"), as_input_error(name):
+        problem = given.on(comm) if given else general_problem(scene, comm)
+    warnings = scene.doubts
+    with as_input_error(name):
+        if scene.mesh.shape is None:
+            # with scipy, which solves of presets do without
+            from archord.presets.held import check
+
+            with timer("mesh"):
+                warnings += check(problem)
+        require_mirrored(problem)
+        system = System(problem, timer=timer)
+        warnings += system.warnings
+        if scene.mesh.shape is None or any(part.interference for part in scene.interaction):
+            from archord.presets.held import require_facing
+
+            warnings += require_facing(system)
+    frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
+    warnings += friction_doubts(frictions)
+    warnings += contrast_doubts(problem.bodies)
+    return _account(scene, system, warnings, file)
+
+
+def _account(scene: ProblemScene, system: System, warnings: list[str], file: str | None) -> Account:
+    """The account of a general problem, whose mesh is in a ``file``, if any."""
+    measures = part_measures(scene)
+    by_factor = [column("step"), column("load_factor", of="at")]
+    return Account(
+        scene,
+        system,
+        measures,
+        [*by_factor, *(measure.column for measure in measures), *_last_columns(scene, system)],
+        driven=partial(_driven, system, [load.name for load in scene.load]),
+        profiles=partial(surface_profiles, system),
+        fixed=("s", "weight", "X"),
+        per_step=(*per_step(system), "slip"),
+        balance=_balance_of(scene),
+        facts=partial(_facts, scene, system, file),
+        warnings=warnings,
+        checks=step_checks(scene, system),
+        refusal=partial(refusal, system),
+        ending=partial(ending, scene, system),
+        fit=scene.path.fit_steps if scene.fits else 0,
+    )
+
+
+def _last_columns(scene: ProblemScene, system: System) -> list[Column]:
+    """The energies of the whole, and what a step cost."""
+    energies = ENERGIES if system.contact.has_friction else ENERGIES[:2]
+    unit = scene.units.energy_of(scene.analysis.thickness)
+    of_whole = [column(name, unit) for name in (*energies, "work")]
+    cost = [column("iterations"), column("cutbacks"), column("seconds", "s")]
+    return [*of_whole, column("force_balance"), *cost]
+
+
+def _driven(system: System, names: Sequence[str]) -> Driven:
+    """Displacements and forces of the loads of these ``names``. Collective."""
+    q, force = system.driven()
+    loads = [system.drive_names.index(name) for name in names]
+    return q[loads], force[loads]
+
+
+def _balance_of(scene: ProblemScene) -> Callable[[Accepted, Values], float]:
+    """How far forces are from balance, over the largest force of the run so far."""
+    forces = [(f"{name} x", f"{name} y") for name in supporting(scene)]
+    forces += [(f"{part.name} force x", f"{part.name} force y") for part in scene.interaction]
+
+    def balance(state: Accepted, values: Values) -> float:
+        before = [np.hypot(m[x], m[y]) for m in state.before for x, y in forces]
+        return state.system.force_balance(float(max(before, default=0.0)))
+
+    return balance
+
+
+def _facts(scene: ProblemScene, system: System, file: str | None) -> dict[str, Any]:
+    """Sizes of the mesh, which is in a ``file``, if any, and what was made of the scene."""
+    source = {"file": scene.mesh.file} if scene.mesh.file else {}
+    if file:
+        source["sha256"] = sha256(Path(file).read_bytes()).hexdigest()
+    mesh = system.problem.mesh
+    shares = {
+        interface.interaction.name: [pair.share for pair in interface.pairs]
+        for interface in system.contact.interfaces
+    }
+    return {
+        "mesh": sizes(system) | source,
+        "model": {"contact_shares": shares},
+        "bodies": {
+            body.name: list(mesh.cell_sets[body.cells or body.name])
+            for body in system.problem.bodies
+        },
+        "materials": scene.materials,
+    }
