@@ -18,9 +18,8 @@ import numpy.typing as npt
 from archord.materials.kinematics import Kinematics, Plane
 
 Array = npt.NDArray[np.floating]
-__all__ = ["COMPONENTS", "Array", "Material", "Plane", "Points", "State"]
+__all__ = ["Array", "Material", "Plane", "Points", "State"]
 State = Any
-COMPONENTS = ("xx", "yy", "zz", "xy")  # of stresses and plastic strains
 
 
 class Material(Protocol):

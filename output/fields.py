@@ -17,7 +17,6 @@ import numpy as np
 
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
-from archord.materials.material import COMPONENTS
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import StepFile, times
 from archord.output.files.xdmf import CELLS, step_grid, steps_text
@@ -96,6 +95,7 @@ class FieldWriter:
     ) -> None:
         self.path = folder / "fields.xdmf"
         self._keeps_points = points
+        self._components = order.system.problem.kinematics.names
         self._second = second = SecondOrder(order.kind, order.nodes_of_cell)
         _, in_vtk_order = CELLS[second.cells.shape[1]]
         x = second(order.coordinates)
@@ -142,9 +142,9 @@ class FieldWriter:
         found: Arrays = {}
         for name in ("stress", "plastic_strain"):
             if f"points/{name}" in at_points:
-                tensor, recovered = np.split(recovered, [len(COMPONENTS)], axis=1)
-                for k, component in enumerate(COMPONENTS):
-                    found[f"{name}_{component}"] = tensor[:, k]
+                for k, component in enumerate(self._components):
+                    found[f"{name}_{component}"] = recovered[:, k]
+                recovered = recovered[:, len(self._components) :]
         if "points/peeq" in at_points:
             # the polynomials swing below zero where nothing yields
             found["peeq_nodal"] = np.maximum(recovered[:, 0], 0.0)

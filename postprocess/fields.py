@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from archord.materials.elasticity import principal_stresses, von_mises
-from archord.materials.material import COMPONENTS, Array
+from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN
+from archord.materials.material import Array
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
 from archord.scene.errors import InputError, toml_value
@@ -52,9 +53,10 @@ class Fields:
     peeq: Array | None  # (m,) equivalent plastic strain
     contact_state: Array  # (m,) share of the cell's contact edge that is in contact, 0 elsewhere
     contact_pressure: Array  # (m,) mean over that edge
-    stress: Array | None = None  # (n, 4) COMPONENTS, recovered at the nodes, like the following
+    stress: Array | None = None  # (n, 4) recovered at the nodes, like the following
     plastic_strain: Array | None = None  # (n, 4)
     peeq_nodal: Array | None = None  # (n,)
+    components: tuple[str, ...] = PLANE_STRAIN.names  # of tensors (., 4)
     cell_tensors: dict[str, Array] = field(default_factory=dict)  # (m, 4) means, by TENSORS
     bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
     edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along named sets
@@ -82,7 +84,7 @@ class Fields:
         axis) and "von_mises" of their tensor."""
         found: dict[str, Array] = {}
         for name, tensor in self.nodal_tensors().items():
-            for k, component in enumerate(COMPONENTS):
+            for k, component in enumerate(self.components):
                 found[f"{name}_{component}"] = tensor[:, k]
         if self.stress is not None:
             principal, angle = principal_stresses(self.stress)
@@ -133,15 +135,16 @@ def read_fields(
     at = step_name(step)
     _require(bool(scene.output.fields), folder, scene, "fields")
     with opened(folder, "fields", step) as file:
+        components = AXISYMMETRIC.names if "stress_rr" in file else PLANE_STRAIN.names
 
         def array(name: str) -> Any:
             return file[f"{name}/{at}"][()] if f"{name}/{at}" in file else None
 
         found = {name: array(name) for name in (*CELL_FIELDS, "peeq_nodal")}
         for name in TENSORS:
-            components = [array(f"{name}_{component}") for component in COMPONENTS]
-            known = all(values is not None for values in components)
-            found[name] = np.stack(components, axis=1) if known else None
+            columns = [array(f"{name}_{component}") for component in components]
+            known = all(values is not None for values in columns)
+            found[name] = np.stack(columns, axis=1) if known else None
         means = {name: array(f"cells/{name}") for name in TENSORS}
         return Fields(
             step=step,
@@ -150,6 +153,7 @@ def read_fields(
             cells=file["mesh/cells"][()],
             body=file["mesh/body"][()],
             displacement=file[f"displacement/{at}"][:, :2],
+            components=components,
             cell_tensors={name: values for name, values in means.items() if values is not None},
             bodies=bodies,
             edges=dict(all_arrays(file["edges"])) if "edges" in file else {},

@@ -43,7 +43,7 @@ _BEARING = 1.5
 
 
 @dataclass(frozen=True)
-class Check:
+class StrengthCheck:
     """One allowable: ``kind`` is "yield" or "ultimate", ``by`` is "hand" or "FE", ``bound`` tells
     that the run did not reach it, so that the ``allowable`` is the largest force that was
     solved."""
@@ -75,11 +75,11 @@ class Margins:
     unit: str
     stress: str
     strengths: dict[str, tuple[float, str]]
-    checks: list[Check]
+    checks: list[StrengthCheck]
     notes: list[str]
     plate: str = ""
 
-    def weakest(self, kind: str, by: str) -> Check | None:
+    def weakest(self, kind: str, by: str) -> StrengthCheck | None:
         """The check of this ``kind`` and origin with the smallest allowable."""
         found = [check for check in self.checks if (check.kind, check.by) == (kind, by)]
         return min(found, key=lambda check: check.allowable) if found else None
@@ -155,7 +155,7 @@ def margins(
     strengths = _strengths(run, lug.body, proof, tensile)
     applied = {"yield": load, "ultimate": load * factor}
     checks = [
-        Check(kind, "hand", name, allowable, applied[kind])
+        StrengthCheck(kind, "hand", name, allowable, applied[kind])
         for kind, (strength, _) in strengths.items()
         for name, allowable in by_hand(lug.shape, strength, lug.thickness).items()
     ]
@@ -177,7 +177,7 @@ def margins(
 
 def _by_elements(
     force: Array, peeq: Array, applied: dict[str, float], yields: float, breaks: float | None
-) -> tuple[list[Check], list[str]]:
+) -> tuple[list[StrengthCheck], list[str]]:
     """The checks of the steps' forces ``(n,)`` and largest PEEQ ``(n,)`` against the PEEQ at which
     the lug ``yields`` and ``breaks``, and notes on them."""
     limits = [("yield", "first yield", 0.0), ("yield", f"PEEQ of {yields:.3g}", yields)]
@@ -193,7 +193,7 @@ def _by_elements(
     checks = []
     for kind, name, limit in limits:
         allowable, reached = load_at(force, peeq, limit)
-        checks.append(Check(kind, "FE", name, allowable, applied[kind], bound=not reached))
+        checks.append(StrengthCheck(kind, "FE", name, allowable, applied[kind], bound=not reached))
     for kind in dict.fromkeys(check.kind for check in checks if check.margin is None):
         notes.append(
             f"the {kind} margin is not known by finite elements: {applied[kind]:g} is beyond the "
@@ -372,7 +372,7 @@ def margin_text(found: Margins) -> str:
     return "\n".join([*lines, *(f"note: {note}" for note in found.notes)])
 
 
-def _compared(found: Margins, kind: str) -> Check | None:
+def _compared(found: Margins, kind: str) -> StrengthCheck | None:
     """The criterion of finite elements beside a hand formula: the last, as first yield is none of a
     section."""
     return next(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
 from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
@@ -52,6 +53,8 @@ class Probe:
     length: str = ""  # the unit of x and s
     # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
     angle: Array | None = None
+    axes: tuple[str, ...] = ("x", "y")
+    per: str = "per unit thickness"  # what the force is of
 
     @property
     def largest(self) -> int:
@@ -67,8 +70,8 @@ class Probe:
         """The place of point ``k`` in words: its angle, or how far along the edge or line it is;
         and x and y."""
         along = f"s = {self.s[k]:.6g}" if self.angle is None else f"{self.angle[k]:.4g}°"
-        x, y = self.x[k]
-        return f"at {along}, x = {x:.6g}, y = {y:.6g}"
+        place = [f"{axis} = {x:.6g}" for axis, x in zip(self.axes, self.x[k], strict=True)]
+        return f"at {along}, {', '.join(place)}"
 
     def at(self, angle: float) -> float:
         """The value at an ``angle`` in degrees. Raises `InputError` if the edge has none there."""
@@ -96,7 +99,8 @@ class Probe:
         columns = {"s": self.s}
         if self.angle is not None:
             columns["angle"] = self.angle
-        columns |= {"x": self.x[:, 0], "y": self.x[:, 1], self.quantity: self.values}
+        columns |= dict(zip(self.axes, self.x.T, strict=True))
+        columns[self.quantity] = self.values
         return frame_of(columns, {"angle": "°", self.quantity: self.unit})
 
 
@@ -129,7 +133,9 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
     """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises
     `InputError`.
 
-    At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field;
+    At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field:
+    "hoop" is the stress along the edge; around an axis it is the stress round the axis, and the
+    stress along the edge is "along";
     at the integration points of a surface "pressure", "gap" or, with friction, "contact_shear", or
     "facet_pressure", the mean of each facet, which scatters less where bodies yield. On a line a
     nodal field (von Mises stress), linear between nodes.
@@ -145,20 +151,18 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
         quantity = quantity or "hoop"
         found = _stress(run, edge, quantity, step)
     force, by = _driving(run, step)
-    unit = _unit_of(quantity, run.scene.units)
-    length = run.scene.units.length
+    kind = kinematics(run.scene.analysis.plane)
     return Probe(
-        edge or "line",
-        quantity,
-        unit,
-        step,
-        force,
-        by,
-        found.x,
-        found.s,
-        found.values,
-        length,
-        found.angle,
+        place=edge or "line",
+        quantity=quantity,
+        unit=_unit_of(quantity, run.scene.units),
+        step=step,
+        force=force,
+        by=by,
+        length=run.scene.units.length,
+        axes=kind.axes,
+        per="per unit thickness" if kind.is_plane else "on the whole ring",
+        **found._asdict(),
     )
 
 
@@ -210,11 +214,13 @@ def _stress(run: Probed, edge: str, quantity: str, step: int) -> _Along:
     tangent, joined = _tangents(fields.coordinates[nodes], nodes)
     stresses = {}
     if fields.stress is not None:
-        xx, yy, _, xy = np.moveaxis(fields.stress[nodes], -1, 0)
+        xx, yy, across, xy = np.moveaxis(fields.stress[nodes], -1, 0)
         c, d = np.moveaxis(tangent, -1, 0)
-        hoop = xx * c**2 + yy * d**2 + 2 * xy * c * d
+        along = xx * c**2 + yy * d**2 + 2 * xy * c * d
         shear = (yy - xx) * c * d + xy * (c**2 - d**2)
-        stresses = {"hoop": hoop, "normal": xx + yy - hoop, "shear": shear}
+        stresses = {"hoop": along, "normal": xx + yy - along, "shear": shear}
+        if kinematics(run.scene.analysis.plane).has_hoop:
+            stresses |= {"along": along, "hoop": across}
     shown = np.ones(nodes.shape, dtype=bool)
     shown[:, 2] = ~joined
     values = _nodal(run, fields, quantity, nodes, **stresses)

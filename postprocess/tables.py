@@ -94,7 +94,7 @@ def probe_text(probe: Probe, angles: Iterable[float]) -> str:
     """A quantity along an edge or a line, its largest and smallest value and where they are, and
     its values at ``angles``."""
     unit = f" {probe.unit}".rstrip()
-    force = f"{probe.by or 'force'} = {probe.force:.6g} per unit thickness"
+    force = f"{probe.by or 'force'} = {probe.force:.6g} {probe.per}"
     lines = [_thinned(_table_of(probe.frame()), "-o FILE.csv"), ""]
     lines.append(f"{probe.quantity} along {probe.place}, step {probe.step}, {force}")
     for name, k in (("largest", probe.largest), ("smallest", probe.smallest)):

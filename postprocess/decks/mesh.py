@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import basix
 import numpy as np
@@ -28,7 +28,7 @@ _RIM = 0.8  # inner over outer radius of the ring that stands for a rigid disc
 
 
 @dataclass(frozen=True)
-class Surface:
+class DeckSurface:
     """The ``elements`` ``(n,)`` behind a surface, their ``edges`` ``(n,)``, edge i going from
     corner i to the next, and those edges' nodes ``(n, 3)``: start, end, midpoint."""
 
@@ -54,7 +54,7 @@ class DeckMesh:
     middles: Ints
     elements: dict[str, Ints]
     node_sets: dict[str, Ints]
-    surfaces: dict[str, Surface]
+    surfaces: dict[str, DeckSurface]
 
     def forces(self, of_dofs: Array) -> Array:
         """Nodal forces ``(n, 2)`` that do the work of those of the dofs."""
@@ -78,63 +78,94 @@ def surface_name(interaction: Interaction, side: int) -> str:
 
 def deck_mesh(system: System) -> DeckMesh:
     """The mesh of ``system``, of degree 2 and on one rank."""
-    problem, V = system.problem, system.V
-    mesh, kind, x = V.mesh, V.mesh.basix_cell(), V.tabulate_dof_coordinates()[:, :2]
-    corners, nodes = len(_EDGES[kind]), V.dofmap.list[:, _NODES[kind]].astype(np.int64)
-    one, two, last = (x[nodes[:, i]] for i in (0, 1, corners - 1))
-    clockwise = np.linalg.det(np.stack([two - one, last - one], axis=1)) < 0
-    turned = [0, *range(corners - 1, 0, -1), *range(2 * corners - 1, corners - 1, -1), 8][
-        : nodes.shape[1]
-    ]
-    nodes[clockwise] = nodes[clockwise][:, turned]
-    cells = {body.name: problem.mesh.cells_in(body.cells or body.name) for body in problem.bodies}
-    numbered = np.concatenate(list(cells.values()))
-    number = np.full(len(nodes), -1)
-    number[numbered] = np.arange(len(numbered))
-    bodies = {name: nodes[own, : 2 * corners] for name, own in cells.items()}
-    mesh.topology.create_connectivity(2, 1)
-    facets_of = mesh.topology.connectivity(2, 1).array.reshape(-1, corners)
-
-    def surface(name: str) -> Surface:
-        cell, facet = np.nonzero(
-            np.isin(facets_of, problem.mesh.facets_in(name)) & (number >= 0)[:, None]
-        )
-        edge = np.array(_EDGES[kind])[facet]
-        edge = np.where(clockwise[cell], corners - 1 - edge, edge)
-        along = np.stack([edge, (edge + 1) % corners, edge + corners], axis=1)
-        return Surface(number[cell], edge, nodes[cell[:, None], along])
-
-    names = [
-        name for i in problem.interactions for name in i.surfaces if not isinstance(name, Rigid)
-    ]
-    surfaces = {name: surface(name) for name in names}
-    node_sets = {s.facets: problem.mesh.dofs_in(V, s.facets) for s in problem.supports}
-    for i in problem.interactions:
-        if isinstance(disc := i.surfaces[0], Rigid):
-            start, end = x[surfaces[i.surfaces[1]].nodes[:, :2]].swapaxes(0, 1)
-            n = int(
-                np.ceil(2 * np.pi * disc.circle.radius / np.linalg.norm(end - start, axis=1).mean())
-            )
-            name, (rim, ring) = surface_name(i, 0), _ring(disc.circle, n)
-            ring, x, first = ring + len(x), np.concatenate([x, rim]), sum(map(len, bodies.values()))
-            bodies[name], node_sets[name] = ring, np.unique(ring)
-            surfaces[name] = Surface(
-                first + np.arange(n), np.ones(n, dtype=np.int64), ring[:, [1, 2, 5]]
-            )
-    used = np.unique(np.concatenate([own.ravel() for own in bodies.values()]))
+    problem = system.problem
+    cells = _Cells(system, {body.name: problem.cells_of(body) for body in problem.bodies})
+    x = cells.x
+    elements = dict(cells.elements)
+    surfaces = {}
+    node_sets = {}
+    for support in problem.supports:
+        node_sets[support.facets] = problem.mesh.dofs_in(system.V, support.facets)
+    for interaction in problem.interactions:
+        for given in interaction.surfaces:
+            if not isinstance(given, Rigid):
+                surfaces[given] = cells.surface(problem.mesh.facets_in(given))
+    for interaction in problem.interactions:
+        disc = interaction.surfaces[0]
+        if isinstance(disc, Rigid):
+            ends = x[surfaces[interaction.surfaces[1]].nodes[:, :2]]
+            length = np.linalg.norm(np.diff(ends, axis=1), axis=2).mean()
+            n = int(np.ceil(2 * np.pi * disc.circle.radius / length))
+            rim, ring = _ring(disc.circle, n)
+            ring += len(x)
+            x = np.concatenate([x, rim])
+            first = sum(map(len, elements.values()))
+            name = surface_name(interaction, 0)
+            elements[name] = ring
+            node_sets[name] = np.unique(ring)
+            edges = np.ones(n, dtype=np.int64)
+            surfaces[name] = DeckSurface(first + np.arange(n), edges, ring[:, [1, 2, 5]])
+    used = np.unique(np.concatenate([own.ravel() for own in elements.values()]))
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))
-    middles = nodes[numbered] if corners == 4 else np.zeros((0, 9), int)
-    elements = {name: place[own] for name, own in bodies.items()}
+    elements = {name: place[own] for name, own in elements.items()}
     node_sets = {name: place[own][place[own] >= 0] for name, own in node_sets.items()}
-    surfaces = {name: Surface(s.elements, s.edges, place[s.nodes]) for name, s in surfaces.items()}
-    return DeckMesh(x[used], used, middles, elements, node_sets, surfaces)
+    surfaces = {name: replace(s, nodes=place[s.nodes]) for name, s in surfaces.items()}
+    return DeckMesh(x[used], used, cells.middles, elements, node_sets, surfaces)
+
+
+class _Cells:
+    """The cells of a system as elements, and the surfaces that lie on them.
+
+    Attributes
+    ----------
+    x : array (n, 2)
+        The nodes, in the order of the system's block dofs.
+    elements : dict of arrays (m, 6 or 8)
+        Nodes of the elements, counterclockwise, by the names of bodies.
+    middles : array (m, 9)
+        The nodes of quadrilaterals, with the one in the middle; none of triangles.
+    """
+
+    def __init__(self, system: System, bodies: dict[str, Ints]) -> None:
+        V = system.V
+        mesh = V.mesh
+        kind = mesh.basix_cell()
+        self.x = V.tabulate_dof_coordinates()[:, :2]
+        self._edges = np.array(_EDGES[kind])
+        self._corners = corners = len(self._edges)
+        self._nodes = nodes = V.dofmap.list[:, _NODES[kind]].astype(np.int64)
+        one, two, last = np.moveaxis(self.x[nodes[:, [0, 1, corners - 1]]], 1, 0)
+        self._clockwise = np.linalg.det(np.stack([two - one, last - one], axis=1)) < 0
+        turned = [0, *range(corners - 1, 0, -1), *range(2 * corners - 1, corners - 1, -1), 8]
+        nodes[self._clockwise] = nodes[self._clockwise][:, turned[: nodes.shape[1]]]
+        numbered = np.concatenate(list(bodies.values()))
+        self._number = np.full(len(nodes), -1)  # of every cell's element
+        self._number[numbered] = np.arange(len(numbered))
+        self.elements = {name: nodes[own, : 2 * corners] for name, own in bodies.items()}
+        is_quadrilateral = kind == basix.CellType.quadrilateral
+        self.middles = nodes[numbered] if is_quadrilateral else np.zeros((0, 9), dtype=np.int64)
+        mesh.topology.create_connectivity(2, 1)
+        self._facets = mesh.topology.connectivity(2, 1).array.reshape(-1, corners)
+
+    def surface(self, facets: Ints) -> DeckSurface:
+        """The edges of elements that are these ``facets``."""
+        on_surface = np.isin(self._facets, facets) & (self._number >= 0)[:, None]
+        cell, facet = np.nonzero(on_surface)
+        edge = self._edges[facet]
+        edge = np.where(self._clockwise[cell], self._corners - 1 - edge, edge)
+        along = np.stack([edge, (edge + 1) % self._corners, edge + self._corners], axis=1)
+        return DeckSurface(self._number[cell], edge, self._nodes[cell[:, None], along])
 
 
 def _ring(circle: RigidCircle, n: int) -> tuple[Array, Ints]:
     """Nodes and ``n`` quadrilaterals of a ring below a circle, whose edges 1 lie on it."""
-    angle, k = np.pi * np.arange(2 * n) / n, 2 * np.arange(n)
-    ray, after = circle.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), (k + 2) % (2 * n)
-    x = circle.centre + np.concatenate([r * ray for r in (_RIM, (1 + _RIM) / 2, 1.0)])
-    nodes = [k, 4 * n + k, 4 * n + after, after, 2 * n + k, 4 * n + k + 1, 2 * n + after, k + 1]
-    return x, np.stack(nodes, axis=1)
+    angle = np.pi * np.arange(2 * n) / n
+    ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    radii = [circle.radius * part for part in (_RIM, (1 + _RIM) / 2, 1.0)]
+    x = circle.centre + np.concatenate([radius * ray for radius in radii])
+    begin = 2 * np.arange(n)
+    end = (begin + 2) % (2 * n)
+    corners = [begin, 4 * n + begin, 4 * n + end, end]
+    midpoints = [2 * n + begin, 4 * n + begin + 1, 2 * n + end, begin + 1]
+    return x, np.stack([*corners, *midpoints], axis=1)

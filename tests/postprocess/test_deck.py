@@ -4,6 +4,8 @@ joint."""
 from __future__ import annotations
 
 import math
+import shutil
+import subprocess
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -14,15 +16,33 @@ from mpi4py import MPI
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import areas
 from archord.cli import run
+from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.shapes.bushing import bushing
 from archord.materials.elasticity import Elastic
-from archord.postprocess.decks.deck import contact_stiffness, deck, system_of
+from archord.materials.kinematics import AXISYMMETRIC
+from archord.postprocess.decks.deck import (
+    _Writer,
+    contact_stiffness,
+    deck,
+    system_of,
+    thickness,
+)
 from archord.postprocess.decks.mesh import deck_mesh
 from archord.scene.file import resolved
 from archord.solver.path.system import System
-from archord.solver.problem import Body, DeadLoad, Dirichlet, Drive, Interaction, Mean, Problem
+from archord.solver.problem import (
+    Body,
+    DeadLoad,
+    Dirichlet,
+    Drive,
+    Interaction,
+    Mean,
+    Problem,
+    Rigid,
+)
 
+ccx = shutil.which("ccx")
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
 
@@ -312,6 +332,60 @@ def test_nodal_forces_on_quadrilaterals():
     prescribed = replace(problem, drives=[problem.drives[0], Drive("end", (0.0, 3.0))])
     with pytest.raises(ValueError, match="the mean displacement of 'end' cannot be exported"):
         deck(System(prescribed), mesh, [1.0])
+
+
+def tube(quads):
+    """A tube of radii 5 and 10 that is 8 long; held at its lower end, pulled along the axis at its
+    upper end by a force, and by a pressure-like load on it."""
+
+    def build(gmsh):
+        face = gmsh.model.occ.addRectangle(5, 0, 0, 5, 8)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [face], name="tube")
+        for line, name in ((1, "bottom"), (3, "top")):
+            gmsh.model.addPhysicalGroup(1, [line], name=name)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 2.0)
+
+    return Problem(
+        gmsh_to_mesh(MPI.COMM_SELF, build, quads=quads),
+        [Body("tube", Elastic(2e5, 0.3))],
+        supports=[Dirichlet("bottom", "bottom", 1), Dirichlet("top", "top", 1, 1.0, "pull")],
+        drives=[Drive("pull", (0.0, 4000.0, 8000.0), "force")],
+        kinematics="axisymmetric",
+    )
+
+
+@pytest.mark.parametrize("quads", [False, True])
+def test_a_ring_has_axisymmetric_elements_and_the_force_on_all_of_it(quads, tmp_path):
+    """CAX6 or CAX8 without a thickness; forces of the whole ring, as CalculiX takes them, and the
+    factor that takes what it prints, of a wedge of two degrees, to the whole."""
+    system = System(tube(quads))
+    mesh = deck_mesh(system)
+    found = read(deck(system, mesh, [1.0, 2.0], "tube"))
+    kinds = {parameters["TYPE"] for keyword, parameters, _ in found.blocks if keyword == "*ELEMENT"}
+    assert kinds == {"CAX8" if quads else "CAX6"}
+    assert [rows for keyword, _, rows in found.blocks if keyword == "*SOLID SECTION"] == [[]]
+    loads = [rows for keyword, _, rows in found.blocks if keyword == "*CLOAD"]
+    assert [float(force) for ((_, axis, force),) in loads if axis == "1"] == [4000.0, 8000.0]
+    assert "forces times 180.0 are those of the whole" in found.text
+    assert thickness(system.problem, mesh) == 1 / 180
+    if ccx is None:
+        pytest.skip("CalculiX is not installed (image target peers)")
+    (tmp_path / "tube.inp").write_text(found.text)
+    subprocess.run([ccx, "-i", "tube"], cwd=tmp_path, check=True, capture_output=True)
+    printed = (tmp_path / "tube.dat").read_text().splitlines()
+    area = math.pi * (10**2 - 5**2)
+    moved = [
+        float(line.split()[1]) for line in printed if line.split()[:1] == [str(len(mesh.x) + 1)]
+    ]
+    assert moved == pytest.approx([force * 8 / (2e5 * area) for force in (4000, 8000)], rel=1e-6)
+
+
+def test_a_rigid_disc_around_an_axis_is_refused():
+    disc = SimpleNamespace(surfaces=(Rigid(RigidCircle((0.0, 9.0), 1.0)), "top"))
+    problem = SimpleNamespace(kinematics=AXISYMMETRIC, interactions=[disc])
+    with pytest.raises(ValueError, match="a rigid disc cannot be exported around an axis"):
+        _Writer(SimpleNamespace(problem=problem), None)
 
 
 @pytest.mark.parametrize("unit", [1000.0, 1e-3])
