@@ -11,7 +11,7 @@ import ufl
 
 from archord.geometry.basis import cell_basis
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.solver.drives import LOAD_DEGREE
+from archord.solver.loads import LOAD_DEGREE
 
 _FEWEST = 6  # integration points in a core: half the points of a triangle
 

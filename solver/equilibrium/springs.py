@@ -132,9 +132,9 @@ class Springs:
 def _form(drives: Drives, body: Body, softest: float) -> fem.Form:
     """The bilinear form of the springs of a ``body``."""
     V = drives.V
-    dx = drives.measure(body.cells or body.name)
-    area = drives.integral(fem.Constant(V.mesh, 1.0) * dx)
+    dx = drives.loads.measure(body.cells or body.name)
+    area = drives.loads.integral(fem.Constant(V.mesh, 1.0) * dx)
     own = float(body.material.elastic_tangent[0, 0])
     modulus = fem.Constant(V.mesh, WEAK * spring_modulus(own, softest) / area)
     product = ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V))
-    return fem.form(modulus * drives.swept(product) * dx)
+    return fem.form(modulus * drives.loads.swept(product) * dx)
