@@ -196,7 +196,7 @@ class _Writer:
     def mesh_lines(self, heading: str) -> list[str]:
         """Nodes, elements, sets and surfaces."""
         mesh = self.mesh
-        whole = number(self.problem.symmetry / self.thick)
+        whole = number(self.problem.whole / self.thick)
         model = f"thickness {number(self.thick)}, forces"
         if not self.problem.kinematics.is_plane:
             model = "axisymmetric, printed forces"
