@@ -43,7 +43,8 @@ INNER = 1.0  # radii of the thick sphere and the thick cylinder
 OUTER = 2.0
 PRESSURE = 1e-3  # in elastic ones
 PLASTIC_RADIUS = 1.4  # up to which the thick sphere yields
-BALL = 20.0  # radius of the rigid ball, in contact radii
+BALL = 200.0  # radius of the rigid ball, in contact radii: Hertz neglects what is of the order a/R
+SMALL_BALL = 20.0  # and of the one that is pressed in deep
 FAR = 300.0  # radius of the half-space, in contact radii
 FINE_FORCE = 0.182372  # of the deep indentation: 8697 nodes, 40 steps
 
@@ -173,22 +174,23 @@ def _plastic_cylinder(run: archord.Run) -> Iterator[Compared]:
 # A rigid ball on a half-space
 
 
-def half_space_mesh(size: float, contact: float = 1.0) -> TaggedMesh:
-    """A quarter of a disc below y = 0, with elements of ``size`` up to 1.5 times the radius of the
-    ``contact`` and growing beyond."""
-    fine = 1.5 * contact
+def half_space_mesh(near: str, fine: float) -> TaggedMesh:
+    """A quarter of a disc below y = 0, with elements of the size ``near`` the ball up to the radius
+    ``fine``, growing beyond."""
     sketch = Sketch(["body"], ["surface", "axis", "far"])
     surface = sketch.path("body", (0.0, 0.0), (fine, 0.0), (FAR, 0.0))
     far = sketch.path("body", (FAR, 0.0), (0.0, -FAR), on=Circle("far", (0.0, 0.0), FAR))
     axis = sketch.path("body", (0.0, -FAR), (0.0, -fine), (0.0, 0.0))
     sketch.face("body", surface=surface, far=far, axis=axis)
     beyond = f"Sqrt(x*x + y*y) - {fine!r}"
-    sketch.sizes["body"] = f"{size!r} + 0.15 * ({beyond} + Abs({beyond}))"
+    sketch.sizes["body"] = f"{near} + 0.15 * ({beyond} + Abs({beyond}))"
     return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
-def _ball(mesh: TaggedMesh, material: Any, depth: float, steps: int) -> archord.Problem:
-    ball = archord.RigidCircle(np.array([0.0, BALL]), BALL)
+def _ball(
+    mesh: TaggedMesh, material: Any, radius: float, depth: float, steps: int
+) -> archord.Problem:
+    ball = archord.RigidCircle(np.array([0.0, radius]), radius)
     return _problem(
         mesh,
         material,
@@ -197,6 +199,10 @@ def _ball(mesh: TaggedMesh, material: Any, depth: float, steps: int) -> archord.
         loads=[archord.Load("ball", on="contact", direction="y", displacement=-depth)],
         steps=steps,
     )
+
+
+# finer where the contact ends
+_EDGE = "Min(0.02 + 0.1 * Sqrt((x - 1)^2 + y*y), 0.11)"
 
 
 def _hertz(run: archord.Run) -> Iterator[Compared]:
@@ -386,12 +392,12 @@ CASES = (
     ),
     Case(
         "rigid ball on a half-space",
-        lambda: _ball(half_space_mesh(0.075), _elastic(), 1 / BALL, 4),
+        lambda: _ball(half_space_mesh(_EDGE, 1.5), _elastic(), BALL, 1 / BALL, 4),
         _hertz,
     ),
     Case(
         "rigid ball deep in a half-space",
-        lambda: _ball(half_space_mesh(0.28, 4.0), _perfect(), 0.5, 20),
+        lambda: _ball(half_space_mesh("0.28", 6.0), _perfect(), SMALL_BALL, 0.5, 20),
         _indentation,
     ),
     Case("ring pressed on a shaft", _fit, _fitted),
