@@ -79,10 +79,12 @@ def chord_projection(
     as long as they carry pressure. Raises ValueError for arrays that are no such arc, and for
     pressure beyond pi/2.
     """
-    angle, p = (np.ravel(np.asarray(values, float)) for values in (phi, pressure))
+    angle = np.ravel(np.asarray(phi, float))
+    p = np.ravel(np.asarray(pressure, float))
     gap = np.diff(angle) * R
-    trapezoidal = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
-    measure = trapezoidal if weight is None else np.ravel(np.asarray(weight, float))
+    measure = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
+    if weight is not None:
+        measure = np.ravel(np.asarray(weight, float))
     if not (0 < eps < np.pi and 0 < R < np.inf):
         raise ValueError(
             f"the contact semi-angle {eps:g} must be between 0 and pi, the radius {R:g} positive."
@@ -94,13 +96,12 @@ def chord_projection(
             "phi must rise from the contact axis, from 0 or more, and the pressure must be finite."
         )
     kept = (angle <= eps) | (p != 0)
-    angle, p, measure = angle[kept], p[kept], measure[kept]
+    angle = angle[kept]
     if len(angle) and angle[-1] > np.pi / 2 * (1 + 1e-12):
         raise ValueError("the contact must end within pi/2 of the axis.")
     stretch = np.cos(eps / 2) / np.cos(angle - eps / 2) ** 2
-    return ChordPressure(
-        chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, eps, R
-    )
+    x = chord_coordinate(angle, eps, R)
+    return ChordPressure(x, p[kept] * np.cos(angle) / stretch, measure[kept] * stretch, eps, R)
 
 
 def read_chord_pressure(
@@ -113,7 +114,8 @@ def read_chord_pressure(
     there is no such run, step or side, no contact angle, or one beyond pi/2 (a ring).
     """
     run = Run(folder)
-    number, arc = run.number(step), run.arc(step, side)
+    number = run.number(step)
+    arc = run.arc(number, side)
     eps = run.curve.eps[number - 1]
     try:
         return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)

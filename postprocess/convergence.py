@@ -24,11 +24,9 @@ from archord.scene.scene import Scene
 Curve = Sequence[float] | np.ndarray
 
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
-_LOWEST, _HIGHEST = (
-    0.5,
-    2.0,
-)  # below, extrapolation multiplies noise; above, the error would be told too small
-_SHOWN = 0.05, 12.0  # orders that three meshes can show
+_LOWEST = 0.5  # below, extrapolation multiplies noise
+_HIGHEST = 2.0  # above, the error would be told too small
+_SHOWN = (0.05, 12.0)  # orders that three meshes can show
 _SLOWEST = 1.5  # order that `mesh_error` takes at least
 _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
 
@@ -45,12 +43,19 @@ def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> floa
     below 0.05 and inf above 12."""
     from scipy.optimize import brentq
 
-    h2, h3 = sizes[1] / sizes[0], sizes[2] / sizes[0]
+    h2 = sizes[1] / sizes[0]
+    h3 = sizes[2] / sizes[0]
     goal = coarser / finer
-    low, high = ((h3**p - h2**p) / (h2**p - 1) for p in _SHOWN)
-    if not low < goal < high:
-        return -math.inf if goal <= low else math.inf
-    return float(brentq(lambda p: (h3**p - h2**p) / (h2**p - 1) / goal - 1, *_SHOWN))
+
+    def quotient(p: float) -> float:
+        return (h3**p - h2**p) / (h2**p - 1)
+
+    low, high = map(quotient, _SHOWN)
+    if goal <= low:
+        return -math.inf
+    if goal >= high:
+        return math.inf
+    return float(brentq(lambda p: quotient(p) / goal - 1, *_SHOWN))
 
 
 class Order(NamedTuple):
@@ -80,12 +85,13 @@ class Refined:
         found = math.inf
         if len(curves) > 2:
             n = min(map(len, curves[:3]))
-            finer, coarser = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
+            fine, middle, coarse = (curve[:n] for curve in curves[:3])
+            finer = middle - fine
+            coarser = coarse - middle
             if finer @ coarser > 0:
                 sizes = [run.scene.joint.h for run in self.runs[:3]]
-                found = observed_order(
-                    sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser))
-                )
+                norms = [float(np.linalg.norm(apart)) for apart in (finer, coarser)]
+                found = observed_order(sizes, *norms)
         if not math.isfinite(found):
             return Order(_ASSUMED, f"{_ASSUMED:g} (assumed)")
         value = min(max(found, _LOWEST), _HIGHEST)
@@ -120,24 +126,14 @@ def group(runs: list[RunCurve]) -> list[Refined]:
 
 def _without_mesh(scene: Scene) -> tuple:
     """Everything of a scene but its element size and its words."""
-    g, analysis = scene.joint, scene.analysis
-    sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1])
-    bodies = scene.pin.model_dump_json(), scene.block.model_dump_json()
-    how = (
-        analysis.plane,
-        analysis.strain,
-        analysis.kinematics,
-        analysis.integration,
-        f"{analysis.friction:.9g}",
-    )
-    return (
-        *(f"{size:.9g}" for size in sizes),
-        *scene.load.stage_steps,
-        "to",
-        *scene.load.stages,
-        *bodies,
-        *how,
-    )
+    g = scene.joint
+    analysis = scene.analysis
+    sizes = [g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1]]
+    shown = [f"{size:.9g}" for size in (*sizes, analysis.friction)]
+    stages = (*scene.load.stage_steps, "to", *scene.load.stages)
+    bodies = (scene.pin.model_dump_json(), scene.block.model_dump_json())
+    how = (analysis.plane, analysis.strain, analysis.kinematics, analysis.integration)
+    return (*shown, *stages, *bodies, *how)
 
 
 def difference(one: Curve, other: Curve, largest: float) -> float:
@@ -164,8 +160,10 @@ def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST)
     p = highest
     if len(d) > 1 and d[-2] and d[-1]:
         p = min(highest, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
-    last = richardson(d[-1], ratio, p)
-    return max([last, *(richardson(b / ratio**_USUAL, ratio, _HIGHEST) for b in d[-2:-1])])
+    error = richardson(d[-1], ratio, p)
+    if len(d) > 1:
+        error = max(error, richardson(d[-2] / ratio**_USUAL, ratio, _HIGHEST))
+    return error
 
 
 def step_error(coarse: Curve, fine: Curve) -> float:

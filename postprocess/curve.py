@@ -46,10 +46,8 @@ class RunCurve:
     @property
     def sigY(self) -> float | None:
         """Yield stress of the weaker body; None if neither yields."""
-        return min(
-            (s.yield_stress for s in self.scene.solids.values() if s.yield_stress is not None),
-            default=None,
-        )
+        known = [solid.yield_stress for solid in self.scene.solids.values()]
+        return min((stress for stress in known if stress is not None), default=None)
 
     @property
     def plane(self) -> str:
@@ -71,13 +69,14 @@ class RunCurve:
 def on_first_loading(delta: Array, P: Array) -> np.ndarray:
     """Whether each of the steps ``(n,)`` is one of `RunCurve.loading`."""
     deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (delta, P))
-    first, going_on = [], True
-    for deeper, stronger in zip(
-        delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < P, strict=True
-    ):
-        going_on = bool(deeper and (going_on or stronger))
-        first.append(going_on)
-    return np.array(first, dtype=bool)
+    deeper = delta > deepest * (1 + 1e-9)
+    stronger = largest * (1 + _SAME) < P
+    first = np.zeros(len(delta), dtype=bool)
+    going_on = True
+    for k in range(len(delta)):
+        going_on = bool(deeper[k] and (going_on or stronger[k]))
+        first[k] = going_on
+    return first
 
 
 def first_loading(load: Array) -> slice:

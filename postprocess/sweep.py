@@ -6,6 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from archord.output.folder import is_sweep
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
@@ -28,11 +30,9 @@ class Sweep:
         self.folder = Path(folder)
         for name in ("sweep.toml", "cases.csv"):
             if not (self.folder / name).is_file():
-                cure = (
-                    f"; archord sweep {self.folder} --gather writes it"
-                    if is_sweep(self.folder)
-                    else ""
-                )
+                cure = ""
+                if is_sweep(self.folder):
+                    cure = f"; archord sweep {self.folder} --gather writes it"
                 raise InputError(
                     f"{self.folder}: is not the folder of a sweep: {name} is missing{cure}."
                 )
@@ -102,16 +102,8 @@ class Sweep:
         names = list(short.values())
         said = []
         for key, name in short.items():
-            value = row[key]
-            shown = (
-                "none"
-                if value != value
-                else f"{value:.6g}"
-                if isinstance(value, float)
-                else str(value)
-            )
             named = name if names.count(name) == 1 else key
-            said.append(f"{named} = {shown} {units.get(key, '')}".rstrip())
+            said.append(f"{named} = {_shown(row[key])} {units.get(key, '')}".rstrip())
         return ", ".join(said) or f"case {case}"
 
     @cached_property
@@ -126,3 +118,10 @@ class Sweep:
                 if status == "done":
                     faults[int(case)] = str(error)
         return found, faults
+
+
+def _shown(value: object) -> str:
+    """A value of a varied key; a missing one is no number."""
+    if isinstance(value, float):
+        return "none" if np.isnan(value) else f"{value:.6g}"
+    return str(value)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,17 +17,18 @@ from archord.measures.energies import ENERGIES
 from archord.output.user_file import check_target, writing
 from archord.postprocess.fields import Fields
 from archord.postprocess.pictures.pictures import panels_of
-from archord.postprocess.pictures.problems import draw_outline
+from archord.postprocess.pictures.problems import draw_outline, frame
 from archord.postprocess.run import Run
 from archord.postprocess.tables import (
     cost_of,
     facts_of,
     first_of_each_kind,
     history_table,
+    named_table,
     peaks_of,
+    spread,
 )
 from archord.report.figure import new_figure
-from archord.report.table import Table
 from archord.report.version import VERSION
 
 if TYPE_CHECKING:
@@ -74,13 +76,13 @@ def _text_of(run: Run) -> list[str]:
     lines += _listed(row for row in cost_of(run) if row[0] != "warning")
     warnings = first_of_each_kind(run.warnings)
     told = [("warning", warning) for warning in warnings[:_MOST_WARNINGS]]
-    if len(warnings) > _MOST_WARNINGS:
-        told.append(("", f"{len(warnings) - _MOST_WARNINGS} more in {run.folder / 'run.json'}"))
+    more = len(warnings) - len(told)
+    if more:
+        told.append(("", f"{more} more in {run.folder / 'run.json'}"))
     lines += ["", *_listed(told or [("warnings", "none")]), ""]
     table = history_table(run)
-    n = len(table.rows)
+    n = spread(table, _ROWS)
     if n > _ROWS:
-        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _ROWS)]
         lines += [f"{_ROWS} of {n} steps; {run.folder / 'history.csv'} has all of them", ""]
     return lines + table.within(_CHARACTERS).splitlines()
 
@@ -110,74 +112,65 @@ def _pages_of(run: Run) -> Iterator[Figure]:
 def _results_page(run: Run) -> Figure:
     """Field, contact pressure and forces, and how the solve converged."""
     figure = _page("results and convergence")
-    panels = [*panels_of(run), _iterations_panel(run), _balance_panel(run), _energy_panel(run)]
+    panels = [*panels_of(run)]
+    panels += [partial(draw, run) for draw in (_iterations_panel, _balance_panel, _energy_panel)]
     rows = (len(panels) + 1) // 2
     axes = figure.subplots(rows, 2, squeeze=False).ravel()
     for place, draw in zip(axes, panels, strict=False):
         draw(place)
-        title = [
-            part for line in place.get_title().splitlines() for part in textwrap.wrap(line, _TITLE)
-        ]
+        title = [textwrap.fill(line, _TITLE) for line in place.get_title().splitlines()]
         place.set_title("\n".join(title), fontsize="medium")
     for place in axes[len(panels) :]:
         place.set_axis_off()
     return figure
 
 
-def _iterations_panel(run: Run) -> Any:
-    def draw(axes: Any) -> None:
-        steps = run.columns["step"]
-        axes.bar(steps, run.columns["iterations"], color="tab:blue", label="Newton iterations")
-        if any(run.columns["cutbacks"]):
-            axes.plot(steps, run.columns["cutbacks"], "o", color="tab:red", label="cutbacks")
-        totals = run.summary["totals"]
-        said = f"{totals.get('newton_iterations', 0):g} iterations, {totals.get('cutbacks', 0):g} cutbacks"
-        axes.set(xlabel="step", ylabel="number", title=said)
+def _iterations_panel(run: Run, axes: Any) -> None:
+    steps = run.columns["step"]
+    axes.bar(steps, run.columns["iterations"], color="tab:blue", label="Newton iterations")
+    if any(run.columns["cutbacks"]):
+        axes.plot(steps, run.columns["cutbacks"], "o", color="tab:red", label="cutbacks")
+    totals = run.summary["totals"]
+    iterations = f"{totals.get('newton_iterations', 0):g} iterations"
+    axes.set(xlabel="step", ylabel="number")
+    axes.set(title=f"{iterations}, {totals.get('cutbacks', 0):g} cutbacks")
+    _finish(axes)
+
+
+def _balance_panel(run: Run, axes: Any) -> None:
+    steps = run.columns["step"]
+    balance = np.abs(np.nan_to_num(run.columns.get("force_balance", [0.0] * run.steps)))
+    residuals = [_last_residual(step) for step in run.summary["steps"]]
+    curves = {"force balance": balance, "last residual": residuals[: run.steps]}
+    for name, values in curves.items():
+        shown = [value if value else np.nan for value in values]
+        if np.isfinite(shown).any():
+            axes.semilogy(steps[: len(shown)], shown, ".-", label=name)
+    estimates = run.summary.get("error_estimates", {})
+    known = {name: estimates.get(name) for name in _BALANCES}
+    told = [
+        f"{name.replace('_', ' ')} {value:.1e}"
+        for name, value in known.items()
+        if value is not None
+    ]
+    axes.set(xlabel="step", ylabel="relative error", title=", ".join(told))
+    _finish(axes)
+
+
+def _energy_panel(run: Run, axes: Any) -> None:
+    for name in ("work", *ENERGIES):
+        if name in run.columns:
+            values = run.columns[name]
+            axes.plot(run.columns["step"], values, ".-", label=name.replace("_", " "))
+    unit = run.units.get("work", "-")
+    axes.set(xlabel="step", ylabel=f"energy [{unit}]", title="energy balance")
+    _finish(axes)
+
+
+def _finish(axes: Any) -> None:
+    if axes.get_legend_handles_labels()[1]:
         axes.legend(frameon=False, fontsize="small")
-        axes.grid(alpha=0.3)
-
-    return draw
-
-
-def _balance_panel(run: Run) -> Any:
-    def draw(axes: Any) -> None:
-        steps = run.columns["step"]
-        balance = np.abs(np.nan_to_num(run.columns.get("force_balance", [0.0] * run.steps)))
-        residuals = [_last_residual(step) for step in run.summary["steps"]]
-        curves = {"force balance": balance, "last residual": residuals[: run.steps]}
-        for name, values in curves.items():
-            shown = [value if value else np.nan for value in values]
-            if np.isfinite(shown).any():
-                axes.semilogy(steps[: len(shown)], shown, ".-", label=name)
-        estimates = run.summary.get("error_estimates", {})
-        told = [
-            f"{name.replace('_', ' ')} {estimates[name]:.1e}"
-            for name in _BALANCES
-            if estimates.get(name) is not None
-        ]
-        axes.set(xlabel="step", ylabel="relative error")
-        axes.set_title(", ".join(told))
-        if axes.lines:
-            axes.legend(frameon=False, fontsize="small")
-        axes.grid(alpha=0.3)
-
-    return draw
-
-
-def _energy_panel(run: Run) -> Any:
-    def draw(axes: Any) -> None:
-        for name in ("work", *ENERGIES):
-            if name in run.columns:
-                axes.plot(
-                    run.columns["step"], run.columns[name], ".-", label=name.replace("_", " ")
-                )
-        axes.set(
-            xlabel="step", ylabel=f"energy [{run.units.get('work', '-')}]", title="energy balance"
-        )
-        axes.legend(frameon=False, fontsize="small")
-        axes.grid(alpha=0.3)
-
-    return draw
+    axes.grid(alpha=0.3)
 
 
 def _last_residual(step: dict[str, Any]) -> float:
@@ -192,17 +185,16 @@ def _draw_mesh(axes: Any, run: Run, fields: Fields) -> None:
     from matplotlib import colormaps
     from matplotlib.collections import PolyCollection
 
-    x, corners = fields.coordinates, 3 if fields.cells.shape[1] == 6 else 4
+    corners = 3 if fields.cells.shape[1] == 6 else 4
     for k, (name, tag) in enumerate(fields.bodies.items()):
-        cells = x[fields.cells[fields.body == tag][:, :corners]]
+        cells = fields.coordinates[fields.cells[fields.body == tag][:, :corners]]
+        style = {"edgecolors": "0.5", "linewidths": 0.2, "label": name}
         tint = colormaps["Pastel2"](k % 8)
-        axes.add_collection(
-            PolyCollection(cells, facecolors=[tint], edgecolors="0.5", linewidths=0.2, label=name)
-        )
-    draw_outline(axes, fields, x, color="black", lw=0.8)
+        axes.add_collection(PolyCollection(cells, facecolors=[tint], **style))
+    draw_outline(axes, fields, fields.coordinates, color="black", lw=0.8)
     axes.autoscale_view()
-    length = run.scene.units.length
-    axes.set(aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]", title="mesh")
+    frame(axes, run)
+    axes.set(title="mesh")
     axes.legend(frameon=False, fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
@@ -222,13 +214,7 @@ def _foot(figure: Figure, run: Run, number: int, of: int) -> None:
 
 def _listed(rows: Iterable[tuple[str, str]]) -> list[str]:
     """Text behind names, wrapped."""
-    table = Table("", "", left=2)
-    for name, text in rows:
-        first, *more = textwrap.wrap(text, _CHARACTERS - 26, break_long_words=True) or [""]
-        table.add(name[:24], first)
-        for line in more:
-            table.add("", line)
-    return str(table).splitlines()
+    return str(named_table(rows, _CHARACTERS - 26, 24, cut=True)).splitlines()
 
 
 def _wrapped(text: str) -> list[str]:
