@@ -17,7 +17,16 @@ class JointView(ProblemView):
     needed = (*CURVES, "delta/dR", "P/(E* R)", "p0/E*")
     sides = ("pin", "hole")
     has_contact = True
-    forces = pulls = {"P": "P"}  # type: ignore[assignment]
+
+    @property
+    def forces(self) -> dict[str, str]:
+        """The column of the force on the joint."""
+        return {"P": "P"}
+
+    @property
+    def pulls(self) -> dict[str, str]:
+        """The same."""
+        return self.forces
 
     def facts(self) -> Iterator[tuple[str, str]]:
         """The joint, its analysis and its bodies."""

@@ -145,11 +145,9 @@ def margins(
             raise InputError(f"{name} {value:g}: must be a positive number.")
     lugs = _lugs_of(run)
     if plate not in lugs:
-        fault = (
-            "is for a clevis, and this run is one of a lug"
-            if "" in lugs
-            else "must be inner or outer"
-        )
+        fault = "must be inner or outer"
+        if "" in lugs:
+            fault = "is for a clevis, and this run is one of a lug"
         raise InputError(f"--plate {plate!r}: {fault}.")
     lug = lugs[plate]
     strengths = _strengths(run, lug.body, proof, tensile)
@@ -186,7 +184,8 @@ def _by_elements(
         notes.append("the lug yields within the first step: shorter steps tell at what force")
     if breaks is None:
         notes.append(
-            "no PEEQ is known at which the lug breaks, as its curve has no end: give --ultimate-peeq"
+            "no PEEQ is known at which the lug breaks, as its curve has no end: give "
+            "--ultimate-peeq"
         )
     else:
         limits.append(("ultimate", f"PEEQ of {breaks:.3g}", breaks))
@@ -205,7 +204,8 @@ def _by_elements(
 def by_hand(lug: LugShape, strength: float, thickness: float) -> dict[str, float]:
     """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin
     or the bushing."""
-    edge, bore = lug.arguments()["edge_distance"], lug.hole
+    edge = lug.arguments()["edge_distance"]
+    bore = lug.hole
     bearing = bore if lug.wall else lug.radius
     planes = 2 * (edge - bore * math.cos(_SPREAD))
     return {
@@ -236,8 +236,8 @@ def load_at(force: Array, peeq: Array, limit: float) -> tuple[float, bool]:
 def proof_strength(solid: Solid) -> float:
     """The engineering stress at a plastic strain of 0.2 %, or first yield where that is higher, as
     with a plateau."""
-    law, first = solid.law, float(solid.yield_stress or 0.0)
-    true = float(law.stress(np.array([PROOF]))[0])
+    first = float(solid.yield_stress or 0.0)
+    true = float(solid.law.stress(np.array([PROOF]))[0])
     return max(first, true * math.exp(-PROOF - true / solid.E))
 
 
@@ -256,20 +256,19 @@ def _strengths(
     if plate.yield_stress is None:
         if proof is None and tensile is None:
             raise InputError(
-                f"{run.folder}: the lug is elastic: it has no yield; give --proof and --tensile for the hand formulas, "
-                "or solve with a yield_stress."
+                f"{run.folder}: the lug is elastic: it has no yield; give --proof and --tensile "
+                "for the hand formulas, or solve with a yield_stress."
             )
         said = {"yield": proof, "ultimate": tensile}
         return {kind: (value, "given") for kind, value in said.items() if value is not None}
     if plate.back_stresses and (proof is None or tensile is None):
         raise InputError(
-            f"{run.folder}: the lug has back stresses, of which no tension test is known here; give --proof and "
-            "--tensile."
+            f"{run.folder}: the lug has back stresses, of which no tension test is known here; "
+            "give --proof and --tensile."
         )
-    found = {"yield": (proof, "given")} if proof else {}
-    found = found or {
-        "yield": (proof_strength(plate), "at 0.2 % plastic strain of the run's curve")
-    }
+    found = {"yield": (proof_strength(plate), "at 0.2 % plastic strain of the run's curve")}
+    if proof:
+        found["yield"] = (proof, "given")
     highest = "the largest engineering stress of the run's curve"
     if plate.perfectly_plastic:
         highest = "the yield stress, as the run is perfectly plastic; --tensile gives another"
@@ -293,18 +292,19 @@ def _lugs_of(run: Run) -> dict[str, _Lug]:
     kind = getattr(shape, "kind", "")
     if kind not in ("lug", "clevis"):
         raise InputError(
-            f"{run.folder}: is no run of a [lug] or a [clevis], whose sections the hand formulas know."
+            f"{run.folder}: is no run of a [lug] or a [clevis], whose sections the hand formulas "
+            "know."
         )
     run.number(None)
-    lugs = (
-        {"": _lug_of(run)}
-        if kind == "lug"
-        else {name: _plate_of(run, name) for name in ("inner", "outer")}
-    )
+    if kind == "lug":
+        lugs = {"": _lug_of(run)}
+    else:
+        lugs = {name: _plate_of(run, name) for name in ("inner", "outer")}
     for lug in lugs.values():
         if max(run.columns[f"{lug.pull} force"]) <= 0:
             raise InputError(
-                f"{run.folder}: the pin never pulls at the lug's end: the force of {lug.pull!r} is never above 0."
+                f"{run.folder}: the pin never pulls at the lug's end: the force of {lug.pull!r} is "
+                "never above 0."
             )
     return lugs
 
@@ -315,31 +315,36 @@ def _lug_of(run: Run) -> _Lug:
     if len(pulls) != 1 or len(run.scene.load) != 1:
         names = ", ".join(load.name for load in run.scene.load)
         raise InputError(
-            f"{run.folder}: is loaded by {names}; the hand formulas are for one load along the lug, in x."
+            f"{run.folder}: is loaded by {names}; the hand formulas are for one load along the "
+            "lug, in x."
         )
-    unit = run.units[f"{pulls[0]} force"]
-    return _Lug(
-        run.scene.mesh.shape, _body_of(run, "lug"), pulls[0], run.scene.thickness, 1.0, unit
-    )
+    pull = pulls[0]
+    unit = run.units[f"{pull} force"]
+    body = _body_of(run, "lug")
+    return _Lug(run.scene.mesh.shape, body, pull, run.scene.thickness, 1.0, unit)
 
 
 def _plate_of(run: Run, name: str) -> _Lug:
     """The inner or the outer plate of a run of a [clevis]; its columns of forces are per unit of
     its thickness. Raises `InputError`."""
-    pull, shape = f"{name} pull", run.scene.mesh.shape
+    pull = f"{name} pull"
+    shape = run.scene.mesh.shape
     drawn = getattr(shape, name)
     if {load.name for load in run.scene.load} != {"inner pull", "outer pull"}:
         raise InputError(
-            f"{run.folder}: margins of a clevis are for its loads 'inner pull' and 'outer pull' alone."
+            f"{run.folder}: margins of a clevis are for its loads 'inner pull' and 'outer pull' "
+            "alone."
         )
     if drawn.thickness is None:
         raise InputError(
-            f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it again."
+            f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it "
+            "again."
         )
     number = {"inner": 1, "outer": 2}[name]
     together = number * drawn.thickness
     lug = LugShape(radius=shape.radius, clearance=shape.clearance, **drawn.outline(shape))
-    return _Lug(lug, _body_of(run, name), pull, together, together, run.scene.units.force_of(1.0))
+    unit = run.scene.units.force_of(1.0)
+    return _Lug(lug, _body_of(run, name), pull, together, together, unit)
 
 
 def _body_of(run: Run, cells: str) -> Any:
@@ -348,9 +353,9 @@ def _body_of(run: Run, cells: str) -> Any:
 
 def margin_text(found: Margins) -> str:
     """The margins as tables, with the assumptions."""
-    ultimate = (
-        f", ultimate load {found.load * found.factor:g} {found.unit}" if found.factor != 1 else ""
-    )
+    ultimate = ""
+    if found.factor != 1:
+        ultimate = f", ultimate load {found.load * found.factor:g} {found.unit}"
     title = f"{found.plate} plate: " if found.plate else ""
     lines = [f"{title}load {found.load:g} {found.unit}{ultimate}; MS = allowable / applied - 1"]
     for kind, (strength, source) in found.strengths.items():
@@ -363,11 +368,13 @@ def margin_text(found: Margins) -> str:
         table.add(check.kind, check.by, check.name, f"{above}{check.allowable:.6g}", margin)
     lines += ["", str(table), ""]
     for kind in ("yield", "ultimate"):
-        hand, fe = found.weakest(kind, "hand"), _compared(found, kind)
+        hand = found.weakest(kind, "hand")
+        fe = _compared(found, kind)
         if hand and fe and not fe.bound:
             off = fe.allowable / hand.allowable - 1
             lines.append(
-                f"{kind}: by hand {hand.name} is the weakest; finite elements ({fe.name}) are {off:+.1%} off it"
+                f"{kind}: by hand {hand.name} is the weakest; finite elements ({fe.name}) are "
+                f"{off:+.1%} off it"
             )
     return "\n".join([*lines, *(f"note: {note}" for note in found.notes)])
 
@@ -375,6 +382,5 @@ def margin_text(found: Margins) -> str:
 def _compared(found: Margins, kind: str) -> StrengthCheck | None:
     """The criterion of finite elements beside a hand formula: the last, as first yield is none of a
     section."""
-    return next(
-        (check for check in reversed(found.checks) if (check.kind, check.by) == (kind, "FE")), None
-    )
+    by_elements = [check for check in found.checks if (check.kind, check.by) == (kind, "FE")]
+    return by_elements[-1] if by_elements else None

@@ -52,7 +52,8 @@ def fault_of(folder: Path, name: str, seals: Seals, *, by_size: bool = False) ->
     try:
         size = path.stat().st_size
         if size != seal["bytes"]:
-            return f"has {size} bytes, not the {seal['bytes']} of run.json: it was changed or cut short after the run"
+            known = f"has {size} bytes, not the {seal['bytes']} of run.json"
+            return f"{known}: it was changed or cut short after the run"
         if not by_size and _seal(path) != seal:
             return "was changed after the run: its sha256 is not the one in run.json"
     except OSError as error:

@@ -29,8 +29,9 @@ def step_grid(
     topology, _ = CELLS[per_cell]
     connectivity = _data(f"{n_cells} {per_cell}", 0, "mesh/cells", "Int")
     points = _data(in_space, 0, "mesh/coordinates")
+    attributes = f'TopologyType="{topology}" NumberOfElements="{n_cells}"'
     lines = [
-        f'<Topology TopologyType="{topology}" NumberOfElements="{n_cells}">{connectivity}</Topology>',
+        f"<Topology {attributes}>{connectivity}</Topology>",
         f'<Geometry GeometryType="XYZ">{points}</Geometry>',
         _attribute("displacement", "Vector", "Node", _data(in_space, step, "displacement")),
     ]

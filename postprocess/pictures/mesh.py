@@ -21,48 +21,50 @@ from archord.report.table import Table
 def mesh_text(name: str, mesh: PlaneMesh) -> str:
     """What is in ``mesh``, in tables with a row a set; warnings come last."""
     area = areas(mesh)
-    size, low = np.ptp(mesh.x, axis=0), mesh.x.min(axis=0)
-    extent = f"{size[0]:g} by {size[1]:g} from ({low[0]:g}, {low[1]:g})"
-    head = f"{name}: {len(mesh.cells)} {mesh.kind.name}s of order {mesh.order}, {len(mesh.x)} nodes, {extent}"
+    width, height = np.ptp(mesh.x, axis=0)
+    left, low = mesh.x.min(axis=0)
+    kind = f"{mesh.kind.name}s of order {mesh.order}"
+    extent = f"{width:g} by {height:g} from ({left:g}, {low:g})"
+    head = f"{name}: {len(mesh.cells)} {kind}, {len(mesh.x)} nodes, {extent}"
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
     bodies = Table("cell set", "cells", "area", "parts", left=1)
     for name, inside in cells.items():
-        bodies.add(
-            name,
-            inside.sum(),
-            f"{area[inside].sum():.6g}",
-            parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1,
-        )
+        n_parts = parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1
+        bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", n_parts)
     facets = Table("facet set", "of", "circle", "facets", "length", "shortest", "longest", left=3)
     for name, tags in mesh.facet_sets.items():
         facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
-    points = Table(
-        "point set",
-        "nodes",
-        left=1,
-        rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()),
-    )
+    points = Table("point set", "nodes", left=1)
+    for name, nodes in mesh.point_sets.items():
+        points.add(name, len(nodes))
     doubts = [*mesh.notes, *distorted(mesh)]
-    doubts += [said for name, inside in cells.items() for said in cracks(mesh, name, inside)]
-    warnings = [f"warning: {said}" for said in doubts]
-    tables = [str(table) for table in (bodies, facets, points) if table.rows]
-    return "\n\n".join([head, *tables, *filter(None, ["\n".join(warnings)])])
+    for name, inside in cells.items():
+        doubts += cracks(mesh, name, inside)
+    parts_of_text = [head]
+    parts_of_text += [str(table) for table in (bodies, facets, points) if table.rows]
+    if doubts:
+        parts_of_text.append("\n".join(f"warning: {said}" for said in doubts))
+    return "\n\n".join(parts_of_text)
 
 
 def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarray]) -> list[object]:
+    """Owners, circle, number, length, shortest and longest of the ``edges`` of a set."""
     nodes, count = np.unique(edges[:, :2], return_counts=True)
     behind = sides_between(mesh.kind, mesh.cells, edges[:, :2]) // n_corners(mesh.kind)
     owners = ", ".join(name for name, inside in cells.items() if inside[behind].any())
     ends = Curve(mesh.x, edges.shape[1] - 1, along(edges)).arc_length(np.array([0.0, 1.0]))
-    length, circle = np.diff(ends)[:, 0], circle_through(mesh.x[nodes]) if len(nodes) else None
-    said = ["closed"] if len(nodes) and (count == 2).all() else []
-    if circle:
-        (x, y), radius = circle[0].round(9) + 0.0, circle[1]
-        straight = (
-            [f"sagitta {length.max() ** 2 / (8 * radius):.2g}"] if edges.shape[1] == 2 else []
-        )
-        said = [f"({x:.5g}, {y:.5g}) R {radius:.8g}", *straight, *said]
-    sizes = length.sum(), length.min(initial=np.inf), length.max(initial=0.0)
+    length = np.diff(ends)[:, 0]
+    said = []
+    circle = circle_through(mesh.x[nodes]) if len(nodes) else None
+    if circle is not None:
+        centre, radius = circle
+        x, y = centre.round(9) + 0.0
+        said.append(f"({x:.5g}, {y:.5g}) R {radius:.8g}")
+        if edges.shape[1] == 2:
+            said.append(f"sagitta {length.max() ** 2 / (8 * radius):.2g}")
+    if len(nodes) and (count == 2).all():
+        said.append("closed")
+    sizes = [length.sum(), length.min(initial=np.inf), length.max(initial=0.0)]
     return [owners, ", ".join(said), len(edges), *(f"{value:.5g}" for value in sizes)]
 
 

@@ -207,7 +207,8 @@ def _page(title: str) -> Figure:
 
 def _foot(figure: Figure, run: Run, number: int, of: int) -> None:
     when = datetime.now(UTC).strftime("%Y-%m-%d")
-    said = f"archord {run.summary['versions'].get('archord', '?')}, report by {VERSION}, {when}; {run.folder}"
+    solved_by = run.summary["versions"].get("archord", "?")
+    said = f"archord {solved_by}, report by {VERSION}, {when}; {run.folder}"
     figure.text(_MARGIN, 0.015, said, fontsize=_SMALL, color="0.4")
     figure.text(1 - _MARGIN, 0.015, f"{number} / {of}", fontsize=_SMALL, color="0.4", ha="right")
 
