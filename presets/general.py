@@ -71,7 +71,7 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         profiles=partial(surface_profiles, system),
         fixed=("s", "weight", "X"),
         per_step=(*per_step(system), "slip"),
-        balance=_balance_of(scene),
+        balance=_balance_of(scene, system.problem.kinematics.axes),
         facts=partial(_facts, scene, system, file),
         warnings=warnings,
         checks=step_checks(scene, system),
@@ -84,7 +84,9 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
 def _last_columns(scene: ProblemScene, system: System) -> list[Column]:
     """The energies of the whole, and what a step cost."""
     energies = ENERGIES if system.contact.has_friction else ENERGIES[:2]
-    unit = scene.units.energy_of(scene.analysis.thickness)
+    kinematics = system.problem.kinematics
+    thickness = scene.analysis.thickness if kinematics.is_plane else 1.0
+    unit = scene.units.energy_of(thickness)
     of_whole = [column(name, unit) for name in (*energies, "work")]
     cost = [column("iterations"), column("cutbacks"), column("seconds", "s")]
     return [*of_whole, column("force_balance"), *cost]
@@ -97,10 +99,11 @@ def _driven(system: System, names: Sequence[str]) -> Driven:
     return q[loads], force[loads]
 
 
-def _balance_of(scene: ProblemScene) -> Callable[[Accepted, Values], float]:
+def _balance_of(scene: ProblemScene, axes: Sequence[str]) -> Callable[[Accepted, Values], float]:
     """How far forces are from balance, over the largest force of the run so far."""
-    forces = [(f"{name} x", f"{name} y") for name in supporting(scene)]
-    forces += [(f"{part.name} force x", f"{part.name} force y") for part in scene.interaction]
+    names = [f"{name} " for name in supporting(scene)]
+    names += [f"{part.name} force " for part in scene.interaction]
+    forces = [(name + axes[0], name + axes[1]) for name in names]
 
     def balance(state: Accepted, values: Values) -> float:
         before = [np.hypot(m[x], m[y]) for m in state.before for x, y in forces]

@@ -22,33 +22,37 @@ def part_columns(scene: ProblemScene) -> Iterator[Column]:
     """The columns of loads, supports, interactions and bodies of ``scene``, in order."""
     units = scene.units
     length = units.length
-    thickness = scene.analysis.thickness
-    force = units.force_of(thickness)
-    moment = units.energy_of(thickness)
-    area = f"{length}{3 if thickness else 2}"  # displaced, over the thickness a volume
+    ring = scene.analysis.plane == "axisymmetric"
+    whole = ring or scene.analysis.thickness is not None
+    force = units.force_of(1.0 if whole else None)
+    moment = units.energy_of(1.0 if whole else None)
+    volume = f"{length}{3 if whole else 2}"  # displaced; per unit thickness an area
+    axes = "rz" if ring else "xy"
     for load in scene.load:
         moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)
         if load.kind == "pressure":
-            moved, by = area, units.stress
+            moved, by = volume, units.stress
         yield "load", load.name, "displacement", moved
         yield "load", load.name, "force", by
     couplings = {coupling.name for coupling in scene.coupling}
+    turned = {} if ring else {"moment": moment}  # a ring has none
     for name in supporting(scene):
         section = "coupling" if name in couplings else "support"
-        for what, unit in (("x", force), ("y", force), ("moment", moment)):
+        for what, unit in (dict.fromkeys(axes, force) | turned).items():
             yield section, name, what, unit
+    places = [f"at {axis}" for axis in axes]
+    touching = {"contact area": f"{length}2"} if ring else {"contact length": length}
     for interaction in scene.interaction:
-        pressed = {"force x": force, "force y": force, "largest pressure": units.stress}
-        placed = dict.fromkeys(("at x", "at y", "contact length", "largest slip"), length)
-        rubbed = {"moment": moment, "largest shear": units.stress}
-        if not interaction.has_friction:
-            rubbed = {}
-        of_law = interaction.quantities
-        for what, unit in (pressed | placed | {"arcs": ""} | rubbed | of_law).items():
+        measured = {f"force {axis}": force for axis in axes}
+        measured |= {"largest pressure": units.stress} | dict.fromkeys(places, length)
+        measured |= touching | {"largest slip": length, "arcs": ""}
+        if interaction.has_friction:
+            measured |= turned | {"largest shear": units.stress}
+        for what, unit in (measured | interaction.quantities).items():
             yield "interaction", interaction.name, what, unit
     for body in scene.body:
         if body.plastic:
-            for what, unit in (("peeq_max", ""), ("at x", length), ("at y", length)):
+            for what, unit in ({"peeq_max": ""} | dict.fromkeys(places, length)).items():
                 yield "body", body.name, what, unit
 
 

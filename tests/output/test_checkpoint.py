@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.measures.energies import Work
+from archord.measures.record import Record
 from archord.output import checkpoint
 from archord.scene.errors import InputError
 from archord.solver.path.load_path import Position
@@ -129,3 +130,19 @@ def test_whatever_is_damaged_is_refused(pressed, tmp_path):
             assert len(str(error.value).splitlines()) == 1
     path.write_bytes(whole)
     assert checkpoint.read(path).scalars == json.loads(json.dumps(pressed.scalars))
+
+
+def test_files_hold_a_joint_s_record_as_format_1_does(pressed):
+    """Side by side, as runs of version 0.2 have it, and PEEQ with its place by body."""
+    told = pressed.scalars["measures"]
+    numbers = {"delta", "P", "p0", "eps", "contact_area", "peeq_max", "peeq_integral", "work"}
+    energies = {"elastic_energy", "plastic_dissipation", "friction_dissipation"}
+    cost = {"step", "iterations", "cutbacks", "seconds"}
+    assert told.keys() == numbers | energies | cost | {"force_balance", "peeq"}
+    assert told["peeq"].keys() == {"pin", "block", "contact"}
+    record = Record.read(told)
+    assert record.at == record["delta"] == told["delta"]
+    assert record["block at y"] == told["peeq"]["block"][2]
+    assert record.plain() == told
+    del told["peeq"]  # as version 0.1
+    assert Record.read(told).plain() == told | {"peeq": {}}
