@@ -1,7 +1,5 @@
 """What every benchmark is made of: cases, the joint that they vary, ranks that take turns."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from archord.benchmarks.case import (
@@ -31,7 +29,7 @@ def test_a_variation_changes_what_it_names_and_nothing_else():
 def test_joints_are_compared_per_thickness():
     """What has no units is the same of a joint ten times as thick, whose force is ten times as
     large."""
-    thin, thick = (SimpleNamespace(P=P, p0=0.5, eps=1.0, delta=0.01) for P in (2.0, 20.0))
+    thin, thick = ({"P": P, "p0": 0.5, "eps": 1.0, "delta": 0.01} for P in (2.0, 20.0))
     scene = paper_joint()
     assert quantities(varied(scene, analysis={"thickness": 10.0}), thick) == quantities(scene, thin)
 
