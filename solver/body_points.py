@@ -95,7 +95,7 @@ class BodyPoints:
 
     def fields(self) -> PointFields:
         """The fields at the last update."""
-        n, q = self.weight.shape
+        shape = self.weight.shape
         trial = self.points.trial
         stress = self.points.material.true_stress(self.strain, self.stress, trial)
         plastic_strain = getattr(trial, "plastic_strain", np.zeros_like(stress))
@@ -103,7 +103,7 @@ class BodyPoints:
             self.cells,
             self.point,
             self.weight,
-            stress.reshape(n, q, -1),
-            plastic_strain.reshape(n, q, -1),
-            self.points.peeq.reshape(n, q),
+            stress.reshape(*shape, stress.shape[1]),
+            plastic_strain.reshape(*shape, plastic_strain.shape[1]),
+            self.points.peeq.reshape(shape),
         )
