@@ -16,11 +16,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.output.files.step_file import times
-from archord.output.files.xdmf import CELLS
-from archord.output.folder import claim_folder
-from archord.output.user_file import check_target, writing
-from archord.postprocess.run import Run
-from archord.postprocess.vtkhdf import (
+from archord.output.files.vtkhdf import (
     LINE,
     SECOND_ORDER,
     VERTEX,
@@ -28,6 +24,10 @@ from archord.postprocess.vtkhdf import (
     Grid,
     write_vtkhdf,
 )
+from archord.output.files.xdmf import CELLS
+from archord.output.folder import claim_folder
+from archord.output.user_file import check_target, writing
+from archord.postprocess.run import Run
 
 _OF_CONTACT = ("pressure", "raw_pressure", "gap", "angle", "s")
 

@@ -14,7 +14,7 @@ from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
 from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
-from archord.postprocess.problem_view import ProblemView
+from archord.presets.views import ProblemView
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from archord.output.history import fault_of_history, read_history
 from archord.postprocess.arc import read_contact
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
-from archord.postprocess.joint_view import view_of
 from archord.postprocess.probe import Probe, probe
+from archord.presets.views import view_of
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
 

@@ -12,11 +12,10 @@ from archord.materials.material import Array
 from archord.output.user_file import writing
 from archord.postprocess.comparison import curves_of
 from archord.postprocess.curve import first_loading
-from archord.postprocess.joint_view import JointView
 from archord.postprocess.pictures import joint, problems
 from archord.postprocess.probe import Probe
-from archord.postprocess.problem_view import ProblemView
 from archord.postprocess.run import Run
+from archord.presets.views import JointView, ProblemView
 from archord.report.figure import new_figure, save
 from archord.scene.errors import InputError
 

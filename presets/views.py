@@ -1,10 +1,14 @@
-"""What tables, pictures and exports must know of the runs of a general scene."""
+"""What tables, pictures and exports must know of a kind of runs: of general scenes, and of a
+[joint], with its one force and its arcs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
+from archord.scene.scene import Scene
+
+_CURVES = ("delta", "P", "p0", "eps", "peeq_max")
 _PARTS = ("body", "interaction", "coupling", "support", "load")
 
 
@@ -44,6 +48,42 @@ class ProblemView:
         for section in _PARTS:
             for part in getattr(self.scene, section):
                 yield f"{section} {part.name}", given(part)
+
+
+class JointView(ProblemView):
+    """The runs of a ``scene`` with a [joint]."""
+
+    path_name = "delta"
+    needed = (*_CURVES, "delta/dR", "P/(E* R)", "p0/E*")
+    sides = ("pin", "hole")
+    has_contact = True
+
+    @property
+    def forces(self) -> dict[str, str]:
+        """The column of the force on the joint."""
+        return {"P": "P"}
+
+    @property
+    def pulls(self) -> dict[str, str]:
+        """The same."""
+        return self.forces
+
+    def facts(self) -> Iterator[tuple[str, str]]:
+        """The joint, its analysis and its bodies."""
+        scene = self.scene
+        g = scene.joint
+        length = scene.units.length
+        sizes = f"R = {g.radius:g} {length}, dR = {g.dR:g} {length}, dR/R = {g.dR / g.radius:g}"
+        yield "joint", f"{g.model}, {sizes}"
+        stiffness = f"E* = {scene.E_star:g} {scene.units.stress}"
+        yield "", f"{plane_words(scene)}, contact {scene.analysis.kinematics}, {stiffness}"
+        yield "pin", given(scene.pin)
+        yield "block", given(scene.block)
+
+
+def view_of(scene: Any) -> ProblemView:
+    """The view of the runs of a ``scene``."""
+    return JointView(scene) if isinstance(scene, Scene) else ProblemView(scene)
 
 
 def plane_words(scene: Any) -> str:
