@@ -34,7 +34,8 @@ def contrast_doubts(bodies: Sequence[Body]) -> list[str]:
     if ratio < _OTHER_UNIT:
         return []
     return [
-        f"{stiffest!r} is {ratio:.1e} times as stiff as {softest!r}: look whether their E have the same unit"
+        f"{stiffest!r} is {ratio:.1e} times as stiff as {softest!r}: look whether their E have the "
+        "same unit"
     ]
 
 
@@ -69,11 +70,12 @@ def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
     if strain > LARGE_STRAIN and peeq < _PLASTIC * strain:
         name = next(body.name for body in system.problem.bodies if system.problem.tag(body) == tag)
         off = f"which makes stresses and forces wrong by about {100 * strain:.2g} %"
-        text = f"the strain reaches {strain:.2g} in {name!r}, too much for small-strain theory, {off}; {LARGE}"
-        said.append(Doubt(text, strain))
+        text = f"the strain reaches {strain:.2g} in {name!r}, too much for small-strain theory"
+        said.append(Doubt(f"{text}, {off}; {LARGE}", strain))
     if angle > _FAR_TURN:
-        text = f"elements turn by {angle:.2g} rad, which small-strain theory takes for a strain of {angle**2 / 2:.2g}"
-        said.append(Doubt(f"{text}; {LARGE}", angle))
+        false_strain = f"small-strain theory takes for a strain of {angle**2 / 2:.2g}"
+        text = f"elements turn by {angle:.2g} rad, which {false_strain}; {LARGE}"
+        said.append(Doubt(text, angle))
     return said
 
 

@@ -28,7 +28,10 @@ _SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating
 _CARRYING = 0.01  # of the same, where the springs carry what contact should
 _ALONE = 0.1  # of the same at the end, where no force pushes the bodies that springs hold
 _LOST = "nothing holds what the loads move"
-_CHECK = "let more of the loads press it against others, or look whether its E has the unit of the others"
+_CHECK = (
+    "let more of the loads press it against others, or look whether its E has the unit of the "
+    "others"
+)
 _UNBALANCED = "the forces on the whole do not balance: {:.1e} of the largest is left"
 NEVER = "no surfaces ever touched: no load presses any of them together"
 PARTED = (

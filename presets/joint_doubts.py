@@ -1,4 +1,5 @@
-"""What to warn of before and after the steps of a joint, and when its run does not count as done."""
+"""What to warn of before and after the steps of a joint, and when its run does not count as
+done."""
 
 from __future__ import annotations
 
@@ -26,18 +27,21 @@ from archord.solver.path.system import System
 _FEWEST_FACETS = 5
 _ROUGH = 0.01  # of the clearance
 APART = (
-    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
-    "displacement or a force above 0 if it should"
+    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; "
+    "give a displacement or a force above 0 if it should"
 )
 AWAY = (
-    "the bodies touch, but not on the contact axis, where p0 is measured and from where eps is: their columns say "
-    "nothing of this step"
+    "the bodies touch, but not on the contact axis, where p0 is measured and from where eps is: their "
+    "columns say nothing of this step"
 )
 UNSEEN = (
-    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
-    "reduce joint.element_size or increase the load"
+    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can "
+    "see; reduce joint.element_size or increase the load"
 )
-_AT_END = "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load less far"
+_AT_END = (
+    "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load "
+    "less far"
+)
 _UNBALANCED = "forces at pin, contact and block differ by {:.1e} of P"
 
 
@@ -45,8 +49,8 @@ def before_steps(scene: Scene, system: System) -> list[str]:
     """The scene's doubts, and a warning if the parabolic facets depart too much from their circles
     for the clearance.
 
-    A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``.
-    Equal facets that face each other are off alike, which leaves the gap as it is.
+    A parabola through ends and middle of an arc of half-angle ``a`` is off by
+    ``R (1 - cos a)^2/8``. Equal facets that face each other are off alike, which leaves the gap as it is.
     """
     joint = scene.joint
     doubts = [*scene.doubts, *friction_doubts({"analysis.friction": scene.analysis.friction})]
@@ -58,8 +62,8 @@ def before_steps(scene: Scene, system: System) -> list[str]:
     off = (1 - np.cos(half_angle)) ** 2 / 8 * joint.radius / abs(joint.dR)
     if off > _ROUGH:
         doubts.append(
-            "the elements on the arcs are too long for the clearance, they depart from the circles by "
-            f"{off:.1g} dR; reduce joint.element_size"
+            "the elements on the arcs are too long for the clearance, they depart from the "
+            f"circles by {off:.1g} dR; reduce joint.element_size"
         )
     return doubts
 
@@ -84,9 +88,9 @@ def step_checks(scene: Scene, system: System) -> list[Check]:
         peeq = core_peeq(scene, system)
         if peeq > 0:
             text = (
-                f"the pin yields where the force is applied, with PEEQ up to {peeq:.1e} in its core, and delta, "
-                "the mean displacement of the core, contains by how much it is squashed there; a larger "
-                "load.core_radius would spread the force"
+                f"the pin yields where the force is applied, with PEEQ up to {peeq:.1e} in its "
+                "core, and delta, the mean displacement of the core, contains by how much it is "
+                "squashed there; a larger load.core_radius would spread the force"
             )
             yield Doubt(text, peeq)
 
@@ -95,8 +99,8 @@ def step_checks(scene: Scene, system: System) -> list[Check]:
         far = delta > scene.small * scene.joint.radius
         if far and not scene.doubts_of_strain:
             text = (
-                f"delta exceeds {scene.small:.2g} R: small-strain theory makes P too low, relatively by about "
-                f"{scene.too_low:g} delta/R; {LARGE}"
+                f"delta exceeds {scene.small:.2g} R: small-strain theory makes P too low, "
+                f"relatively by about {scene.too_low:g} delta/R; {LARGE}"
             )
             yield Doubt(text, delta)
         yield from distortion_doubts(system, m["peeq_max"], small=small and not far)
