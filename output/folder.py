@@ -77,7 +77,8 @@ def claim_folder(folder: Path, force: bool) -> None:
     if not (empty or force):
         said = "is not empty; choose another folder with -o, or overwrite a run in it with --force"
         if (status := report_of(folder).get("status")) in _UNFINISHED:
-            said = f"holds a run that {_UNFINISHED[status]}; continue it with --restart, or overwrite it with --force"
+            how = "continue it with --restart, or overwrite it with --force"
+            said = f"holds a run that {_UNFINISHED[status]}; {how}"
         raise InputError(f"{folder}: {said}.")
 
 

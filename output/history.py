@@ -63,5 +63,6 @@ def fault_of_history(columns: Mapping[str, Sequence[float]], report: Mapping[str
             if isinstance(told, int | float) and not math.isclose(
                 told, here, rel_tol=_SAME, abs_tol=_NOTHING
             ):
-                return f"has {name} = {here:g} at step {k + 1}, run.json {told:g}: one of the two was changed"
+                differing = f"{name} = {here:g} at step {k + 1}, run.json {told:g}"
+                return f"has {differing}: one of the two was changed"
     return ""

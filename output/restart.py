@@ -138,6 +138,6 @@ def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None
         if a.get(key) != b.get(key) and key != "load" and not key.startswith(_MAY_DIFFER):
             there, here = (toml_value(keys[key]) if key in keys else "absent" for keys in (a, b))
             raise InputError(
-                f"{folder}: was solved with {key} = {there}, the scene says {here}; only [stepping], "
-                "analysis.max_iterations and the load's further targets may change."
+                f"{folder}: was solved with {key} = {there}, the scene says {here}; only "
+                "[stepping], analysis.max_iterations and the load's further targets may change."
             )

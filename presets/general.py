@@ -31,8 +31,8 @@ def general_account(
     scene: ProblemScene, comm: MPI.Comm, timer: Timer, given: Problem | None = None
 ) -> Account:
     """The problem of ``scene``, or the one that was ``given`` from Python, of which the scene
-    tells, ready to be solved, and its account, whose measures are those of its parts. Collective over
-    ``comm``; raises `InputError`."""
+    tells, ready to be solved, and its account, whose measures are those of its parts. Collective
+    over ``comm``; raises `InputError`."""
     name = given.mesh_name if given else mesh_name(scene)
     file = given.mesh_file if given else scene.mesh.file
     with timer("mesh"), as_input_error(name):

@@ -27,16 +27,16 @@ from archord.solver.path.system import System
 _FEWEST_FACETS = 5
 _ROUGH = 0.01  # of the clearance
 APART = (
-    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; "
-    "give a displacement or a force above 0 if it should"
+    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the "
+    "hole; give a displacement or a force above 0 if it should"
 )
 AWAY = (
-    "the bodies touch, but not on the contact axis, where p0 is measured and from where eps is: their "
-    "columns say nothing of this step"
+    "the bodies touch, but not on the contact axis, where p0 is measured and from where eps is: "
+    "their columns say nothing of this step"
 )
 UNSEEN = (
-    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can "
-    "see; reduce joint.element_size or increase the load"
+    "no contact point was ever pressed, though delta was positive: the contact is smaller than the "
+    "mesh can see; reduce joint.element_size or increase the load"
 )
 _AT_END = (
     "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load "
@@ -50,7 +50,8 @@ def before_steps(scene: Scene, system: System) -> list[str]:
     for the clearance.
 
     A parabola through ends and middle of an arc of half-angle ``a`` is off by
-    ``R (1 - cos a)^2/8``. Equal facets that face each other are off alike, which leaves the gap as it is.
+    ``R (1 - cos a)^2/8``. Equal facets that face each other are off alike, which leaves the gap as
+    it is.
     """
     joint = scene.joint
     doubts = [*scene.doubts, *friction_doubts({"analysis.friction": scene.analysis.friction})]
