@@ -25,12 +25,23 @@ from archord.materials.hardening import Scaled
 from archord.materials.j2 import J2Material
 from archord.materials.kinematics import Kinematics
 from archord.materials.material import Array, Material, State
+from archord.materials.return_map import PlasticState
 
 _NEAR = 0.05  # relative distance of eigenvalues below which divided differences are series
 _RATIO = [1 / (k + 1) if k % 2 == 0 else 0.0 for k in range(15)]  # artanh(x)/x
 _MIXED = [
     -1.0 if k % 2 == 0 else (k + 1) / (k + 2) for k in range(14)
 ]  # (1/(1 + x) - artanh(x)/x)/x
+
+
+@dataclass(frozen=True)
+class LargeState(PlasticState):
+    """History of ``n`` points of a J2 material at large strain.
+
+    - ``volume_work`` ``(n,)``: what the change of volume adds to the plastic work density
+    """
+
+    volume_work: Array
 
 
 @dataclass(frozen=True)
@@ -71,12 +82,16 @@ class LargeStrain(Material):
         return replace(self, inner=self.inner.under(kinematics))
 
     def state(self, n: int) -> State:
-        """The inner material's."""
-        return self.inner.state(n)
+        """The state of the inner material; with isotropic hardening and the work of its volume."""
+        state = self.inner.state(n)
+        if type(state) is PlasticState:
+            return LargeState(state.plastic_strain, state.peeq, np.zeros(n))
+        return state
 
     def dissipation(self, state: State) -> Array | float:
-        """The inner material's, per undeformed volume."""
-        return self.inner.dissipation(state)
+        """Plastic work density ``(n,)`` per undeformed volume."""
+        dissipated = self.inner.dissipation(state)
+        return dissipated + state.volume_work if isinstance(state, LargeState) else dissipated
 
     def peeq(self, state: State) -> Array | float:
         """The inner material's."""
@@ -104,6 +119,10 @@ class LargeStrain(Material):
             volume = strain @ normal
         scaled = replace(m, hardening=Scaled(m.hardening, np.exp(volume)))
         stress, moduli, new = scaled.update(strain, state)
+        if isinstance(state, LargeState) and new is not state:
+            grown = m.dissipation(new) - m.dissipation(state)
+            volume_work = state.volume_work + np.expm1(volume) * grown
+            new = LargeState(new.plastic_strain, new.peeq, volume_work)
         if m.kinematics.is_thin or new is state:
             return stress, moduli, new
         # a yield stress that grows makes the deviator grow with it

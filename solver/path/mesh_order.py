@@ -186,7 +186,9 @@ class MeshOrder:
             known = stored[f"history/{place}/point"]
             _, here, there = np.intersect1d(number, known, assume_unique=True, return_indices=True)
             for name, values in vars(state).items():
-                values[here] = stored[f"history/{place}/{name}"][there]
+                key = f"history/{place}/{name}"
+                if key in stored:  # runs of 0.2 have no work of the volume
+                    values[here] = stored[key][there]
             points.state = points.trial = state
 
     def _points(self) -> Iterator[tuple[str, Points, np.ndarray]]:

@@ -135,3 +135,31 @@ def test_all_ranks_together_write_what_one_writes(comm, tmp_path_factory):
             )
         np.testing.assert_allclose(read[0].stress, read[1].stress, atol=1e-9)
         np.testing.assert_array_equal(read[0].edges["inner"], read[1].edges["inner"])
+
+
+def test_at_corners_near_points_count_more():
+    """At a corner, whose cell shows no vertex inside, the value is the value of a polynomial that
+    is fitted to two layers of cells, with weights 1 / (0.05 + d^2) of the distances over the
+    largest one."""
+    order = MeshOrder(ring(0.2, quads=True))
+    nodes = SecondOrder(order.kind, order.nodes_of_cell)
+    x = nodes(order.coordinates)[:, :2]
+    places = collect_mesh(order)["points/coordinates"]
+    cells = nodes.cells[:, [0, 1, 3, 2]]
+    recovery = PatchRecovery(x, cells, nodes.between, places, 2)
+    found = recovery((places**3).sum(axis=-1)[..., None])[:, 0]
+    for end in ((A, 0), (B, 0), (0, A), (0, B)):
+        corner = np.linalg.norm(x - end, axis=1).argmin()
+        own = cells[(cells == corner).any(axis=1)]
+        patch = np.isin(cells, own).any(axis=1)
+        assert len(own) == 1 < patch.sum()
+        ray = places[patch].reshape(-1, 2) - x[corner]
+        square = (ray**2).sum(axis=1)
+        root = np.sqrt(1 / (0.05 + square / square.max()))
+        a, b = ray.T
+        basis = np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=1)
+        values = ((ray + x[corner]) ** 3).sum(axis=1)
+        fit, *_ = np.linalg.lstsq(basis * root[:, None], values * root)
+        assert found[corner] == pytest.approx(fit[0], rel=1e-7)
+        plain, *_ = np.linalg.lstsq(basis, values)
+        assert abs(plain[0] - fit[0]) > 1e-5

@@ -135,3 +135,27 @@ def test_cauchys_stress_is_nominal_stress_over_the_deformed_area(plane):
         J = det * outward
     np.testing.assert_allclose(J * np.array([[xx, xy], [xy, yy]]), P @ F.T, rtol=1e-9)
     assert abs(J - 1) > 0.01
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress", "axisymmetric"])
+@pytest.mark.parametrize("name", ["linear hardening", "back stresses"])
+def test_the_work_of_large_strains_is_stored_or_dissipated(name, plane):
+    """Confined compression of a soft metal, whose volume shrinks by a fifth and more: plastic work
+    is that of Kirchhoff's stress. The balance holds to the second order of the step."""
+    material = MATERIALS[name]
+    soft = type(material)(E, NU, plane, LinearHardening(0.04 * E, 0.05 * E))
+    if name == "back stresses":
+        soft = type(material)(E, NU, plane, LinearHardening(0.04 * E), ((0.2 * E, 5.0),))
+    m = LargeStrain(soft)
+    n, k = 1500, 5 if plane == "axisymmetric" else 4
+    end = np.zeros((1, k))
+    end[0, :2] = -0.3, 0.05
+    state, work, last = m.state(1), 0.0, np.zeros((1, k))
+    for at in np.linspace(0, 1, n + 1)[1:]:
+        stress, _, state = m.update(at * end, state)
+        work += float(((stress + last) / 2 * end / n).sum())
+        last = stress
+    stored = m.stored(end, stress, state)[0]
+    dissipated = m.dissipation(state)[0]
+    assert dissipated > 0.1 * stored
+    assert stored + dissipated == pytest.approx(work, rel=2e-3 if plane != "stress" else 1e-2)
