@@ -80,6 +80,9 @@ class ProblemScene(Checked):
             require(
                 other == part.name, place, f"must not name {name!r}, which {other!r} has already"
             )
+        drawn = self.analysis.plane != "axisymmetric" or self.mesh.shape is None
+        said = 'must be "strain" or "stress" for the shape of a preset, which is plane'
+        require(drawn, "analysis.plane", said)
         self._directions()
         require_different(self)
         require_solids({("body", name): body for name, body in self.solids.items()})

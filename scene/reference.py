@@ -126,10 +126,12 @@ def reference() -> str:
 def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
     """Tables of the keys of ``sections``, without those that stood ``before``."""
     for section, info in sections.items():
-        known = [name for name, _, _ in _keys(before[section])] if section in before else []
+        known = {}
+        if section in before:
+            known = {name: key.description for name, key, _ in _keys(before[section])}
         table = Table("key", "unit", "default", "allowed", "what")
         for name, key, schema in _keys(info):
-            if name not in known:
+            if known.get(name) != key.description:
                 default = (
                     "" if schema.get("default") is None else f"`{toml_value(schema['default'])}`"
                 )

@@ -375,12 +375,25 @@ class Analysis(PresetAnalysis):
 class ProblemAnalysis(Modelling):
     """How a general problem is modelled and solved."""
 
+    plane: Literal["strain", "stress", "axisymmetric"] = key(  # type: ignore[assignment]
+        "plane strain, plane stress, or bodies of revolution about x = 0: x is the radius",
+        default="strain",
+    )
     symmetry: int = key(
         "how many times the part makes up the whole; results are of the whole",
         default=1,
         ge=1,
         le=100,
     )
+
+    @model_validator(mode="after")
+    def _whole_rings(self):
+        is_plane = self.plane != "axisymmetric"
+        said = "is for planes: axisymmetric forces are of the whole ring"
+        require(is_plane or self.thickness is None, "thickness", said)
+        said = "must be 1, or 2 for a half that is cut across the axis, as bodies are whole rings"
+        require(is_plane or self.symmetry <= 2, "symmetry", said)
+        return self
 
 
 class Stepping(Section):

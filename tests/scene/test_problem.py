@@ -196,14 +196,40 @@ def test_an_interference_has_a_stage_of_its_own():
         ("mesh.file", None, "mesh.file is missing"),
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
-        ("analysis", {"plane": "space"}, "analysis.plane = .* must be 'strain' or 'stress'"),
+        ("analysis", {"plane": "space"}, "analysis.plane = .* must be 'strain', 'stress' or 'axi"),
+        (
+            "analysis",
+            {"plane": "axisymmetric", "thickness": 2.0},
+            "analysis.thickness = 2.0 is for planes: axisymmetric forces are of the whole ring",
+        ),
+        (
+            "analysis",
+            {"plane": "axisymmetric", "symmetry": 4},
+            "analysis.symmetry = 4 must be 1, or 2 for a half that is cut across the axis",
+        ),
+        (
+            "mesh",
+            {
+                "shape": {
+                    "kind": "lug",
+                    "radius": 9.0,
+                    "clearance": 0.1,
+                    "width": 40.0,
+                    "pin": "half",
+                }
+            },
+            'analysis.plane = "axisymmetric" must be .strain. or .stress. for the shape of a preset',
+        ),
         ("analysis", {"coarse_start": False}, "analysis.coarse_start = false is not a known key"),
         ("format", 3, "format = 3 is for a newer archord"),
     ],
 )
 def test_a_fault_is_said_in_a_sentence(place, value, said):
+    data = changed(place, value)
+    if place == "mesh":
+        data["analysis"] = {"plane": "axisymmetric"}
     with pytest.raises(InputError, match=f"^lug.toml: {said}") as fault:
-        parse_any(changed(place, value), "lug.toml")
+        parse_any(data, "lug.toml")
     assert len(str(fault.value).splitlines()) == 1
 
 
