@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from archord.materials.kinematic import KinematicMaterial
     from archord.materials.material import Material
     from archord.postprocess.pictures.pictures import draw_run
+    from archord.scene.presets.joint import Scene
     from archord.scene.problem import ProblemScene
-    from archord.scene.scene import Scene
     from archord.solver.contact.coulomb import Coulomb
     from archord.solver.contact.law import ContactLaw, Quantity, Response
     from archord.solver.path.system import System
@@ -95,7 +95,7 @@ _HOME = {
     "archord.materials.material": ["Material"],
     "archord.postprocess.pictures.pictures": ["draw_run"],
     "archord.scene.problem": ["ProblemScene"],
-    "archord.scene.scene": ["Scene"],
+    "archord.scene.presets.joint": ["Scene"],
     "archord.solver.contact.coulomb": ["Coulomb"],
     "archord.solver.contact.law": ["ContactLaw", "Quantity", "Response"],
     "archord.solver.path.system": ["System"],

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 from archord.output.folder import MESH, is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
+from archord.report.errors import InputError
 from archord.scene import file as scene_file
-from archord.scene.errors import InputError, toml_value
-from archord.scene.faults import shortened
 from archord.scene.file import ABSENT, AnyScene
-from archord.scene.scene import plain
+from archord.scene.sections.errors import toml_value
+from archord.scene.sections.faults import shortened
+from archord.scene.sections.keys import plain
 
 if TYPE_CHECKING:
     from mpi4py import MPI

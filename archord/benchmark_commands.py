@@ -10,7 +10,7 @@ from time import perf_counter
 import click
 
 from archord.options import Group, argument, output, quiet
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 Say = Callable[[str], None]
 

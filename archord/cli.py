@@ -17,7 +17,7 @@ import click
 import archord
 from archord.options import Group
 from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 # seconds in which a launcher (MPICH's) hands on what a rank said, which it drops with a job that
 # aborts

@@ -19,14 +19,14 @@ import click
 from click.core import ParameterSource
 
 from archord.options import argument, file, flag, overrides
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 if TYPE_CHECKING:
     from archord.postprocess.laws.fitted_law import FittedLaw
     from archord.postprocess.laws.general.joint import LawJoint
     from archord.postprocess.laws.general.joint_curve import JointCurve
     from archord.postprocess.laws.law import Law
-    from archord.scene.scene import Scene
+    from archord.scene.presets.joint import Scene
 
 _Text = tuple[Path, Callable[[], str]]  # a file, and what makes its text
 _LINE = 400  # points of a line of the picture
@@ -343,7 +343,7 @@ def _joint_of_scene(
 
 def _law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
     from archord.scene.file import load_scene
-    from archord.scene.scene import Scene
+    from archord.scene.presets.joint import Scene
 
     found = load_scene(path, overrides)
     if not isinstance(found, Scene):

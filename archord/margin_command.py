@@ -37,7 +37,7 @@ def margin(folder: Path, load: float, plate: str | None, **asked: Any) -> int:
     """
     from archord.postprocess.margin import margin_text, margins, plates_of
     from archord.postprocess.run import Run
-    from archord.scene.errors import InputError
+    from archord.report.errors import InputError
 
     run = Run(folder)
     plates = [plate] if plate else plates_of(run)

@@ -13,9 +13,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from archord.ranks import on_terminal
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import AnyScene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 _LOADS_SHOWN = 3
 _LONG_SILENCE = 20.0  # seconds after which a solve that has said nothing says where it is

@@ -10,7 +10,7 @@ import click
 
 from archord.options import SCENE, argument, file, flag, output, overrides, pictures
 from archord.ranks import terminal_width
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 
 @click.command()

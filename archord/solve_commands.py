@@ -137,8 +137,8 @@ def scene(
         )
     from archord.scene import reference as pages
     from archord.scene.file import load_scene, parse_any, resolved
-    from archord.scene.scene import Scene
-    from archord.scene.shapes import general_joint
+    from archord.scene.presets.joint import Scene
+    from archord.scene.presets.joint_shape import general_joint
 
     if expand is not None:
         given = load_scene(expand)
@@ -171,8 +171,8 @@ def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: 
     from archord.presets.joint import joint_problem
     from archord.presets.problem import as_input_error, mesh_name, scene_mesh
     from archord.scene.file import load_scene, override_key
+    from archord.scene.presets.joint import Scene
     from archord.scene.problem import MeshScene
-    from archord.scene.scene import Scene
 
     if file.suffix == ".toml":
         scene: Any = load_scene(file, overrides)

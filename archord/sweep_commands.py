@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import click
 
 from archord.options import argument, flag, output, overrides, quiet
+from archord.report.errors import InputError
 from archord.report.table import Table
-from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
     from archord.studies.sweep import Result

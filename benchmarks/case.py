@@ -19,7 +19,7 @@ from archord.output.run import Outcome
 from archord.report.files import Row, write_report
 from archord.report.table import Table
 from archord.scene.file import AnyScene, parse_scene, resolved
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.studies.accuracy import solve_to_accuracy
 
 E = 2 * (1 - 0.3**2)  # E* = 1 for two like bodies in plane strain

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from archord.benchmarks.case import paper_joint, varied
 from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 DR = 1e-4
 UNLIKE = ((3.0, 0.2), (1.0, 0.4))  # shear modulus and nu of two bodies with Dundurs' beta = 0

@@ -18,7 +18,7 @@ from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.persson import UNLIKE, persson_joint, theory, unlike
 from archord.measures.record import Record
 from archord.report.table import Table
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 
 def _solve(scene: Scene) -> tuple[list[Record], str]:

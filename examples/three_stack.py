@@ -1,7 +1,17 @@
 """Three squares between walls are pressed together: the middle one is soft, and yields."""
 
-from archord import Body, Elastic, Interaction, J2Material, LinearHardening, Load, Problem, Support
-from archord import rectangles, solve
+from archord import (
+    Body,
+    Elastic,
+    Interaction,
+    J2Material,
+    LinearHardening,
+    Load,
+    Problem,
+    Support,
+    rectangles,
+    solve,
+)
 
 E, nu, yield_stress, depth = 1.0, 0.3, 0.002, 0.02
 

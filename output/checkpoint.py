@@ -24,9 +24,9 @@ from archord.measures.energies import Work
 from archord.measures.record import Record
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import all_arrays, hdf5_in_memory, image, put
+from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.report.version import VERSION
-from archord.scene.errors import InputError
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import Arrays, MeshOrder
 from archord.solver.path.newton import Newton

@@ -11,7 +11,7 @@ from typing import Any
 
 from archord.output.files.disk import new_name
 from archord.output.files.seal import read_report
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 FILES = (
     "scene.toml",

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from archord.output.files.disk import WriteError
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 Result = TypeVar("Result")
 _PAUSE = 0.01  # seconds between two looks

@@ -17,9 +17,10 @@ from archord.output.checkpoint import Checkpoint
 from archord.output.files.seal import TABLES, fault_of, read_report, require_intact
 from archord.output.finished import history_fault
 from archord.output.folder import CHECKPOINT
+from archord.report.errors import InputError
 from archord.report.readable import require_file
-from archord.scene.errors import InputError, toml_value
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
+from archord.scene.sections.errors import toml_value
 
 _TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
 _MAY_DIFFER = ("stepping.", "analysis.max_iterations", *_TARGETS)

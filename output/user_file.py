@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from archord.output.folder import CHECKPOINT, FILES, MESH
+from archord.report.errors import InputError
 from archord.report.files import is_device, replacing
-from archord.scene.errors import InputError
 
 
 def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True) -> None:

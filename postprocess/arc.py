@@ -15,7 +15,7 @@ from archord.measures.edge import SurfaceProfile
 from archord.output.files.seal import require_intact
 from archord.output.files.step_file import step_name
 from archord.presets.arc import ArcProfile
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 _OF_ARCS = ("pin", "hole")
 

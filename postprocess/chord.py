@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from archord.materials.material import Array
 from archord.postprocess.run import Run
 from archord.presets.arc import SYMMETRY
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 
 @dataclass(frozen=True)

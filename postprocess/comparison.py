@@ -20,7 +20,7 @@ import numpy as np
 from archord.materials.material import Array
 from archord.postprocess.curve import first_loading, gap_name
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import scene_keys
 
 COMPARED = ("P", "p0", "eps")

@@ -18,8 +18,8 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve
-from archord.scene.errors import InputError
-from archord.scene.scene import Scene
+from archord.report.errors import InputError
+from archord.scene.presets.joint import Scene
 
 Curve = Sequence[float] | np.ndarray
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from archord.materials.material import Array
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 CURVES = ("delta", "P", "p0", "eps", "peeq_max")
 _SAME = 1e-6  # relative difference of two forces that are the same but for what Newton leaves

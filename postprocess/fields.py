@@ -16,7 +16,8 @@ from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN
 from archord.materials.material import Array
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
-from archord.scene.errors import InputError, toml_value
+from archord.report.errors import InputError
+from archord.scene.sections.errors import toml_value
 
 BODIES = {"pin": 1, "block": 2}
 CELL_FIELDS = ("von_mises", "mean_stress", "peeq", "contact_state", "contact_pressure")

@@ -28,10 +28,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.materials.material import Array
+from archord.report.errors import InputError
 from archord.report.table import Table
-from archord.scene.errors import InputError
-from archord.scene.sections import Solid
-from archord.scene.shapes import LugShape
+from archord.scene.presets.lug import LugShape
+from archord.scene.sections.bodies import Solid
 
 if TYPE_CHECKING:
     from archord.postprocess.run import Run

@@ -15,7 +15,7 @@ from archord.materials.material import Array
 from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
 from archord.presets.views import ProblemView
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd

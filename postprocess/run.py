@@ -23,7 +23,7 @@ from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
 from archord.postprocess.probe import Probe, probe
 from archord.presets.views import view_of
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene
 
 if TYPE_CHECKING:

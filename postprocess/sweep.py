@@ -10,7 +10,7 @@ import numpy as np
 
 from archord.output.folder import is_sweep
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ from archord.measures.account import Account
 from archord.presets.joint_measures import joint_account
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.problem import Problem
 
 

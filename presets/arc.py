@@ -12,7 +12,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.measures.edge import EdgeProfile, SurfaceProfile, surface_profiles
-from archord.scene.geometry import JointGeometry
+from archord.scene.presets.joint_geometry import JointGeometry
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
     from archord.solver.path.system import System

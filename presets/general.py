@@ -22,7 +22,8 @@ from archord.presets.problem import as_input_error, general_problem, mesh_name, 
 from archord.report.timer import Timer
 from archord.scene.columns import supporting
 from archord.scene.problem import ProblemScene
-from archord.scene.sections import friction_doubts
+from archord.scene.sections.analysis import friction_doubts
+from archord.solver.expansion import expanded
 from archord.solver.path.system import System
 from archord.solver.problem import Problem
 
@@ -39,6 +40,7 @@ def general_account(
         problem = given.on(comm) if given else general_problem(scene, comm)
     warnings = scene.doubts
     with as_input_error(name):
+        expanded(problem)  # what contradicts itself is refused before its mesh is looked at
         if scene.mesh.shape is None:
             # with scipy, which solves of presets do without
             from archord.presets.held import check

@@ -18,8 +18,8 @@ from archord.geometry.shapes.joint_mesh import refinements
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from archord.materials.kinematics import kinematics
 from archord.presets.arc import SYMMETRY
-from archord.scene.geometry import JointGeometry
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
+from archord.scene.presets.joint_geometry import JointGeometry
 from archord.solver.core_load import core_density
 from archord.solver.problem import (
     Body,

@@ -20,8 +20,8 @@ from archord.measures.doubts import (
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt
-from archord.scene.scene import Scene
-from archord.scene.sections import friction_doubts
+from archord.scene.presets.joint import Scene
+from archord.scene.sections.analysis import friction_doubts
 from archord.solver.path.system import System
 
 _FEWEST_FACETS = 5

@@ -20,7 +20,7 @@ from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressur
 from archord.presets.joint import joint_problem
 from archord.presets.joint_doubts import before_steps, ending, step_checks
 from archord.report.timer import Timer
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
 
 _N_OF_CONTACT = 4  # delta, P, p0, eps

@@ -19,8 +19,8 @@ from archord.geometry.shapes.clevis import clevis
 from archord.geometry.shapes.lug import lug
 from archord.materials.kinematics import kinematics
 from archord.presets.joint import joint_mesh
+from archord.report.errors import InputError
 from archord.scene import parts
-from archord.scene.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.path.system import displacement_space

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 _CURVES = ("delta", "P", "p0", "eps", "peeq_max")
 _PARTS = ("body", "interaction", "coupling", "support", "load")

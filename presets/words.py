@@ -17,7 +17,7 @@ from archord.materials.hardening import (
 )
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.solver.contact.interaction import Interaction
 from archord.solver.expansion import disc_of

@@ -4,21 +4,36 @@ together."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from archord.scene.keys import require
-
-if TYPE_CHECKING:
-    from archord.scene.parts import CouplingSection
-    from archord.scene.problem import ProblemScene
+from archord.scene.parts import (
+    BodySection,
+    CouplingSection,
+    InteractionSection,
+    LoadSection,
+    SupportSection,
+)
+from archord.scene.sections.analysis import ProblemAnalysis
+from archord.scene.sections.keys import require
+from archord.scene.sections.units import Units
 
 _FREEDOMS = ("x", "y", "rotation")
-Column = tuple[
-    str, str, str, str
-]  # section and name of the part, what its name is followed by, unit
+Column = tuple[str, str, str, str]  # section and name of a part, what follows the name, unit
 
 
-def part_columns(scene: ProblemScene) -> Iterator[Column]:
+class Parts(Protocol):
+    """What a general scene tells of its columns."""
+
+    units: Units
+    analysis: ProblemAnalysis
+    body: list[BodySection]
+    interaction: list[InteractionSection]
+    coupling: list[CouplingSection]
+    support: list[SupportSection]
+    load: list[LoadSection]
+
+
+def part_columns(scene: Parts) -> Iterator[Column]:
     """The columns of loads, supports, interactions and bodies of ``scene``, in order."""
     units = scene.units
     length = units.length
@@ -31,7 +46,8 @@ def part_columns(scene: ProblemScene) -> Iterator[Column]:
     for load in scene.load:
         moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)
         if load.kind == "pressure":
-            moved, by = volume, units.stress
+            moved = volume
+            by = units.stress
         yield "load", load.name, "displacement", moved
         yield "load", load.name, "force", by
     couplings = {coupling.name for coupling in scene.coupling}
@@ -56,21 +72,24 @@ def part_columns(scene: ProblemScene) -> Iterator[Column]:
                 yield "body", body.name, what, unit
 
 
-def supporting(scene: ProblemScene) -> list[str]:
+def supporting(scene: Parts) -> list[str]:
     """Names of what has a reaction: supports of sets, and rigid couplings."""
     couplings = {coupling.name for coupling in scene.coupling}
     supports = [support.name for support in scene.support if support.on not in couplings]
     return [*supports, *(coupling.name for coupling in scene.coupling if coupling.kind == "rigid")]
 
 
-def require_different(scene: ProblemScene) -> None:
-    """Raise `Fault` where two parts of ``scene`` make one column, or a name is that of a coupling's
-    motion."""
+def require_different(scene: Parts) -> None:
+    """Raise `Fault` where two parts of ``scene`` make one column, or a name is the name of a
+    coupling's motion."""
     first: dict[str, tuple[str, str]] = {}
     for section, part, what, _ in part_columns(scene):
         column = f"{part} {what}"
         other = first.setdefault(column, (section, part))
-        said = f"makes the column {column!r} of history.csv, as the {other[0]} {other[1]!r} does: rename one of them"
+        said = (
+            f"makes the column {column!r} of history.csv, as the {other[0]} {other[1]!r} does: "
+            "rename one of them"
+        )
         require(other == (section, part), (section, part, "name"), said)
     motions = {
         f"{c.name} {freedom}": c.name for c in scene.coupling for freedom in _motions(scene, c)
@@ -81,11 +100,14 @@ def require_different(scene: ProblemScene) -> None:
     }
     given |= {load.name: "load" for load in scene.load}
     for name, section in given.items():
-        said = f"is what results call a motion of the coupling {motions.get(name)!r}: rename one of them"
+        said = (
+            f"is what results call a motion of the coupling {motions.get(name)!r}: rename one of "
+            "them"
+        )
         require(name not in motions, (section, name, "name"), said)
 
 
-def _motions(scene: ProblemScene, coupling: CouplingSection) -> list[str]:
+def _motions(scene: Parts, coupling: CouplingSection) -> list[str]:
     """Freedoms of the ``coupling`` that are solved for by a name made of its own.
 
     They are free ones of a rigid coupling, held ones of a distributing one; a load gives its name

@@ -11,13 +11,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from archord.report.errors import InputError
 from archord.report.readable import require_file
-from archord.scene.errors import InputError
-from archord.scene.faults import keys_of, shortened
+from archord.scene.presets.joint import CHOSEN, Scene
+from archord.scene.presets.known import PRESETS
 from archord.scene.problem import ProblemScene
-from archord.scene.scene import CHOSEN, Scene
-from archord.scene.sections import LOADS
-from archord.scene.shapes import PRESETS
+from archord.scene.sections.faults import keys_of, shortened
+from archord.scene.sections.loading import LOADS
 
 ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],

@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from archord.scene.keys import Name, Pair, PartName, Positive, Section, given, key, require
-from archord.scene.sections import Loading, NotNegative, Solid, StepCounts, Steps, Targets
-from archord.scene.shapes import BushingShape, ClevisShape, JointShape, LugShape
+from archord.scene.presets.known import AnyShape
+from archord.scene.sections.bodies import NotNegative, Solid
+from archord.scene.sections.keys import Name, Pair, PartName, Positive, Section, given, key, require
+from archord.scene.sections.loading import Loading, StepCounts, Steps, Targets
 
 Freedom = Literal["x", "y", "rotation"]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
@@ -47,10 +48,9 @@ class MeshSection(Section):
     circle: list[CircleSection] = Field(
         default_factory=list, description="circles that facet sets lie on"
     )
-    shape: (
-        Annotated[LugShape | ClevisShape | BushingShape | JointShape, Field(discriminator="kind")]
-        | None
-    ) = Field(None, description="the shape of a preset, as `archord scene --expand` prints it")
+    shape: AnyShape | None = Field(
+        None, description="the shape of a preset, as `archord scene --expand` prints it"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> MeshSection:
@@ -122,14 +122,14 @@ class InteractionSection(Section):
         "the one facet set whose points carry the contact; both do if absent", other="hole"
     )
     interference: NotNegative = key(
-        "of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are pushed together, in a "
-        "stage first; a drawn gap is taken off",
+        "of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are "
+        "pushed together, in a stage first; a drawn gap is taken off",
         "length",
         default=0.0,
     )
     overlap: NotNegative = key(
-        "of a press fit that the mesh shows: how deep the surfaces are drawn into each other, for that stage; instead "
-        "of interference",
+        "of a press fit that the mesh shows: how deep the surfaces are drawn into each other, for "
+        "that stage; instead of interference",
         "length",
         default=0.0,
     )
@@ -152,7 +152,10 @@ class InteractionSection(Section):
         require(len(self.surfaces) == wanted, "surfaces", f"must name {said}")
         require(len({*self.surfaces}) == wanted, "surfaces", "must be two different facet sets")
         taken = [name for name in self.surfaces if name in _OF_CONTACT or "/" in name]
-        said = f"must not name {taken}: contact.h5 has no room for such a name, rename the set in the mesh"
+        said = (
+            f"must not name {taken}: contact.h5 has no room for such a name, rename the set in the "
+            "mesh"
+        )
         require(not taken, "surfaces", said)
         require(
             self.integrated in (None, *self.surfaces),

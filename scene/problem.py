@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from archord.scene.columns import require_different
-from archord.scene.keys import key, require, unused
 from archord.scene.parts import (
     BodySection,
     CouplingSection,
@@ -19,8 +18,13 @@ from archord.scene.parts import (
     PathSection,
     SupportSection,
 )
-from archord.scene.scene import STEPS, Checked, require_solids
-from archord.scene.sections import ProblemAnalysis, ProblemOutput, Stepping, Units, steps_of
+from archord.scene.presets.joint import STEPS
+from archord.scene.sections.analysis import ProblemAnalysis, ProblemOutput, Stepping
+from archord.scene.sections.bodies import require_solids
+from archord.scene.sections.checked import Checked
+from archord.scene.sections.keys import key, require, unused
+from archord.scene.sections.loading import steps_of
+from archord.scene.sections.units import Units
 
 FORMAT = 2
 # parts whose names must differ, as results, reactions and drives are found by them
@@ -76,7 +80,8 @@ class ProblemScene(Checked):
                 require(not alike, (section, part.name, "name"), said)
         used: dict[str, str] = {}
         for part, name in [(i, name) for i in self.interaction for name in i.surfaces]:
-            place, other = ("interaction", part.name, "surfaces"), used.setdefault(name, part.name)
+            place = ("interaction", part.name, "surfaces")
+            other = used.setdefault(name, part.name)
             require(
                 other == part.name, place, f"must not name {name!r}, which {other!r} has already"
             )
@@ -93,10 +98,8 @@ class ProblemScene(Checked):
     def _directions(self) -> None:
         """Raise `Fault` where one direction of one place is held or loaded twice, or turns what
         cannot turn."""
-        couplings, discs = (
-            {c.name for c in self.coupling},
-            {i.name for i in self.interaction if i.rigid},
-        )
+        couplings = {c.name for c in self.coupling}
+        discs = {i.name for i in self.interaction if i.rigid}
         seen: dict[tuple[str, str], str] = {}
         parts = [("support", s.name, s.on, f) for s in self.support for f in s.fixed]
         parts += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
@@ -116,18 +119,18 @@ class ProblemScene(Checked):
                 "must not be a rigid disc",
             )
         for load in (load for load in self.load if load.kind == "pressure"):
-            place, held = ("load", load.name, "on"), {(load.on, "x"), (load.on, "y")} <= seen.keys()
+            place = ("load", load.name, "on")
+            held = {(load.on, "x"), (load.on, "y")} <= seen.keys()
             require(load.on not in couplings | discs, place, "must be a facet set for a pressure")
             require(not held, place, "must not be held in x and y: a pressure moves nothing there")
 
     @property
     def doubts(self) -> list[str]:
         """What to warn of before anything is solved."""
-        fit = "an overlap or an interference"
-        return [
-            *super().doubts,
-            *([] if self.fits else unused(self.path, "path", "fit_steps", fit)),
-        ]
+        found = super().doubts
+        if not self.fits:
+            found += unused(self.path, "path", "fit_steps", "an overlap or an interference")
+        return found
 
     @property
     def n_stages(self) -> int:
@@ -141,15 +144,16 @@ class ProblemScene(Checked):
 
     def values(self, load: LoadSection) -> tuple[float, ...]:
         """Values of ``load`` at load factors 0, 1, 2, ..., the ends of all stages."""
-        given = [*load.stages, *[load.stages[-1]] * (self.n_stages - len(load.stages))]
-        return (0.0,) * (1 + self.fits) + tuple(given)
+        begins = 2 if self.fits else 1
+        kept = self.n_stages - len(load.stages)
+        return (*[0.0] * begins, *load.stages, *[load.stages[-1]] * kept)
 
     @property
     def targets(self) -> list[float]:
         """The load factor at every output step; stage k ends at k."""
-        counts = [self.path.fit_steps] * self.fits + steps_of(
-            self.path.steps, self.n_stages, "path.steps"
-        )
+        counts = steps_of(self.path.steps, self.n_stages, "path.steps")
+        if self.fits:
+            counts = [self.path.fit_steps, *counts]
         return [stage + k / n for stage, n in enumerate(counts) for k in range(1, n + 1)]
 
     @property
@@ -162,8 +166,9 @@ class ProblemScene(Checked):
     @property
     def accurate(self) -> str:
         """Name of what an accuracy is asked of."""
-        load = self.load[-1]  # that of its two columns which it does not prescribe
-        return f"{load.name} {'force' if load.kind == 'displacement' else 'displacement'}"
+        load = self.load[-1]
+        not_prescribed = "force" if load.kind == "displacement" else "displacement"
+        return f"{load.name} {not_prescribed}"
 
     @property
     def loading(self) -> str:

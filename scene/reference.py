@@ -8,12 +8,12 @@ from typing import Any, get_args, get_origin
 
 from archord.materials.named import metals
 from archord.report.table import Table
-from archord.scene.errors import toml_value
 from archord.scene.parts import MeshSection
+from archord.scene.presets.joint import FORMAT as JOINT_FORMAT
+from archord.scene.presets.joint import Scene
+from archord.scene.presets.known import PRESETS, SHAPES
 from archord.scene.problem import FORMAT, ProblemScene
-from archord.scene.scene import FORMAT as JOINT_FORMAT
-from archord.scene.scene import Scene
-from archord.scene.shapes import PRESETS, BushingShape, ClevisShape, JointShape, LugShape
+from archord.scene.sections.errors import toml_value
 
 _JOINT: dict[str, Any] = {
     name: info for name, info in Scene.model_fields.items() if name != "format"
@@ -147,8 +147,7 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
 def _shapes() -> Iterator[str]:
     """The section of a mesh that a preset draws."""
     table = Table("kind", "has the keys of", "and")
-    shapes = {"lug": LugShape, "clevis": ClevisShape, "bushing": BushingShape, "joint": JointShape}
-    for name, shape in shapes.items():
+    for name, shape in SHAPES.items():
         more = [f"`{key}`: {_SHAPED[key]}" for key in _SHAPED if key in shape.model_fields]
         table.add(f'`"{name}"`', f"[{name}]", "; ".join(more))
     yield "### [mesh.shape]\n"

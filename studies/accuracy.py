@@ -27,9 +27,9 @@ from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint_doubts import UNSEEN
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import AnyScene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
 from archord.studies.mesh_family import MeshFamily, ProblemFamily
 

@@ -24,8 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from archord.scene.errors import InputError, toml_value
-from archord.scene.faults import shortened
+from archord.report.errors import InputError
 from archord.scene.file import (
     ABSENT,
     ALTERNATIVES,
@@ -41,8 +40,10 @@ from archord.scene.file import (
     read_toml,
     resolved,
 )
-from archord.scene.keys import Section
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
+from archord.scene.sections.errors import toml_value
+from archord.scene.sections.faults import shortened
+from archord.scene.sections.keys import Section
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000

@@ -28,7 +28,7 @@ from archord.output.files.disk import replace_file
 from archord.output.folder import claim_folder
 from archord.output.ranks import arrived_before
 from archord.output.restart import plan_restart
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.cases import Case
 from archord.studies.sweep import FAILURE, Result, of_case

@@ -35,7 +35,7 @@ from archord.postprocess.laws.general.general_law import (
 from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.law_fit import EARLY
 from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
-from archord.scene.errors import toml_value
+from archord.scene.sections.errors import toml_value
 
 Row = dict[str, Any]
 # How many joints of each kind. A kind is the plane, what yields, whether the other body is stronger

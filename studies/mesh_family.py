@@ -15,9 +15,9 @@ from pydantic import ValidationError
 
 from archord.measures.record import Record
 from archord.scene.file import AnyScene
-from archord.scene.geometry import JointGeometry
+from archord.scene.presets.joint import Scene
+from archord.scene.presets.joint_geometry import JointGeometry
 from archord.scene.problem import ProblemScene
-from archord.scene.scene import Scene
 
 RATIO = 1.5  # of the element sizes from one mesh to the next
 _GROWTH = 6.25  # over the element size in R, for a wide contact

@@ -16,10 +16,11 @@ from typing import Any
 from archord.output.files.disk import replace_file
 from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
+from archord.report.errors import InputError
 from archord.report.readable import require_file
-from archord.scene.errors import InputError, toml_value
 from archord.scene.file import AnyScene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
+from archord.scene.sections.errors import toml_value
 from archord.studies.cases import Case, Sweep
 
 FILE = "sweep.toml"

@@ -14,9 +14,9 @@ from archord.postprocess.convergence import Refined, group
 from archord.postprocess.laws.calibration import POOR, check_compatible, fit_curve
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run
+from archord.report.errors import InputError
 from archord.report.table import Table
 from archord.report.version import VERSION
-from archord.scene.errors import InputError
 from archord.studies.cases import read_sweep
 from archord.studies.sweep import FILE, of_case, result_of
 

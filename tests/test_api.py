@@ -10,7 +10,7 @@ import pytest
 
 import archord
 from archord.progress import Progress
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
 COARSE = {"joint.relative_element_size": 0.2, "load.steps": 2}

@@ -21,6 +21,8 @@ ROOMS = [
     "geometry.meshes",
     "geometry.meshes.formats",
     "geometry.shapes",
+    "scene.sections",
+    "scene.presets",
     "scene",
     "solver.contact",
     "solver.linear",
@@ -51,6 +53,8 @@ FE = ["dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "gmsh"]
 BANNED = {
     "report": [*FE, "archord"],
     "materials": FE,
+    "scene.sections": FE,
+    "scene.presets": FE,
     "scene": FE,
     "output.files": FE,
     "solver": ["archord.scene", "archord.presets"],

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from archord.postprocess.run import _NEEDED, Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from tests.output.run_files import rewrite_report
 from tests.test_cli import SCENE, archord
 

@@ -13,7 +13,7 @@ import pytest
 
 from archord.output.folder import occupied
 from archord.output.history import read_history
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from tests.output.run_files import accepted_steps, same_run
 from tests.test_cli import ENVIRONMENT, SCENE, archord, kill_after
 

@@ -11,7 +11,7 @@ import numpy as np
 from archord.benchmarks.case import Case, E, paper_joint, varied
 from archord.output.run import Outcome
 from archord.postprocess.convergence import difference
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 ELASTIC = 1e-2, 3e-3, 1e-3, 3e-4, 1e-4

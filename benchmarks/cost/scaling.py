@@ -19,9 +19,9 @@ import numpy as np
 
 from archord.benchmarks.case import paper_joint, write_table
 from archord.benchmarks.timing import Process, Said, Timing, solving, time_all
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import resolved
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 Cost = dict[str, Any]
 # element size on the arcs over R by about how many dofs that gives; the elements grow by 6.25 times

@@ -21,7 +21,7 @@ from archord.benchmarks.cost.scaling import launcher
 from archord.benchmarks.timing import Process, Said, Timing, time_all
 from archord.report.files import Row
 from archord.scene.file import resolved
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 SETS = tomllib.loads(Path(__file__).with_name("variants.toml").read_text(encoding="utf-8"))["set"]
 ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve

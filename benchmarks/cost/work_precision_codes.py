@@ -29,10 +29,10 @@ from archord.benchmarks.peers.installed import Peer, installed
 from archord.benchmarks.timing import Failure, Process, solving
 from archord.geometry.basis import Array
 from archord.postprocess.run import Run
+from archord.report.errors import InputError
 from archord.report.version import VERSION
-from archord.scene.errors import InputError
 from archord.scene.file import resolved
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
 CASES: dict[str, dict[str, Any]] = DATA["cases"]

@@ -15,8 +15,8 @@ from archord.benchmarks.paper.figures import FIGURES, LAYOUTS, draw_zones, write
 from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_missing
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
+from archord.report.errors import InputError
 from archord.report.files import replacing
-from archord.scene.errors import InputError
 
 
 def chosen(names: Sequence[str]) -> list[str]:

@@ -19,7 +19,7 @@ from archord.materials.material import Plane
 from archord.output.ranks import agreed
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 PLANES: tuple[Plane, ...] = ("strain", "stress")
 MESHES = {"coarse": 0.04, "fine": 0.02}  # element size on the arcs over R

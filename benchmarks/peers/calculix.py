@@ -26,7 +26,7 @@ from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label, surface_n
 from archord.postprocess.run import Run
 from archord.report.table import Table
 from archord.scene.file import AnyScene, load_scene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")

@@ -24,7 +24,7 @@ from archord.benchmarks.case import Case, Expected, paper_joint, quantities, var
 from archord.benchmarks.persson import persson_joint, theory
 from archord.benchmarks.stability.eye import drawn_eye
 from archord.scene.file import AnyScene, parse_any
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 Values = dict[str, dict[str, float]]  # by case and quantity
 FILE = Path(__file__).with_name("fine.json")

@@ -19,11 +19,11 @@ from archord.benchmarks.case import Case, Expected, matches, quantities, side_by
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
+from archord.report.errors import InputError
 from archord.report.files import write_report
 from archord.report.table import Table
-from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.path.stepping import Step, StepFailure
 
 _BALANCE = 1e-8  # largest difference of forces over P, unless round-off is known to be larger

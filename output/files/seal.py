@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.files.disk import naming
+from archord.report.errors import InputError
 from archord.report.readable import json_of, require_file
-from archord.scene.errors import InputError
 
 SEALED = ("scene.toml", "history.csv", "mesh.npz", "contact.h5", "fields.h5")
 TABLES = ("scene.toml", "history.csv")  # what a restart writes again from the other files

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from archord.output.files.disk import replace_file
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 Arrays = dict[str, np.ndarray]
 

@@ -22,7 +22,7 @@ from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint import Array, LawJoint
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning
 _LIKE = 0.01  # share of P by which the blocks of runs of one fit may change it

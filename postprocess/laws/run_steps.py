@@ -13,8 +13,8 @@ import numpy as np
 from archord.materials.material import Array
 from archord.postprocess.curve import on_first_loading
 from archord.postprocess.run import Run
+from archord.report.errors import InputError
 from archord.report.version import VERSION
-from archord.scene.errors import InputError
 from archord.scene.file import resolved
 
 _OPEN = 1e-6  # of the largest force: nothing touches

@@ -23,7 +23,7 @@ from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve, hermite
 from archord.postprocess.laws.run_steps import RunSteps, read_steps
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 _ELASTIC = 1e-9  # of the largest force times displacement: nothing was dissipated
 _POWER = 1.2  # of the displacement in the force of first touch; contacts of lines have 1.1 to 1.3

@@ -20,7 +20,7 @@ from archord.postprocess.pictures.problems import (
     shown_steps,
 )
 from archord.postprocess.run import Run
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 _BEFORE: dict[str, Any] = {"color": "0.55", "lw": 0.9}
 _VISIBLE = 0.1  # clearance over R, as drawn

@@ -16,8 +16,8 @@ from archord.postprocess.pictures import joint, problems
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.presets.views import JointView, ProblemView
+from archord.report.errors import InputError
 from archord.report.figure import new_figure, save
-from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,7 +13,7 @@ from archord.materials.material import Array
 from archord.postprocess.fields import Fields
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 # largest displacement over the size of the bodies, as drawn, where nothing touches
 _MAGNIFIED = 0.05

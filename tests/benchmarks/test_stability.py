@@ -20,7 +20,7 @@ from archord.benchmarks.stability.run import (
     with_references,
 )
 from archord.cli import run
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 
 def test_three_cases_through_the_command(tmp_path, capsys, refused):

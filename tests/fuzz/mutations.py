@@ -19,10 +19,10 @@ import tomli_w
 from pydantic import BaseModel
 
 from archord.scene.file import parse_any, resolved
+from archord.scene.presets.joint import Scene
+from archord.scene.presets.known import PRESETS
 from archord.scene.problem import ProblemScene
 from archord.scene.reference import example
-from archord.scene.scene import Scene
-from archord.scene.shapes import PRESETS
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 GENERAL = Path(__file__).with_name(

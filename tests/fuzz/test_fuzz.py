@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, resolved
 from tests.fuzz.fuzzing import faults, run_case, run_mesh_case, scene_of
 from tests.fuzz.mutations import KINDS, base_scenes

@@ -17,7 +17,7 @@ from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import solve_scene
 from archord.scene.file import load_scene
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 
 
 def solved(scenes: dict[str, Scene], folder: Path) -> dict[str, Path]:

@@ -11,7 +11,7 @@ from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.measures.energies import Work
 from archord.measures.record import Record
 from archord.output import checkpoint
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.stepping import Step

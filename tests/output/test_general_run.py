@@ -10,7 +10,7 @@ from mpi4py import MPI
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import parse_any
 from archord.studies.accuracy import solve_to_accuracy
 

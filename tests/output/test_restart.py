@@ -16,7 +16,7 @@ from archord.output.history import read_history
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from tests.output.run_files import accepted_steps, same_run
 from tests.solver.solving import SEVERAL, scene

@@ -19,7 +19,7 @@ from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.output.run_json import peak_memory
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, resolved
 from tests.output.run_files import accepted_steps, same_run, solved
 from tests.solver.solving import scene

@@ -11,7 +11,7 @@ from archord.output.files.seal import read_report
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from tests.output.run_files import rewrite_report
 
 _BY_SIZE = "bytes, not the"

@@ -17,7 +17,7 @@ from archord.output.files.step_file import StepFile
 from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.output.run import solve_scene
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from tests.output.run_files import accepted_steps
 from tests.solver.solving import scene
 

@@ -18,9 +18,9 @@ import pytest
 
 from archord.cli import run
 from archord.output.user_file import check_target, writing
+from archord.report.errors import InputError
 from archord.report.figure import new_figure, save
 from archord.report.files import replacing, write_report
-from archord.scene.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 SCENE = str(ROOT / "scenes" / "steel_pin.toml")

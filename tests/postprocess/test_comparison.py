@@ -11,7 +11,7 @@ from archord.cli import run as command
 from archord.postprocess.comparison import compare_runs, differing_keys
 from archord.postprocess.curve import RunCurve, first_loading
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import parse_any
 from tests.output.run_files import solved
 

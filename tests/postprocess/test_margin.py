@@ -16,10 +16,10 @@ from archord.postprocess.margin import (
     tensile_strength,
 )
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.parts import BodySection
-from archord.scene.shapes import LugShape
+from archord.scene.presets.lug import LugShape
 from tests.output.run_files import solved
 
 STEEL = {"E": 210000.0, "nu": 0.3}

@@ -7,7 +7,7 @@ from archord.geometry.basis import QUADRILATERAL
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle, refined
 from archord.postprocess.pictures.mesh import draw_mesh, mesh_text
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 
 
 def ring(n=12, order=1):

@@ -7,10 +7,10 @@ from mpi4py import MPI
 
 from archord.cli import run as command
 from archord.output.files.step_file import times
+from archord.output.files.vtkhdf import SECOND_ORDER, Grid, write_vtkhdf
 from archord.output.run import solve_scene
 from archord.postprocess.export import export_vtk
 from archord.postprocess.run import Run
-from archord.output.files.vtkhdf import SECOND_ORDER, Grid, write_vtkhdf
 from tests.output.test_step_file import file_size_limit
 from tests.postprocess.vtk_reader import VtkFile
 from tests.solver.solving import scene

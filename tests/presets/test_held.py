@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from archord.measures.account import Account
 from archord.presets.account import account_of
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import parse_any
 
 STEEL = {"E": 210000.0, "nu": 0.3}

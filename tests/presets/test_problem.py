@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
 from archord.presets.account import account_of
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import parse_any
-from archord.scene.shapes import general_joint
+from archord.scene.presets.joint_shape import general_joint
 from archord.solver.path.stepping import Step, march
 from tests.solver.solving import solve
 

@@ -10,7 +10,7 @@ import archord
 from archord.output.run import solve_scene
 from archord.presets.account import account_of
 from archord.presets.words import words_of
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import parse_scene
 from tests.solver.parts import blocks
 

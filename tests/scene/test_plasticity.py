@@ -4,9 +4,10 @@ of both."""
 import pytest
 
 from archord.materials.named import metal, metals
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, parse_scene, resolved
-from archord.scene.sections import Solid, Units
+from archord.scene.sections.bodies import Solid
+from archord.scene.sections.units import Units
 
 STEEL = {"E": 206000.0, "nu": 0.29}
 TEST = {

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import files_read, load_scene, parse_any, resolved
 from archord.scene.problem import ProblemScene
 from archord.scene.reference import example

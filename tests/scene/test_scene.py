@@ -16,10 +16,10 @@ from archord.materials.hardening import (
     VoceHardening,
 )
 from archord.materials.named import metal
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
+from archord.scene.presets.joint import Scene
 from archord.scene.reference import example, materials, reference
-from archord.scene.scene import Scene
 
 
 def basic() -> dict:

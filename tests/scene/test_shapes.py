@@ -8,7 +8,7 @@ import tomli_w
 from mpi4py import MPI
 
 from archord.presets.problem import general_problem
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, resolved
 from archord.scene.problem import ProblemScene
 from archord.solver.path.system import System

@@ -14,7 +14,7 @@ from archord.measures.record import Record
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import joint_problem
 from archord.presets.joint_measures import JointMeasures, joint_account
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.linear.substructured import schur_kernels
 from archord.solver.path.coarse_start import coarse_start
 from archord.solver.path.stepping import march

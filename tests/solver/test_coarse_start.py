@@ -10,7 +10,7 @@ from archord.benchmarks.case import paper_joint
 from archord.geometry.curve import ProjectionError
 from archord.output.run import solve_scene
 from archord.presets import joint as preset
-from archord.scene.sections import Stepping
+from archord.scene.sections.analysis import Stepping
 from archord.solver.path import coarse_start
 from tests.solver.solving import SEVERAL, joint_system
 

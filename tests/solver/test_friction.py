@@ -9,7 +9,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
-from archord.scene.scene import Scene
+from archord.scene.presets.joint import Scene
 from archord.solver.contact.named import LAWS, contact_law
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene
 from archord.solver.path.stepping import StepFailure
 from tests.solver.solving import scene, solve

@@ -11,7 +11,7 @@ from archord.output.run import solve_scene
 from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.presets.joint_doubts import core_peeq
-from archord.scene.sections import JointLoad
+from archord.scene.sections.loading import JointLoad
 from tests.solver.solving import solve
 
 LIKE = LawJoint(1.0, DR, 1.0)

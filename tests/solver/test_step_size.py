@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from archord.scene.errors import InputError
-from archord.scene.sections import Stepping
+from archord.report.errors import InputError
+from archord.scene.sections.analysis import Stepping
 from archord.solver.path.load_path import LoadPath
 from archord.solver.path.newton import Newton
 from archord.solver.path.stepping import StepFailure, StepRules, march

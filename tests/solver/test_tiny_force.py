@@ -5,7 +5,7 @@ import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.persson import persson_joint
-from archord.scene.sections import JointLoad
+from archord.scene.sections.loading import JointLoad
 from tests.solver.solving import solve
 
 

@@ -16,9 +16,9 @@ from archord.benchmarks.cost.work_precision_codes import CASES
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.progress import Progress
-from archord.scene import geometry as scene_geometry
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, parse_scene, resolved
+from archord.scene.presets import joint_geometry as scene_geometry
 from archord.studies import mesh_family
 from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.mesh_family import MeshFamily, ProblemFamily

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from archord.materials.elasticity import contact_modulus
 
 if TYPE_CHECKING:
-    from archord.scene.scene import Scene
-    from archord.scene.sections import Solid
+    from archord.scene.presets.joint import Scene
+    from archord.scene.sections.bodies import Solid
 
 Array = npt.NDArray[np.floating]
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are

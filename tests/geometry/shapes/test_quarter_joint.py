@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
-from archord.scene.geometry import JointGeometry
+from archord.scene.presets.joint_geometry import JointGeometry
 from tests.geometry.shapes.measures import Cells, Facets
 
 R, DR, W = 1.0, 0.005, 10.0

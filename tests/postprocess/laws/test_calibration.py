@@ -10,7 +10,7 @@ from archord.postprocess.laws.calibration import calibrate, fit_curve
 from archord.postprocess.laws.fit_report import notes
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from tests.output.run_files import solved
 from tests.postprocess.synthetic import LOADS, curve
 from tests.solver.solving import scene

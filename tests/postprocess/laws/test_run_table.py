@@ -17,7 +17,7 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.run_table import _left_out, _steps_asked, run_table
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
+from archord.report.errors import InputError
 from archord.scene.file import load_scene
 from tests.output.run_files import solved
 

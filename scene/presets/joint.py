@@ -1,21 +1,22 @@
-"""The scene: a joint and its loading, checked, with every key's unit and default; in any consistent
-set of units."""
+"""The paper's joint as a scene: a pin joint and its loading, in any consistent set of units."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from archord.materials.elasticity import contact_modulus
-from archord.scene.errors import InputError
-from archord.scene.faults import in_sentences
-from archord.scene.geometry import JointGeometry
-from archord.scene.keys import Section, key, plain, require, unused
-from archord.scene.sections import Analysis, JointLoad, Output, Pin, Solid, Stepping, Units
+from archord.report.errors import InputError
+from archord.scene.presets.joint_geometry import JointGeometry
+from archord.scene.sections.analysis import Analysis, Output, Stepping
+from archord.scene.sections.bodies import Pin, Solid, require_solids
+from archord.scene.sections.checked import Checked
+from archord.scene.sections.keys import key, require, unused
+from archord.scene.sections.loading import JointLoad
+from archord.scene.sections.units import Units
 
 # version of the scene format: rises when a scene gets a meaning that an older archord would get
 # wrong
@@ -30,77 +31,6 @@ _STIFFEST = 1.6  # P over E* delta of no joint in a block: 1.53 where the cleara
 _STIFFEST_STUCK = (
     3.5  # the same with friction: 2.2 with a coefficient of 1, 3.15 where nothing slides
 )
-_SOFTEST = 1e-8  # ratio of the moduli
-_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
-
-
-class Checked(Section):
-    """A scene, checked: sections given as tables or as their classes; the default ``format`` is the
-    newest."""
-
-    def __init__(
-        self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any
-    ) -> None:
-        """Check ``sections`` as read from ``source``; ``origin`` names another source of some
-        keys."""
-        try:
-            data = plain(sections)
-        except RecursionError:
-            raise InputError(
-                f"{source}: is not a scene: its tables are nested too deeply."
-            ) from None
-        version = data.get("format")
-        newest = type(self).model_fields["format"].default
-        if (
-            isinstance(version, int) and version > newest
-        ):  # it may hold anything else that is unknown here
-            said = f"is for a newer archord; this one reads format {newest}"
-            raise InputError(f"{source}: format = {version} {said}.")
-        try:
-            units = data.get("units")
-            context = {"stress": str(units.get("stress", "MPa"))} if isinstance(units, dict) else {}
-            self.__pydantic_validator__.validate_python(data, self_instance=self, context=context)
-        except ValidationError as error:
-            raise InputError(
-                in_sentences(error.errors(), data, type(self), source, dict(origin or {}))
-            ) from None
-
-    def require_open(self: Any, chosen: tuple[str, ...]) -> None:
-        """Raise `Fault` if the scene gives a key of those that its accuracy chooses."""
-        for name in chosen if self.analysis.accuracy is not None else ():
-            section, key = name.split(".")
-            table = getattr(self, section)
-            free = key not in table.model_fields_set or getattr(table, key) is None
-            require(
-                free, name, "must not be given together with analysis.accuracy, which chooses it"
-            )
-
-    @property
-    def thickness(self: Any) -> float:
-        """Thickness, 1 if forces are per unit thickness."""
-        return self.analysis.thickness or 1.0
-
-    @property
-    def doubts(self: Any) -> list[str]:
-        """What to warn of before anything is solved."""
-        return [*self.units.doubts, *self.analysis.doubts]
-
-    @property
-    def materials(self: Any) -> dict[str, dict[str, Any]]:
-        """The numbers that each body is solved with, by its name: E, nu, the yield stress, and in
-        words how it hardens."""
-        unit = self.units.stress
-        solids = self.solids.items()
-        return {
-            name: solid.model_dump(include={"E", "nu", "yield_stress"})
-            | {"strength": solid.strength(unit)}
-            for name, solid in solids
-        }
-
-    @property
-    def plastic(self: Any) -> bool:
-        """Whether any body can yield."""
-        return any(solid.plastic for solid in self.solids.values())
 
 
 class Scene(Checked):
@@ -269,32 +199,3 @@ class Scene(Checked):
     def solids(self) -> dict[str, Solid]:
         """The deformable bodies by name."""
         return {"block": self.block} if self.pin.rigid else {"pin": self.pin, "block": self.block}
-
-
-def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
-    """Raise `Fault` for moduli and strengths, by their places, that leave the tolerances or the
-    range of numbers."""
-    stiffest = max(solid.E for solid in solids.values())
-    for place, solid in solids.items():
-        modulus = (*place, "E")
-        strength = solid.yield_stress
-        require(
-            1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units"
-        )
-        said = (
-            f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in one "
-            "unit"
-        )
-        require(stiffest <= solid.E / _SOFTEST, modulus, said)
-        strong = strength is None or strength >= _WEAKEST * solid.E
-        require(
-            strong,
-            (*place, "yield_stress"),
-            f"must be at least {_WEAKEST:g} times E, in the same unit",
-        )
-        allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
-        require(
-            allowed,
-            (*place, "hardening"),
-            f"must not exceed {1 / _WEAKEST:g} times E, in the same unit",
-        )

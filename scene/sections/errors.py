@@ -5,10 +5,6 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from archord.report.errors import InputError
-
-__all__ = ["Fault", "InputError", "toml_value"]
-
 
 class Fault(ValueError):
     """What is ``said`` of the key at ``place``: of its section, or below sections or the names of

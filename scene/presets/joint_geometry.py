@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from archord.scene.keys import Positive, Section, given, key, require
+from archord.scene.sections.keys import Positive, Section, given, key, require
 
 _WIDEST = 1e6  # block_size over R
 _THINNEST = 0.02  # wall of a ring over R

@@ -18,8 +18,8 @@ from archord.materials.hardening import (
     VoceHardening,
 )
 from archord.materials.named import metal, metals
-from archord.scene.errors import Fault
-from archord.scene.keys import Pair, Positive, Section, key, require
+from archord.scene.sections.errors import Fault
+from archord.scene.sections.keys import Pair, Positive, Section, key, require
 
 ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
 Exponent = Annotated[float, Field(gt=0, le=1)]

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
-from pydantic._internal._model_construction import (
-    ModelMetaclass,
-)  # pydantic has no public name for it
+from pydantic._internal._model_construction import ModelMetaclass
 
-from archord.scene.errors import Fault, InputError
-from archord.scene.faults import of_section
+from archord.report.errors import InputError
+from archord.scene.sections.errors import Fault
+from archord.scene.sections.faults import of_section
 
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f]*$")]  # text on one line
 Positive = Annotated[float, Field(gt=0)]

@@ -12,7 +12,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from archord.scene.errors import Fault, toml_value
+from archord.scene.sections.errors import Fault, toml_value
 
 _MOST_SENTENCES = 20
 _ELSEWHERE = {

@@ -1,0 +1,115 @@
+"""A clevis: a pin through one inner and two outer plates."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from archord.scene.presets.lug import Lug, PlateOutline
+from archord.scene.presets.preset import BoredShape, PinPart, Preset, general_scene
+from archord.scene.sections.bodies import Solid
+from archord.scene.sections.keys import Positive, key, require
+
+
+class PlateOfClevis(PlateOutline):
+    """One plate of a clevis."""
+
+    def lug(self, clevis: Clevis) -> Lug:
+        """The plate as a lug, unchecked."""
+        outline = self.model_dump(include={*PlateOutline.model_fields})
+        return Lug.model_construct(radius=clevis.radius, clearance=clevis.clearance, **outline)
+
+    def outline(self, clevis: Clevis) -> dict[str, Any]:
+        """What draws it."""
+        found = self.lug(clevis).arguments()
+        return {name: found[name] for name in PlateOutline.model_fields}
+
+
+class ClevisPlate(PlateOfClevis, Solid):
+    """The inner plate of a clevis, or each of its two outer ones."""
+
+    thickness: Positive = key("thickness of this plate", "length", example=10.0)
+
+
+class DrawnPlate(PlateOfClevis):
+    """The outline of one plate of a clevis, and what a margin of safety needs beside it."""
+
+    thickness: Positive | None = key(
+        "thickness of the plate, for its margins of safety", "length", default=None
+    )
+
+
+class Clevis(BoredShape):
+    """A pin through one inner and two outer plates, and how finely they are meshed."""
+
+
+class ClevisShape(Clevis):
+    """A clevis with what a preset says elsewhere."""
+
+    inner: DrawnPlate
+    outer: DrawnPlate
+    pin: PinPart = "half"
+    kind: Literal["clevis"] = "clevis"
+
+    @model_validator(mode="after")
+    def _plates(self) -> ClevisShape:
+        for name in ("inner", "outer"):
+            getattr(self, name).lug(self).check(place=(name,))
+        return self
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        plates = {name: getattr(self, name).outline(self) for name in ("inner", "outer")}
+        return super().arguments() | plates
+
+
+class ClevisScene(Preset):
+    """A pin through one inner plate and two outer ones: the plane problem of the inner plate, under
+    the force P, beside the one of an outer plate, under P/2, each per unit of its own thickness."""
+
+    clevis: Clevis = Field(description="radius of the pin, clearance in all plates, and mesh")
+    inner: ClevisPlate = Field(description="geometry and material of the inner plate")
+    outer: ClevisPlate = Field(description="geometry and material of each of the two outer plates")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ClevisScene:
+        self.require_whole("clevis.clearance", self.clevis.clearance)
+        for name, plate in self._plates.items():
+            plate.lug(self.clevis).check(place=(name,))
+        said = (
+            "is not for a clevis: its plates share a force, and the displacement is the sum of "
+            "both; give force"
+        )
+        require(self.load.displacement is None, "load.displacement", said)
+        require(not self.pin.rigid, "pin.rigid", "must be false in a clevis")
+        said = "is not for a clevis, whose plates have a thickness each"
+        require(self.analysis.thickness is None, "analysis.thickness", said)
+        return self
+
+    @property
+    def _plates(self) -> dict[str, ClevisPlate]:
+        return {"inner": self.inner, "outer": self.outer}
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for."""
+        parts: dict[str, list[dict[str, Any]]] = {"interaction": [], "support": [], "load": []}
+        shape = self.clevis.arguments() | {"kind": "clevis"}
+        overlap = max(-self.clevis.clearance, 0.0)
+        bodies: dict[str, Solid] = {}
+        for (name, plate), share in zip(self._plates.items(), (1.0, 0.5), strict=True):
+            shape[name] = plate.outline(self.clevis) | {"thickness": plate.thickness}
+            surfaces = [f"{name} pin", f"{name} hole"]
+            contact = {"name": f"pin in {name}", "surfaces": surfaces, "overlap": overlap}
+            place = {"diameter": f"{name} flat"}.get(self.load.at, f"{name} centre")
+            forces = [share / plate.thickness * force for force in self.load.stages]
+            parts["load"].append(
+                {"name": f"{name} pull", "on": place, "direction": "x", "force": forces}
+            )
+            parts["support"].append(
+                {"name": f"{name} clamp", "on": f"{name} clamp", "fixed": ["x", "y"]}
+            )
+            parts["interaction"].append(contact)
+            bodies |= {f"{name} pin": self.pin, name: plate}
+        parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
+        return general_scene(self, shape, 2, bodies, **parts, path={"steps": self.load.steps})

@@ -1,0 +1,193 @@
+"""What presets share: the shape around a pin, its load, and the general scene made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from archord.scene.presets.joint import Scene
+from archord.scene.sections.analysis import PresetAnalysis, ProblemOutput, Stepping
+from archord.scene.sections.bodies import Pin, Solid
+from archord.scene.sections.checked import Checked
+from archord.scene.sections.keys import Positive, Section, key, plain, require
+from archord.scene.sections.loading import Loading, StepCounts, Targets
+from archord.scene.sections.units import Units
+
+# walls, overlaps and lengths over the pin's radius
+THINNEST = 0.02 * (1 - 1e-9)
+DEEPEST = 0.03
+FARTHEST = 1e3
+_MATERIAL = {*Solid.model_fields}
+PinPart = Literal["half", "whole", "none"]
+
+
+class Shape(Section):
+    """A shape around a pin, and how finely it is meshed."""
+
+    radius: float = key("radius R of the pin", "length", example=10.0, ge=1e-30, le=1e30)
+    element_size: Positive | None = key(
+        "edge length of elements on the arcs; 0.04 R if absent", "length", other=0.4
+    )
+    growth: float = key(
+        "growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2
+    )
+
+    @model_validator(mode="after")
+    def _mesh(self):
+        require(
+            1e-3 <= self.h / self.radius <= 0.5,
+            "element_size",
+            "must be between 1e-3 and 0.5 times the radius",
+        )
+        return self
+
+    @property
+    def h(self) -> float:
+        """Element size on the arcs."""
+        return self.element_size or 0.04 * self.radius
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        return self.model_dump() | {"element_size": self.h}
+
+
+class BoredShape(Shape):
+    """A shape whose hole leaves the pin a clearance."""
+
+    clearance: float = key(
+        "hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1
+    )
+
+    @model_validator(mode="after")
+    def _clearance(self):
+        between = f"must be between {-DEEPEST:g} and 0.5 times the radius"
+        require(-DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
+        return self
+
+
+class PinLoad(Loading):
+    """How the pin is moved in +x: by its diameter across the axis, or as a rigid disc."""
+
+    displacement: Targets | None = key(
+        "displacement of the pin", "length", default=None, example=0.1
+    )
+    force: Targets | None = key("force on the whole pin, instead", "force", other=1000.0)
+    at: Literal["diameter", "centre"] = key(
+        "a force acts on the straight diameter or the centre", default="diameter"
+    )
+    steps: StepCounts = key("output steps up to each target", default=20)
+
+    @model_validator(mode="after")
+    def _at(self) -> PinLoad:
+        require(
+            self.at == "diameter" or self.force is not None,
+            "at",
+            'must be "diameter" for a displacement',
+        )
+        return self
+
+
+class Preset(Checked):
+    """What the scenes of presets share; each defines `general`."""
+
+    format: Literal[2] = key("version of the scene format", default=2)
+    units: Units = Field(default_factory=Units, description="names of the units")
+    pin: Pin = Field(description="material of the pin")
+    load: PinLoad = Field(description="loading")
+    analysis: PresetAnalysis = Field(default_factory=PresetAnalysis, description="model and solver")
+    stepping: Stepping = Field(
+        default_factory=Stepping, description="control of the steps between outputs"
+    )
+    output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for."""
+        raise NotImplementedError
+
+    def require_whole(self, name: str, gap: float) -> None:
+        """Raise `Fault` of the key ``name`` where half a pin would have to be pressed in."""
+        fits = self.pin.whole or self.pin.rigid or gap >= 0
+        require(fits, name, "needs pin.whole = true, as half a pin cannot be pressed in")
+
+    def pulled(
+        self,
+        shape: dict[str, Any],
+        solids: Mapping[str, Solid],
+        held: str,
+        surfaces: list[str],
+        gaps: list[float],
+        laws: Sequence[str] = (),
+    ) -> dict[str, Any]:
+        """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their
+        ``surfaces`` the first faces the second at the first of the ``gaps`` by the first of the
+        ``laws``, the third the fourth, ..."""
+        half, touching = (shape.get(name, True) for name in ("half", "touching"))
+        rigid = self.pin.rigid
+        names = ["pin", *solids]
+        contacts = list[dict[str, Any]]()
+        for k, gap in enumerate(gaps):
+            facing = {
+                "name": f"{names[k]} in {names[k + 1]}",
+                "surfaces": surfaces[2 * k : 2 * k + 2],
+            }
+            law = {"law": laws[k]} if laws else {}
+            contacts.append(facing | law | {"overlap": max(-gap, 0.0)})
+        if rigid:
+            disc = {
+                "centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0],
+                "radius": shape["radius"],
+            }
+            contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
+        supports = [{"name": held, "on": held, "fixed": ["x", "y"]}]
+        if half or not rigid:
+            supports.append({"name": "axis", "on": "axis" if half else "centre", "fixed": ["y"]})
+        place = contacts[0]["name"] if rigid else {"diameter": "flat"}.get(self.load.at, "centre")
+        pull = {
+            "name": "pull",
+            "on": place,
+            "direction": "x",
+            self.load.kind: getattr(self.load, self.load.kind),
+        }
+        parts = {
+            "interaction": contacts,
+            "support": supports,
+            "load": [pull],
+            "path": {"steps": self.load.steps},
+        }
+        return general_scene(self, shape, 2 if half else 1, solids, **parts)
+
+
+def general_scene(
+    scene: Scene | Preset,
+    shape: dict[str, Any],
+    symmetry: int,
+    solids: Mapping[str, Solid],
+    **parts: Any,
+) -> dict[str, Any]:
+    """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that
+    ``scene`` has, too, the keys that were given, as an accuracy chooses some others."""
+    pin = scene.pin
+    said = {
+        name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")
+    }
+    for name in ("integration", "coarse_start", "friction"):  # of presets alone
+        said["analysis"].pop(name, None)
+    if friction := scene.analysis.friction:
+        parts["interaction"] = [
+            part if part.get("law") == "tied" else part | {"friction": friction}
+            for part in parts["interaction"]
+        ]
+    bodies = solids if pin.rigid or pin in solids.values() else {"pin": pin, **solids}
+    drawn = "whole" if pin.whole else "half"
+    if pin.rigid:
+        drawn = "none"
+    parts |= {
+        "mesh": {"shape": shape | {"pin": drawn}},
+        "body": [
+            {"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL)
+            for n, s in bodies.items()
+        ],
+    }
+    return said | parts | {"analysis": said["analysis"] | {"symmetry": symmetry}}

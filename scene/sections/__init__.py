@@ -1,0 +1,1 @@
+"""The sections of scenes: documented keys, checked."""
