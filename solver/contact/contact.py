@@ -47,6 +47,7 @@ class Contact:
         self.pairs = [pair for i in interfaces for pair in i.pairs]
         self.has_friction = any(pair.law.has_friction for pair in self.pairs)
         self._slipping = [pair for pair in self.pairs if pair.counts_slip]
+        self._block_size = V.dofmap.bs
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
@@ -54,7 +55,7 @@ class Contact:
         self.use_gamma_factor(self.gamma_factor)
         self.active_set_changes = 0
         self._reaches = [Reach(pair, i.slide) for i in interfaces for pair in i.pairs]
-        self.tangent = ContactTangent(self._reaches)
+        self.tangent = ContactTangent(self._reaches, self._block_size)
 
     def move(self, levels: Array, fitted: float = 1.0) -> None:
         """Displace rigid surfaces to the drives' ``levels`` ``(d,)``, with the part ``fitted`` of
@@ -108,7 +109,7 @@ class Contact:
             return False
         grew = [each.extend() for each in self._reaches if each.pair.moves]
         if any(grew):
-            self.tangent = ContactTangent(self._reaches)
+            self.tangent = ContactTangent(self._reaches, self._block_size)
         return any(grew)
 
     def anticipate(self, u: Array, levels: Array) -> bool:
@@ -135,7 +136,10 @@ class Contact:
     def add_force(self, force: Array) -> None:
         """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)``
         of owned nodes."""
-        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in self._all}
+        on = {
+            id(surface): np.zeros((len(surface.curve_dofs), force.shape[1]))
+            for surface in self._all
+        }
         for pair in self.pairs:
             pair.add_forces(on[id(pair.surface)], on[id(pair.opposite)])
         for surface in self.surfaces:

@@ -12,10 +12,9 @@
 
 #include "contact_tangent.h"
 
-enum { MOST = 24 };             /* nodes of a cell (degree 4: 15) and of the opposite facet (5) */
-enum { X, Y, D };               /* components of a displacement; so many */
-enum { N, T };                  /* components in the frame: normal and tangent */
-enum { XX, YY, XY, YX, HOOP };  /* components of the displacement gradient */
+enum { MOST = 24 }; /* nodes of a cell (degree 4: 15) and of the opposite facet (5) */
+enum { X, Y, D };   /* components of a displacement; so many */
+enum { N, T };      /* components in the frame: normal and tangent */
 
 /* A derivative at one point by the displacements of the own cell's nodes, then of the opposite facet's. */
 typedef double Row[MOST][D];
@@ -29,16 +28,13 @@ typedef struct {
 /* The derivative of the own stress vector by the own nodes, in x and y. */
 static void stress_rates(const Side *s, int32_t i, Row stress[D])
 {
-    const double *shape_gradient = s->gradient + D * s->a * i;
     for (int r = X; r <= Y; r++) {
         const double *C = s->moduli + s->g * (D * i + r);
+        for (int c = 0; c < s->a + s->o; c++) stress[r][c][X] = stress[r][c][Y] = 0;
         for (int c = 0; c < s->a; c++) {
-            const double *slope = shape_gradient + D * c;
-            stress[r][c][X] = C[XX] * slope[X] + C[XY] * slope[Y];
-            stress[r][c][Y] = C[YY] * slope[Y] + C[YX] * slope[X];
-            if (s->g > HOOP) stress[r][c][X] += C[HOOP] * s->hoop[s->a * i + c];
+            const double *derivative = s->derivative + s->m * (s->a * i + c);
+            for (int t = 0; t < s->g; t++) stress[r][c][s->terms[2 * t]] += C[t] * derivative[s->terms[2 * t + 1]];
         }
-        for (int c = s->a; c < s->a + s->o; c++) stress[r][c][X] = stress[r][c][Y] = 0;
     }
 }
 

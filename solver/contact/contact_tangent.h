@@ -1,15 +1,16 @@
 #include <stdint.h>
 
 /* One side of a contact: n facets of q points, with the arrays of the points in contiguous memory.
- * a nodes a cell, of which k lie on the facet (trace), o nodes of the opposite facet, g components of
- * the displacement gradient: xx, yy, xy, yx and, of an axisymmetric problem, the hoop strain u_r / r. */
+ * a nodes a cell, of which k lie on the facet (trace), o nodes of the opposite facet, m derivatives of
+ * a basis function (by the axes, and perhaps over the radius), g components of the displacement
+ * gradient. */
 typedef struct {
-    int32_t moves, n, q, a, k, o, g;
-    const double *shape;    /* (n, q, a) basis functions of the own cell */
-    const double *gradient; /* (n, q, a, 2) their gradients */
-    const double *hoop;     /* (n, q, a) basis functions over the radius, where g is 5 */
-    const int32_t *trace;   /* (n, k) nodes of the facet within the cell */
-    const double *weight;   /* (n, q) */
+    int32_t moves, n, q, a, k, o, m, g;
+    const double *shape;      /* (n, q, a) basis functions of the own cell */
+    const double *derivative; /* (n, q, a, m) */
+    const int32_t *terms;     /* (g, 2) a component of the displacement and its derivative */
+    const int32_t *trace;     /* (n, k) nodes of the facet within the cell */
+    const double *weight;     /* (n, q) */
     double share;
     const double *gamma;         /* (n q, 2) of gap and slip */
     const uint8_t *active;       /* (n q) the point carries something */

@@ -99,13 +99,13 @@ class Pair:
     def evaluate(self, u: Array, motion: Array, dt: float) -> None:
         """Evaluate at ``u`` ``(n, d)``, with the opposite's nodes moved by ``motion``, in a step of
         the length ``dt``; raises `ProjectionError`."""
-        displacement, stress_vector, moduli = self.surface.deform(u)
+        own = self.surface.deform(u)
         self.dt = dt
-        self._moved = displacement, motion
-        self.stress_vector = np.ascontiguousarray(stress_vector)
-        self.moduli = np.ascontiguousarray(moduli)
+        self._moved = own.displacement, motion
+        self.stress_vector = own.stress_vector
+        self.moduli = own.moduli
         if self.moves:
-            self._find_partners(displacement, motion)
+            self._find_partners(own.displacement, motion)
         normal = self.projection.normal
         self.frame = np.stack([normal, _turned(normal)], axis=1)
         self.opening = self._opening()

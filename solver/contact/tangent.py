@@ -28,8 +28,9 @@ class ContactTangent:
     rows, columns : (n,) places of the blocks in global block dofs, sorted
     """
 
-    def __init__(self, reaches: list[Reach]) -> None:
+    def __init__(self, reaches: list[Reach], block_size: int) -> None:
         self._reaches = reaches
+        self._block_size = block_size
         self._kernels = library(_SOURCE)
         meetings = [reach.meetings() for reach in reaches]
         size = 1 + max((m.largest_dof() for m in meetings), default=0)
@@ -42,7 +43,8 @@ class ContactTangent:
 
     def blocks(self) -> Array:
         """Derivative ``(n, d, d)`` of the residual at the last evaluation."""
-        values = np.zeros((len(self.rows), 2, 2))
+        d = self._block_size
+        values = np.zeros((len(self.rows), d, d))
         for reach, keys, slots in zip(self._reaches, self._keys, self._slots, strict=True):
             place = np.searchsorted(keys, reach.point_keys()).astype(np.int32)
             side = _side(reach.pair)
@@ -82,10 +84,11 @@ def _side(pair: Pair) -> Any:
         "a": a,
         "k": surface.trace.shape[1],
         "o": partners.shape.shape[1],
+        "m": surface.derivative.shape[3],
         "g": pair.moduli.shape[2],
         "shape": surface.shape,
-        "gradient": surface.gradient,
-        "hoop": surface.hoop,
+        "derivative": surface.derivative,
+        "terms": surface.terms,
         "trace": surface.trace,
         "weight": surface.weight,
         "share": pair.share,

@@ -1,0 +1,47 @@
+"""How large the traction on a facet can be for the elastic energy of its cell.
+
+Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue
+problem of each contact cell is solved, with its curved geometry and its elastic moduli.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.geometry.strain import PointStrain
+from archord.materials.kinematics import Kinematics
+
+
+def trace_constants(
+    moduli: Array,
+    kinematics: Kinematics,
+    in_cell: tuple[PointStrain, Array],
+    on_facet: tuple[PointStrain, Array],
+    outward: Array,
+) -> tuple[Array, Array]:
+    """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its
+    cell``, any ``v``; and the same of the shear. Unit: stress / length.
+
+    Strains come with the weights ``(n, q)`` of their points; ``outward`` ``(n, q, 2)`` are the
+    normals on the facet.
+    """
+    strain, weight = in_cell
+    B = strain.matrix()
+    energy = np.einsum("nq,nqia,ij,nqjb->nab", weight, B, moduli, B, optimize=True)
+
+    force = kinematics.traction(outward)  # (n, q, 2, k)
+    force_x = force[..., 0, :]
+    force_y = force[..., 1, :]
+    n_x = outward[..., 0, None]
+    n_y = outward[..., 1, None]
+    of_strain = np.stack([n_x * force_x + n_y * force_y, n_x * force_y - n_y * force_x])
+    strain, weight = on_facet
+    of_nodes = np.einsum("inqk,nqka->inqa", of_strain @ moduli, strain.matrix())
+    traces = np.einsum("nq,inqa,inqb->inab", weight, of_nodes, of_nodes)
+
+    value, vector = np.linalg.eigh(energy)
+    rigid = kinematics.n_rigid
+    scaled = vector[..., rigid:] / np.sqrt(value[:, None, rigid:])
+    of_normal, of_shear = np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ traces @ scaled)[..., -1]
+    return of_normal, of_shear
