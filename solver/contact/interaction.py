@@ -37,7 +37,7 @@ GAMMA_FACTOR = 0.5
 @dataclass(frozen=True)
 class Rigid:
     """A rigid disc displaced by ``rate`` times the displacement of the ``drive``, or by rates of
-    drives by name."""
+    drives by name; in an axisymmetric problem a sphere on the axis."""
 
     circle: RigidCircle
     rate: Vector | Mapping[str, Vector] = (0.0, 0.0)
@@ -143,8 +143,10 @@ class Interface:
             raise ValueError(
                 f"{interaction.name!r} is tied: it keeps its gaps, and knows no interference or overlap"
             )
-        self.pairs: list[Pair] = []
         integrated = self._integrated()
+        if integrated[0].kinematics.has_hoop:
+            self._require_on_axis()
+        self.pairs: list[Pair] = []
         with on_every_rank(integrated[0].comm):
             for own, share in zip(integrated, _shares(integrated), strict=True):
                 opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
@@ -168,6 +170,20 @@ class Interface:
                 f"{interaction.name!r} does not have the surface {interaction.integrated!r}"
             )
         return found
+
+    def _require_on_axis(self) -> None:
+        """Raise ValueError for a rigid sphere that does not stay on the axis."""
+        for given in self.interaction.surfaces:
+            if not isinstance(given, Rigid):
+                continue
+            if given.circle.centre[0] != 0:
+                raise ValueError(
+                    f"the centre of the rigid sphere of {self.interaction.name!r} must lie on the axis"
+                )
+            if any(rate[0] for rate in given.moved_by().values()):
+                raise ValueError(
+                    f"the rigid sphere of {self.interaction.name!r} must move along the axis"
+                )
 
     def fit(self, part: float) -> None:
         """Let interferences be there by this ``part``."""

@@ -63,6 +63,7 @@ class Surface:
     trace_shape : (n, q, k) the same of the nodes on the facet
     derivative : (n, q, a, 2 or 3) the basis by the axes, and around an axis over the radius
     terms : (g, 2) see `Kinematics.terms`
+    small_strain : the small strain at the points
     gamma, gamma_shear : (n,) constants of the trace inequality, in stress per length
     """
 
@@ -147,7 +148,7 @@ class Surface:
 
         self.points = Points(self.material, n * q)
         large = self.material.finite
-        self._small_strain = PointStrain(self.kinematics, basis, self.cell_dofs)
+        self.small_strain = PointStrain(self.kinematics, basis, self.cell_dofs)
         self._strain = PointStrain(self.kinematics, basis, self.cell_dofs, large=large)
         self.derivative = self._strain.derivative
         self.terms = np.array(self.kinematics.terms, dtype=np.int32)
@@ -162,7 +163,7 @@ class Surface:
         strain = PointStrain(self.kinematics, basis, self.cell_dofs)
         weight = basis.measure * w * self.kinematics.measure(basis.point)
         in_cell = strain, weight
-        on_facet = self._small_strain, self.weight
+        on_facet = self.small_strain, self.weight
         moduli = self.material.elastic_tangent
         return trace_constants(moduli, self.kinematics, in_cell, on_facet, self.outward)
 
