@@ -58,14 +58,19 @@ class Projection:
     @classmethod
     def empty(cls, m: int, k: int) -> Projection:
         """Of ``m`` points, to be filled in."""
-        vectors = np.empty((3, m, 2))
-        numbers = np.empty((2, m))
-        of_nodes = np.empty((2, m, k))
-        flags = np.empty((2, m), dtype=bool)
-        facet = np.empty(m, dtype=np.int32)
-        nodes = np.empty((m, k), dtype=np.int32)
-        xi, bend = numbers
-        return cls(facet, xi, *vectors, bend, *of_nodes, *flags, nodes)
+        return cls(
+            facet=np.empty(m, dtype=np.int32),
+            xi=np.empty(m),
+            point=np.empty((m, 2)),
+            normal=np.empty((m, 2)),
+            tangent=np.empty((m, 2)),
+            bend=np.empty(m),
+            shape=np.empty((m, k)),
+            slope=np.empty((m, k)),
+            slides=np.empty(m, dtype=bool),
+            found=np.empty(m, dtype=bool),
+            nodes=np.empty((m, k), dtype=np.int32),
+        )
 
 
 def lagrange(degree: int) -> Array:
@@ -243,8 +248,9 @@ class Curve:
         points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
         nodes = (self.X + displacement)[self.connectivity]
         start = home.astype(np.int32, copy=False)
-        curve = nodes, self.before, self.after, self._coefficients, start
-        *results, on_nodes = vars(partners).values()
+        curve: list[np.ndarray] = [nodes, self.before, self.after, self._coefficients, start]
+        results: list[np.ndarray] = list(vars(partners).values())
+        on_nodes = results.pop()
         first_lost = np.zeros(1, dtype=np.int32)
         kernel = library(Path(__file__).with_name("closest_point.c")).closest_points
         n_lost = kernel(

@@ -141,7 +141,8 @@ class Interface:
         self.slide = interaction.slide if moves else 0.0
         if not law.slides and (interaction.interference or interaction.overlap):
             raise ValueError(
-                f"{interaction.name!r} is tied: it keeps its gaps, and knows no interference or overlap"
+                f"{interaction.name!r} is tied: "
+                "it keeps its gaps, and knows no interference or overlap"
             )
         integrated = self._integrated()
         if integrated[0].kinematics.has_hoop:
@@ -178,7 +179,7 @@ class Interface:
                 continue
             if given.circle.centre[0] != 0:
                 raise ValueError(
-                    f"the centre of the rigid sphere of {self.interaction.name!r} must lie on the axis"
+                    f"the rigid sphere of {self.interaction.name!r} must have its centre on the axis"
                 )
             if any(rate[0] for rate in given.moved_by().values()):
                 raise ValueError(
