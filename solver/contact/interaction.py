@@ -174,17 +174,14 @@ class Interface:
 
     def _require_on_axis(self) -> None:
         """Raise ValueError for a rigid sphere that does not stay on the axis."""
+        sphere = f"the rigid sphere of {self.interaction.name!r}"
         for given in self.interaction.surfaces:
             if not isinstance(given, Rigid):
                 continue
             if given.circle.centre[0] != 0:
-                raise ValueError(
-                    f"the rigid sphere of {self.interaction.name!r} must have its centre on the axis"
-                )
+                raise ValueError(f"{sphere} must have its centre on the axis")
             if any(rate[0] for rate in given.moved_by().values()):
-                raise ValueError(
-                    f"the rigid sphere of {self.interaction.name!r} must move along the axis"
-                )
+                raise ValueError(f"{sphere} must move along the axis")
 
     def fit(self, part: float) -> None:
         """Let interferences be there by this ``part``."""

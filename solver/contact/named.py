@@ -56,7 +56,8 @@ def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
         )
     if friction and (law not in ("coulomb", "frictionless") or not friction > 0):
         raise ValueError(
-            f"friction must be positive, of a law that is frictionless without it: {friction:g} of {law!r}"
+            "friction must be positive, of a law that is frictionless without it: "
+            f"{friction:g} of {law!r}"
         )
     if friction:
         return Coulomb(friction)
