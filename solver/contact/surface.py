@@ -152,7 +152,7 @@ class Surface:
         self._strain = PointStrain(self.kinematics, basis, self.cell_dofs, large=large)
         self.derivative = self._strain.derivative
         self.terms = np.array(self.kinematics.terms, dtype=np.int32)
-        outward = self.outward.reshape(n * q, -1)
+        outward = self.outward.reshape(n * q, self.outward.shape[-1])
         # takes a stress to the force on the edge
         self._cut = np.ascontiguousarray(self.kinematics.traction(outward, large=large))
 
