@@ -44,9 +44,8 @@ def test_names_become_folders_and_are_found(tmp_path):
 
 def test_a_run_that_stops_is_a_sentence(tmp_path):
     """Nothing resists a pull; `attempt` gives what was reached, `solve` insists on the end."""
-    pulled = Case(
-        "pulled", paper_joint(0.3, 1, load={"displacement": None, "relative_force": -0.001})
-    )
+    load = {"displacement": None, "relative_force": -0.001}
+    pulled = Case("pulled", paper_joint(0.3, 1, load=load, stepping={"minimum": 1.0}))
     assert pulled.attempt(tmp_path).status == "stopped"
     assert not pulled.is_done(tmp_path)
     with pytest.raises(RuntimeError, match=r"^pulled: no equilibrium"):

@@ -95,6 +95,24 @@ def test_shape_functions_are_lagrange_polynomials(degree):
             np.testing.assert_allclose(found @ nodes**power, wanted, atol=1e-14)
 
 
+@every_curve
+def test_vertices_face_outward(f):
+    """Each vertex once, also the free ends; its normal lies between those of the chords beside
+    it."""
+    c = interpolate(f, 8)
+    x, outward = c.vertices()
+    corners = c.X[::2]
+    np.testing.assert_array_equal(x, corners)
+    chord = np.diff(corners, axis=0)
+    normal = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    beside = np.concatenate([normal[:1], normal, normal[-1:]])
+    for of_facet in (beside[:-1], beside[1:]):
+        assert ((outward * of_facet).sum(axis=1) > 0.9).all()
+    np.testing.assert_allclose(outward[[0, -1]], normal[[0, -1]], atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1.0, rtol=1e-14)
+
+
 def test_arc_length():
     """Fourth order, the geometry's own: quarter circles of 4, 8 and 16 facets against pi / 2; and
     the end of a facet is the start of the next, also on a graded wave."""

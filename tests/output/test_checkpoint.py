@@ -15,8 +15,10 @@ from archord.report.errors import InputError
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.stepping import Step
+from archord.solver.path.system import System
 from tests.solver.contact.test_ranks import CUTS
 from tests.solver.solving import joint_system, scene, solve
+from tests.solver.test_stabilisation import sleeves
 
 PROBLEM = scene(0.15, 3, yield_stress=0.002)
 
@@ -29,6 +31,20 @@ def pressed():
     position = Position(3, joint.equilibrium.load, 0.003, 0.1 * joint.equilibrium.state(), 0.7)
     at = solution.steps[-1], Step(joint.equilibrium.load), position, Work(0.01, 0.02, 0.03)
     return checkpoint.halt(MeshOrder(joint), "scene", *at)
+
+
+def test_the_energy_of_springs_goes_on(tmp_path):
+    """What springs took up before a halt counts after it, too."""
+    halted = System(sleeves())
+    halted.solve([0.15])
+    energy = halted.stabilisation_energy
+    assert energy > 0
+    record = Record(1, 0.15, {}, 0.0, *np.zeros(4), 1, 0, 0.0)
+    position = Position(1, halted.equilibrium.load, 0.15, halted.equilibrium.state())
+    saved = checkpoint.halt(MeshOrder(halted), "", record, Step(0.15), position, Work())
+    going_on = System(sleeves())
+    checkpoint.resume(MeshOrder(going_on), tmp_path, saved)
+    assert going_on.stabilisation_energy == pytest.approx(energy, rel=1e-14)
 
 
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:

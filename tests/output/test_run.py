@@ -134,6 +134,26 @@ def test_fields_open_with_their_steps_in_order(run):
     assert (np.linalg.norm(points[middle] - chord, axis=-1) < 0.1 * sides).all()
 
 
+def test_means_of_cells_integrate_to_the_whole(run):
+    """PEEQ of the cells times their areas is the integral over the integration points, of both
+    halves of the joint."""
+    found = Run(run.folder)
+    fields = found.fields()
+    # the determinant of a curved triangle is quadratic: the middles of its edges integrate it
+    slopes = np.array(
+        [
+            [[-1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, -2.0, 2.0, 2.0]],
+            [[1.0, 1.0, 0.0, -2.0, 2.0, -2.0], [1.0, 0.0, 1.0, -2.0, 2.0, -2.0]],
+            [[-1.0, -1.0, 0.0, 2.0, 2.0, -2.0], [-1.0, 0.0, 1.0, 0.0, 0.0, 0.0]],
+        ]
+    )
+    x = fields.coordinates[fields.cells]
+    area = np.linalg.det(np.einsum("qka,nai->nqki", slopes, x)).mean(axis=1) / 2
+    integral = found.columns["peeq_integral"][-1]
+    assert fields.peeq.max() > 1e-4
+    assert 2 * np.abs(area) @ fields.peeq == pytest.approx(integral, rel=1e-10)
+
+
 def test_contact_file_integrates_to_the_force(run):
     """The projected pressure of each side carries the raw pressure's force; gaps are closed where
     it acts."""

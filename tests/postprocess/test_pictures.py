@@ -135,7 +135,7 @@ def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refus
         assert len(re.findall(rb"/Type /Page\b", content)) in (2, 3)
         capsys.readouterr()
         assert "is there already" in refused(["report", str(folder), "-o", str(target)])
-        assert command(["report", str(folder), "-o", str(target), "--force"]) == 0
+    assert command(["report", str(bare), "-o", str(target), "--force"]) == 0
     assert not list(tmp_path.glob("*.new"))
     capsys.readouterr()
     assert "cannot be written" in refused(

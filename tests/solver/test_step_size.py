@@ -140,6 +140,12 @@ def test_a_failed_step_is_cut_and_the_length_recovers():
     assert np.diff([0.0, *accepted]).max() > 0.15
 
 
+def test_a_step_that_was_just_cut_does_not_grow():
+    """Its length has failed before; the step after it may be longer again."""
+    spring, _, _ = follow([1.0], lambda load, stride: math.inf if stride > 0.3 else 3)
+    assert spring.solved[:4] == pytest.approx([1.0, 0.5, 0.25, 0.5])
+
+
 def test_the_smallest_step_is_tried_before_giving_up():
     """The last solve that fails is one of the minimum's length, and the state is that of the last
     load that held."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from archord.solver.contact.law import STICK
 from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import (
     DR,
@@ -83,6 +84,30 @@ def test_the_resultant_is_the_integrated_pressure(integrated, kinematics):
         contact.resultant(), total, rtol=0, atol=1e-15 * np.abs(total).max() * 100
     )
     assert contact.n_active() == active > 0
+
+
+def test_points_that_begin_to_slide_are_counted():
+    """A pin is pressed, and then turned by little, by much, and by much the other way: each point
+    that goes over to another branch counts once."""
+    parts = joint_parts(kinematics="current, rubbing")
+    pressed = parts.pressed(1.5 * DR)
+    parts.contact.evaluate(pressed)
+    commit(parts.contact)
+    parts.contact.begin(pressed)
+    on_pin = nodes_of(parts.V, parts.cells, Cells.PIN)
+    before = [pair.branch for pair in parts.contact.pairs]
+    began = False
+    for turn in (1e-7, 0.3 * DR, -0.3 * DR):
+        u = pressed.copy()
+        u[on_pin, 0] += turn
+        parts.contact.evaluate(u)
+        after = [pair.branch for pair in parts.contact.pairs]
+        changed = [a != b for a, b in zip(before, after, strict=True)]
+        slid = [(a == STICK) & (b > STICK) for a, b in zip(before, after, strict=True)]
+        began |= any(some.any() for some in slid)
+        assert parts.contact.active_set_changes == sum(int(some.sum()) for some in changed)
+        before = after
+    assert began
 
 
 def test_points_without_a_partner_carry_no_pressure():
