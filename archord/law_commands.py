@@ -110,7 +110,8 @@ def laws() -> int:
     multiple=True,
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave) or .json",
+    help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave) or "
+    ".json",
 )
 @flag("--force", "overwrite exports")
 @_sentences()
@@ -173,7 +174,9 @@ def law(
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
     if plot:
         check_target(plot, files_read(scene, overrides) if scene else [], force=True)
-    states, said, silent = [], [], []
+    states = []
+    said = []
+    silent = []
     for entry in chosen:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", LawRangeWarning)
@@ -260,7 +263,8 @@ def _refuse_unused(chosen: list[Law], given: dict[str, Any]) -> None:
         if given[name] is not None and not any(name in law.coefficients for law in chosen):
             laws = ", ".join(law.name for law in LAWS.values() if name in law.coefficients)
             raise InputError(
-                f"--{name} {given[name]:g}: is for {laws} alone; {chosen[0].name} has no such coefficient."
+                f"--{name} {given[name]:g}: is for {laws} alone; {chosen[0].name} has no such "
+                "coefficient."
             )
 
 
@@ -312,7 +316,10 @@ def _joint_of_scene(
     from archord.postprocess.laws.general.joint import LawJoint
 
     if "E_star" in values:
-        said = "does not go with --scene, which has E* of E and nu of its bodies; change these by --set"
+        said = (
+            "does not go with --scene, which has E* of E and nu of its bodies; change these by "
+            "--set"
+        )
         raise InputError(f"--E-star {values['E_star']:g}: {said}.")
     before = _law_scene(path, overrides)
     changes = {
@@ -421,7 +428,8 @@ def fit(
                 "--table: takes one run, and but for --of and --force no other option."
             )
         return _write_table(folders[0], tables, of, force)
-    deltas, first = load_range or (0.0, math.inf), folders[0]
+    deltas = load_range or (0.0, math.inf)
+    first = folders[0]
     if any(map(is_sweep, folders)):
         if len(folders) > 1 or json_file or exports or picture:
             raise InputError(
@@ -429,7 +437,8 @@ def fit(
             )
         return _fit_sweep(first, deltas)
     calibration = calibrate([Run(folder).curve.loading() for folder in folders], deltas)
-    inputs, files = [folder / name for folder in folders for name in FILES], []
+    inputs = [folder / name for folder in folders for name in FILES]
+    files = []
     if picture:
         check_target(picture, inputs, force=True)
         files.append(fit_report.draw_fit(calibration, picture))

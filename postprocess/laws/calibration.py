@@ -26,6 +26,8 @@ from archord.report.errors import InputError
 
 POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning
 _LIKE = 0.01  # share of P by which the blocks of runs of one fit may change it
+_SEPARATELY = "one law is for one kind of joint: fit them separately."
+_OWN_TABLE = "archord fit RUN --table FILE keeps the run's own P(delta)."
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # one start may miss the best side of the onset
 
 
@@ -85,8 +87,12 @@ def fit(
 
 @dataclass(frozen=True)
 class Residual:
-    """A run's part of a fit, arrays ``(n,)``: ``delta/dR``, the dimensionless data and what the law
-    makes of them."""
+    """A run's part of a fit.
+
+    - ``load`` ``(n,)``: ``delta/dR`` of the steps
+    - ``data`` ``(n,)``: the run's curve, without dimension
+    - ``law`` ``(n,)``: the fitted law at the same steps
+    """
 
     name: str
     load: Array
@@ -111,30 +117,35 @@ class CurveFit:
 
     @property
     def quality(self) -> tuple[float, float, float, int]:
-        """Of all runs one after the other, the coefficient of determination, root mean square and
-        largest (with its sign) of ``law/data - 1``, and the number of steps."""
+        """Coefficient of determination, root mean square and largest value (with its sign) of
+        ``law/data - 1``, and number of steps, over all runs."""
         data = np.concatenate([part.data for part in self.residuals])
         law = np.concatenate([part.law for part in self.residuals])
         off = law / data - 1
-        r2 = 1 - ((law - data) ** 2).sum() / ((data - data.mean()) ** 2).sum()
+        left = ((law - data) ** 2).sum()
+        spread = ((data - data.mean()) ** 2).sum()
         rms = np.sqrt(np.mean(off**2))
-        return float(r2), float(rms), float(off[np.abs(off).argmax()]), len(off)
+        largest = off[np.abs(off).argmax()]
+        return float(1 - left / spread), float(rms), float(largest), len(off)
 
     @property
     def serial_correlation(self) -> float:
         """Correlation of residuals of neighbouring steps: about 0 for noise, near 1 where the law
         has another shape."""
         rows = [part.law - part.data for part in self.residuals]
-        squares = sum(float(r @ r) for r in rows)
-        return sum(float(r[1:] @ r[:-1]) for r in rows) / squares if squares else 0.0
+        squares = sum(float(row @ row) for row in rows)
+        if not squares:
+            return 0.0
+        return sum(float(row[1:] @ row[:-1]) for row in rows) / squares
 
 
 def fit_curve(
     groups: list[Refined], load_range: tuple[float, float] = (0.0, np.inf), quantity: str = "P"
 ) -> CurveFit:
-    """Fit the law to the curve "P" or "p0" of all ``groups``: ``c``, too, where two steps or more
-    past the onset of the plateau have yielded indeed, as the slope of an elastic p0(delta) falls,
-    too.
+    """Fit the law to the curve "P" or "p0" of all ``groups``.
+
+    ``c`` is fitted, too, where two steps or more past the onset of the plateau have yielded: the
+    slope of an elastic p0(delta) falls as well.
 
     Where scenes have a second mesh, the fit is repeated with data extrapolated to vanishing element
     size; the change of a parameter is its discretisation error. Raises `InputError` where the range
@@ -143,7 +154,8 @@ def fit_curve(
     chosen = [(g.run, _selected(g.run, load_range)) for g in groups]
     if quantity == "p0" and sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen) < 2:
         raise InputError(
-            f"{groups[0].run.name}: p0 says nothing of k past yield, and fewer than two steps are before."
+            f"{groups[0].run.name}: p0 says nothing of k past yield, and fewer than two steps are "
+            "before."
         )
     curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
 
@@ -159,17 +171,20 @@ def fit_curve(
         ]
 
     def solve(data: list[Array], free: str) -> tuple[list[float], list[float]]:
-        slope = float(np.median([y[0] / unit[0] for y, unit in zip(data, law([1.0]), strict=True)]))
+        slopes = [y[0] / unit[0] for y, unit in zip(data, law([1.0]), strict=True)]
+        slope = float(np.median(slopes))
         starts = [[slope, c] for c in _STARTS_OF_C] if free == "kc" else [[slope]]
         try:
             return fit(lambda values: np.concatenate(law(values)), starts, np.concatenate(data))
         except ValueError as error:
-            names, what = ", ".join(g.run.name for g in groups), " and ".join(free)
+            names = ", ".join(g.run.name for g in groups)
+            what = " and ".join(free)
             raise InputError(
                 f"{names}: {what} cannot be fitted to {quantity}: {error}; widen --range."
             ) from None
 
-    data, free = scaled(y[0] for y in curves), "k"
+    data = scaled(y[0] for y in curves)
+    free = "k"
     if any(run.sigY for run, _ in chosen):
         values, errors = solve(data, "kc")
         onsets = [_joint(run, *values).first_yield for run, _ in chosen]
@@ -177,7 +192,9 @@ def fit_curve(
             rows & (run.peeq_max > 0) & (run.delta > at)
             for (run, rows), at in zip(chosen, onsets, strict=True)
         ]
-        free = "kc" if np.isfinite(errors).all() and np.concatenate(beyond).sum() >= 2 else "k"
+        yielded = np.concatenate(beyond).sum()
+        if np.isfinite(errors).all() and yielded >= 2:
+            free = "kc"
     if free == "k":
         values, errors = solve(data, free)
     mesh: list[float | None] = [None] * len(free)
@@ -188,12 +205,11 @@ def fit_curve(
         finer = scaled(
             y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True)
         )
-        mesh = [
-            abs(moved - value) for moved, value in zip(solve(finer, free)[0], values, strict=True)
-        ]
-    parts = zip(chosen, data, law(values), strict=True)
+        moved, _ = solve(finer, free)
+        mesh = [abs(new - value) for new, value in zip(moved, values, strict=True)]
     residuals = tuple(
-        Residual(run.name, run.delta[rows] / run.dR, *both) for (run, rows), *both in parts
+        Residual(run.name, run.delta[rows] / run.dR, measured, fitted)
+        for (run, rows), measured, fitted in zip(chosen, data, law(values), strict=True)
     )
     dof = sum(map(len, data)) - len(free)
     found = [Estimate(*numbers, dof) for numbers in zip(values, errors, mesh, strict=True)]
@@ -217,7 +233,8 @@ def _joint(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
 def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.bool_]:
     """Which steps ``(n,)`` of ``run`` lie in the range of ``delta/dR``, ends included. Raises
     `InputError` if none."""
-    load, slack = run.delta / run.dR, 1e-9
+    load = run.delta / run.dR
+    slack = 1e-9
     touching = (run.P > 0) & (run.p0 > 0)
     if not touching.any():
         raise InputError(
@@ -226,8 +243,10 @@ def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.
     low, high = load_range
     chosen = touching & (load >= low * (1 - slack)) & (load <= high * (1 + slack))
     if not chosen.any():
-        raise InputError(f"{run.name}: has no step with contact from {low:g} to {high:g} clearances; its {len(load)} "
-                         f"steps are from {load.min():g} to {load.max():g}.")  # fmt: skip
+        raise InputError(
+            f"{run.name}: has no step with contact from {low:g} to {high:g} clearances; its "
+            f"{len(load)} steps are from {load.min():g} to {load.max():g}."
+        )
     return chosen
 
 
@@ -247,7 +266,9 @@ class Calibration:
 
     def law(self) -> FittedLaw:
         """The law for the joint of the first scene, with k and c of all scenes."""
-        run, found, parts = self.scenes[0].run, self.joint.estimates, self.joint.residuals
+        run = self.scenes[0].run
+        found = self.joint.estimates
+        parts = self.joint.residuals
         numbers: dict[str, Any] = {
             name: getattr(run, name) for name in ("E_star", "R", "dR", "plane")
         }
@@ -255,7 +276,8 @@ class Calibration:
             found.pop("c", None)
         for name, estimate in found.items():
             numbers |= {name: estimate.value, f"{name}_error": estimate.error}
-        loads, units = np.concatenate([part.load for part in parts]), run.scene.units
+        loads = np.concatenate([part.load for part in parts])
+        units = run.scene.units
         numbers |= {
             "sigY": run.sigY if "c" in found else None,
             "fitted_to": tuple(part.name for part in parts),
@@ -272,7 +294,8 @@ def calibrate(runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.i
     low, high = load_range
     if not 0 <= low < high:
         raise InputError(
-            f"--range {low:g} {high:g}: must be two displacements in clearances, 0 or more and rising."
+            f"--range {low:g} {high:g}: must be two displacements in clearances, 0 or more and "
+            "rising."
         )
     check_compatible(runs)
     scenes = group(runs)
@@ -284,63 +307,77 @@ def calibrate(runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.i
 def check_compatible(runs: list[RunCurve]) -> None:
     """Raise `InputError` for runs that have no such law, or none in common."""
     for run in runs:
-        if not run.scene.joint.is_block:
-            model = run.scene.joint.model
-            raise InputError(
-                f'{run.name}: joint.model = "{model}" has no law to fit; only "block" has.'
-            )
-        if run.scene.analysis.friction:
-            raise InputError(
-                f"{run.name}: analysis.friction = {run.scene.analysis.friction:g} does not fit: the law is for contact "
-                "without friction; archord fit RUN --table FILE keeps the run's own P(delta)."
-            )
-        for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
-            if not solid.perfectly_plastic:
-                said = (
-                    f" = {solid.hardening:g}"
-                    if isinstance(solid.hardening, float) and solid.hardening
-                    else ""
-                )
-                key = (
-                    "back_stresses"
-                    if solid.back_stresses and solid.hardening == 0
-                    else f"hardening{said}"
-                )
-                raise InputError(
-                    f"{run.name}: {body}.{key} does not fit: the law is for perfect plasticity, hardening = 0; "
-                    "archord fit RUN --table FILE keeps the run's own P(delta)."
-                )
+        _check_alone(run)
     first = runs[0]
     for run in runs[1:]:
-        own, wanted = (LawJoint.from_scene(each.scene) for each in (run, first))
-        ours, theirs = (
-            (joint.pin_share, joint.nu or 0.0, joint.pin_nu or 0.0) for joint in (own, wanted)
-        )
-        softer, fault = abs(own.softer[0] - wanted.softer[0]), ""
-        if own.plane != wanted.plane:
-            fault = f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"
-        elif not np.allclose(ours, theirs, rtol=1e-6, atol=1e-9):
-            fault = f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}"
-        elif own.large_strain != wanted.large_strain:
-            fault = f"analysis.strain = {run.scene.analysis.strain!r} does not fit: {first.name} has the other"
-        elif own.fixed_pairs != wanted.fixed_pairs:
-            fault = f"analysis.kinematics = {run.scene.analysis.kinematics!r} does not fit: {first.name} has the other"
-        elif own.whole != wanted.whole:
-            fault = f"pin.whole = {str(own.whole).lower()} does not fit: {first.name} has the other"
-        elif softer > _LIKE:
-            sizes = [f"{each.scene.joint.W / each.R:.4g} R" for each in (run, first)]
-            fault = (f"joint.block_size is {sizes[0]} and that of {first.name} {sizes[1]}, by which their P differs by "
-                     f"about {softer:.1%}")  # fmt: skip
+        fault = _difference(run, first)
         if fault:
-            raise InputError(
-                f"{run.name}: {fault}; one law is for one kind of joint: fit them separately."
-            )
+            raise InputError(f"{run.name}: {fault}; {_SEPARATELY}")
     yielding = [(run.name, LawJoint.from_scene(run.scene).yielding) for run in runs]
     yielding = [(name, bodies) for name, bodies in yielding if bodies != "none"]
     for name, bodies in yielding[1:]:
         like, others = yielding[0]
         if bodies != others:
             said = f"yield stresses ({bodies}) do not fit: {like} has them otherwise ({others})"
-            raise InputError(
-                f"{name}: {said}; one law is for one kind of joint: fit them separately."
-            )
+            raise InputError(f"{name}: {said}; {_SEPARATELY}")
+
+
+def _check_alone(run: RunCurve) -> None:
+    """Raise `InputError` for a run whose kind of joint has no law to fit."""
+    scene = run.scene
+    model = scene.joint.model
+    if not scene.joint.is_block:
+        raise InputError(
+            f'{run.name}: joint.model = "{model}" has no law to fit; only "block" has.'
+        )
+    friction = scene.analysis.friction
+    if friction:
+        raise InputError(
+            f"{run.name}: analysis.friction = {friction:g} does not fit: the law is for contact "
+            f"without friction; {_OWN_TABLE}"
+        )
+    for body, solid in (("pin", scene.pin), ("block", scene.block)):
+        if solid.perfectly_plastic:
+            continue
+        key = "hardening"
+        if solid.back_stresses and solid.hardening == 0:
+            key = "back_stresses"
+        elif isinstance(solid.hardening, float) and solid.hardening:
+            key = f"hardening = {solid.hardening:g}"
+        raise InputError(
+            f"{run.name}: {body}.{key} does not fit: the law is for perfect plasticity, "
+            f"hardening = 0; {_OWN_TABLE}"
+        )
+
+
+def _difference(run: RunCurve, first: RunCurve) -> str:
+    """Why one law cannot be for ``run`` and for the ``first`` run; empty if it can."""
+    analysis = run.scene.analysis
+    own = LawJoint.from_scene(run.scene)
+    wanted = LawJoint.from_scene(first.scene)
+    other = f"does not fit: {first.name} has the other"
+    if own.plane != wanted.plane:
+        return (
+            f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"
+        )
+    if not np.allclose(_elasticity(own), _elasticity(wanted), rtol=1e-6, atol=1e-9):
+        return f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}"
+    if own.large_strain != wanted.large_strain:
+        return f"analysis.strain = {analysis.strain!r} {other}"
+    if own.fixed_pairs != wanted.fixed_pairs:
+        return f"analysis.kinematics = {analysis.kinematics!r} {other}"
+    if own.whole != wanted.whole:
+        return f"pin.whole = {str(own.whole).lower()} {other}"
+    softer = abs(own.softer[0] - wanted.softer[0])
+    if softer <= _LIKE:
+        return ""
+    size, first_size = (f"{each.scene.joint.W / each.R:.4g} R" for each in (run, first))
+    return (
+        f"joint.block_size is {size} and that of {first.name} {first_size}, by which their P "
+        f"differs by about {softer:.1%}"
+    )
+
+
+def _elasticity(joint: LawJoint) -> tuple[float, float, float]:
+    """The pin's share of the compliance, and Poisson's ratios of block and pin."""
+    return joint.pin_share, joint.nu or 0.0, joint.pin_nu or 0.0

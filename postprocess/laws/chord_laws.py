@@ -34,7 +34,8 @@ def plastic_winkler(joint: LawJoint, delta: Array) -> LawState:
     beyond ``delta0 = c sigY R/(k E*)``; below, and everywhere without a yield stress, ``P = (8/3) k
     E* delta sqrt(delta/(2 (dR + delta)))`` (eq. 9). Perfect plasticity.
     """
-    root, dR = _half_sine(joint, delta), joint.clearance
+    root = _half_sine(joint, delta)
+    dR = joint.clearance
     uncut = joint.k * joint.E_star * delta / joint.radius
     p0 = np.minimum(uncut, joint.threshold)
     below = p0 / np.where(uncut > 0, uncut, 1.0)  # delta0/delta, 1 before the onset
@@ -44,7 +45,8 @@ def plastic_winkler(joint: LawJoint, delta: Array) -> LawState:
     flank = (below / (1 + s)) ** 2 * (2 + s) / 3
     P = 4 * joint.radius * root * (uncut * flank + p0 * s)
     slope = flank + (flank + below * s) * dR / (2 * (dR + delta))
-    return LawState(delta, P, 4 * joint.k * joint.E_star * root * slope, p0, 2 * np.arcsin(root))
+    stiffness = 4 * joint.k * joint.E_star * root * slope
+    return LawState(delta, P, stiffness, p0, 2 * np.arcsin(root))
 
 
 def parabola(joint: LawJoint, delta: Array) -> LawState:
@@ -67,13 +69,11 @@ def winkler(joint: LawJoint, delta: Array) -> LawState:
     chord). Where eps is small the difference is taken from its series, ``dR (eps - sin(eps))``, to
     keep all digits.
     """
-    eps, stiffness = 2 * np.arcsin(_half_sine(joint, delta)), joint.k * joint.E_star
+    eps = 2 * np.arcsin(_half_sine(joint, delta))
+    stiffness = joint.k * joint.E_star
     small = eps**3 / 6 * (1 - eps**2 / 20 * (1 - eps**2 / 42))
-    P = stiffness * (delta * eps + joint.clearance * np.where(eps < 0.02, small, eps - np.sin(eps)))
-    return LawState(
-        delta,
-        P,
-        stiffness * (eps + np.sin(eps) * np.cos(eps)),
-        stiffness * delta / joint.radius,
-        eps,
-    )
+    difference = np.where(eps < 0.02, small, eps - np.sin(eps))
+    P = stiffness * (delta * eps + joint.clearance * difference)
+    slope = stiffness * (eps + np.sin(eps) * np.cos(eps))
+    p0 = stiffness * delta / joint.radius
+    return LawState(delta, P, slope, p0, eps)

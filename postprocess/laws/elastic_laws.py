@@ -29,9 +29,9 @@ def hertz(joint: LawJoint, P: Array) -> LawState:
     """Line contact of half-width ``a = 2 sqrt(P R*/(pi E*))``: peak pressure ``p0 = sqrt(P E*/(pi
     R*))`` and semi-angle ``a/R1`` (Johnson 1985, eqs 4.43 and 4.45)."""
     root = np.sqrt(P / (math.pi * joint.E_star * joint.relative_radius))
-    return LawState(
-        NOTHING, P, NOTHING, joint.E_star * root, 2 * joint.relative_radius * root / joint.radius
-    )
+    p0 = joint.E_star * root
+    angle = 2 * joint.relative_radius * root / joint.radius
+    return LawState(NOTHING, P, NOTHING, p0, angle)
 
 
 def hertz_load_limit(joint: LawJoint) -> float:
@@ -45,18 +45,19 @@ def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
     codes use it for pins: ``P = (4/3) E* sqrt(R*) delta^(3/2)/L``, ``p0 = (2/pi) E*
     sqrt(delta/R*)`` (Johnson 1985, eq. 4.24)."""
     assert joint.length is not None
-    root, size = np.sqrt(delta), math.sqrt(joint.relative_radius)
+    root = np.sqrt(delta)
+    size = math.sqrt(joint.relative_radius)
     spring = 4 / 3 * joint.E_star * size / joint.length
-    return LawState(
-        delta, spring * delta * root, 1.5 * spring * root, 2 / math.pi * joint.E_star * root / size
-    )
+    p0 = 2 / math.pi * joint.E_star * root / size
+    return LawState(delta, spring * delta * root, 1.5 * spring * root, p0)
 
 
 def logarithm(joint: LawJoint, delta: Array, A: float, q: float) -> LawState:
     """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the
     bracket in the law, ``y = -W_-1(-delta/(e delta_limit))`` with Lambert's function, is 1 at the
     limit and infinite for no displacement; nan beyond."""
-    spring, limit = math.pi * joint.E_star, turning_point(joint, A, q)
+    spring = math.pi * joint.E_star
+    limit = turning_point(joint, A, q)
     argument = -delta / (math.e * limit)
     turning = argument <= -(1 - 1e-15) / math.e  # where round-off would give a complex W, or none
     y = np.maximum(-lambertw(np.where(turning, -0.1, argument), -1).real, 1.0)
@@ -76,9 +77,8 @@ def dubowsky_freudenstein(joint: LawJoint, delta: Array) -> LawState:
     = P L: Lundberg's compression of two half-spaces that touch along a strip of length L and
     Hertz's pressure across it."""
     assert joint.length is not None
-    return logarithm(
-        joint, delta, math.pi * joint.length**2 / (joint.relative_radius * joint.clearance), 1.0
-    )
+    A = math.pi * joint.length**2 / (joint.relative_radius * joint.clearance)
+    return logarithm(joint, delta, A, 1.0)
 
 
 def dubowsky_freudenstein_limit(joint: LawJoint) -> float:
@@ -96,9 +96,13 @@ def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array
     + 1) + sqrt(b^2 - y^2)) / (sqrt(b^2 + 1) - sqrt(b^2 - y^2)) ]`` (Persson 1964; Hu et al., eq.
     13).
     """
-    b, y = np.tan(eps / 2), np.tan(phi / 2)
-    c, s = np.sqrt(1 + b**2), np.sqrt(np.maximum(b**2 - y**2, 0.0))
-    shape = 2 / (np.pi * c) * s / (1 + y**2) + np.arctanh(s / c) / (np.pi * b**2 * (1 + b**2))
+    b = np.tan(eps / 2)
+    y = np.tan(phi / 2)
+    c = np.sqrt(1 + b**2)
+    s = np.sqrt(np.maximum(b**2 - y**2, 0.0))
+    root = 2 / (np.pi * c) * s / (1 + y**2)
+    logarithm_term = np.arctanh(s / c) / (np.pi * b**2 * (1 + b**2))
+    shape = root + logarithm_term
     return np.where(np.abs(phi) < eps, shape * P / joint.radius, 0.0)
 
 
@@ -109,8 +113,9 @@ def persson_load(joint: LawJoint, eps: Array) -> Array:
     Decuzzi 2001)."""
     b2 = np.tan(eps / 2) ** 2
     left = 2 - (1 + joint.dundurs_alpha) * (np.log1p(b2) + 2 * b2**2)
+    closing = np.where(left > 0, left, 0.0)
     with np.errstate(divide="ignore"):
-        return joint.unit * 2 * np.pi * b2 * (1 + b2) / np.where(left > 0, left, 0.0)
+        return joint.unit * 2 * np.pi * b2 * (1 + b2) / closing
 
 
 def persson(joint: LawJoint, P: Array) -> LawState:

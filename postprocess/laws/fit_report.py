@@ -56,28 +56,39 @@ def summary_table(calibration: Calibration) -> Table:
 def notes(calibration: Calibration) -> list[str]:
     """What the reader of the table must know about this calibration, one sentence each, and the
     law."""
-    said, joint, scenes = [], calibration.joint, calibration.scenes
+    said = []
+    joint = calibration.joint
+    scenes = calibration.scenes
     if not joint.orders:
         said.append(
             "mesh: the discretisation error is unknown, no scene was given on a second mesh."
         )
     elif len(joint.orders) < len(scenes):
-        said.append(f"mesh: {len(joint.orders)} of {len(scenes)} scenes were given on a second mesh; the joint fit "
-                    "counts no other.")  # fmt: skip
+        said.append(
+            f"mesh: {len(joint.orders)} of {len(scenes)} scenes were given on a second mesh; the "
+            "joint fit counts no other."
+        )
     said += [
         f"mesh: order of convergence of {name}: {order.words}." for name, order in joint.orders
     ]
-    said += [f"mesh: {run.name} serves to estimate the discretisation error of {scene.run.name}."
-             for scene in scenes for run in scene.coarser]  # fmt: skip
+    for scene in scenes:
+        said += [
+            f"mesh: {run.name} serves to estimate the discretisation error of {scene.run.name}."
+            for run in scene.coarser
+        ]
     if joint.serial_correlation > _BENT:
-        said.append(f"s.e.: residuals of neighbouring steps are correlated ({joint.serial_correlation:.2f}): the law's "
-                    "shape differs from the runs', and errors and intervals, which take residuals as independent, are "
-                    "too small.")  # fmt: skip
+        correlation = f"{joint.serial_correlation:.2f}"
+        said.append(
+            f"s.e.: residuals of neighbouring steps are correlated ({correlation}): the law's "
+            "shape differs from the runs', and errors and intervals, which take residuals as "
+            "independent, are too small."
+        )
     if joint.c is None and any(scene.run.sigY for scene in scenes):
         said.append("c: too few steps past yield in the range; elastic law.")
     if scenes[0].run.scene.pin.whole:
         said.append(
-            "pin.whole: k and c are those of a whole pin; archord law and the paper have them of half a pin."
+            "pin.whole: k and c are those of a whole pin; archord law and the paper have them of "
+            "half a pin."
         )
     law = calibration.law()
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
@@ -94,7 +105,8 @@ def doubts(calibration: Calibration) -> list[str]:
     if rms <= POOR:
         return []
     return [
-        f"the law misses P of its own runs by {rms:.1%} rms, {largest:+.1%} at worst: theirs has another shape"
+        f"the law misses P of its own runs by {rms:.1%} rms, {largest:+.1%} at worst: theirs has "
+        "another shape"
     ]
 
 
@@ -111,7 +123,8 @@ def as_json(calibration: Calibration) -> str:
 def draw_fit(calibration: Calibration, target: Path) -> Path:
     """Draw P(delta) of all scenes, the law, and its residuals as ``target``; returns the file.
     Raises ValueError for an unknown format."""
-    figure, fit = new_figure(9, 4.2), calibration.joint
+    figure = new_figure(9, 4.2)
+    fit = calibration.joint
     force, residuals = figure.subplots(1, 2)
     for i, (scene, part) in enumerate(zip(calibration.scenes, fit.residuals, strict=True)):
         load = np.linspace(0, part.load.max(), 400)

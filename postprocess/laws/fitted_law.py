@@ -56,7 +56,10 @@ class FittedLaw(BaseModel):
         farthest = float(np.max(delta, initial=0.0)) / self.dR
         end = self.fitted_range[1]
         if end and farthest > end * (1 + ROUND_OFF):
-            said = f"delta = {farthest:.4g} dR is beyond the {end:g} dR that the law was fitted to: it extrapolates"
+            said = (
+                f"delta = {farthest:.4g} dR is beyond the {end:g} dR that the law was fitted to: "
+                "it extrapolates"
+            )
             warnings.warn(LawRangeWarning(said), stacklevel=3)
         return self._state(delta)
 

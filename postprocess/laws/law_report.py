@@ -43,7 +43,8 @@ def sample(
 
 def says_nothing(state: LawState, by_load: bool) -> bool:
     """Whether a law has no number at any of the points of its `sample`."""
-    told = (state.delta if by_load else state.load, state.peak_pressure, state.angle)
+    found = state.delta if by_load else state.load
+    told = (found, state.peak_pressure, state.angle)
     return not any(np.isfinite(values).any() for values in told)
 
 
@@ -63,7 +64,8 @@ def law_table(
     """The law's title and its `sample`, a row for each point, in ``units`` of length, force,
     stiffness and stress where they are known, forces of a joint of this ``thickness``; without
     columns that the law says nothing of."""
-    moving, one = law.gives_displacement, joint.clearance
+    moving = law.gives_displacement
+    one = joint.clearance
     columns = [
         ("delta", "length", state.delta, moving),
         ("delta/dR", "", state.delta / one, moving),

@@ -139,8 +139,8 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
     if _is_of_joint(run):
         if of is not None:
             raise InputError(
-                f"{run.folder}: is the run of a joint, which has one load; "
-                "--of is for general scenes."
+                f"{run.folder}: is the run of a joint, which has one load; --of is for general "
+                "scenes."
             )
         scene = run.scene
         length = abs(scene.joint.dR)
@@ -159,8 +159,8 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
         )
         if abs(before[1]) > _OPEN * np.abs(after[1]).max(initial=0.0):
             raise InputError(
-                f"{run.folder}: {names[1]} is {before[1]:.6g} before the load moves; "
-                "a table begins at 0."
+                f"{run.folder}: {names[1]} is {before[1]:.6g} before the load moves; a table "
+                "begins at 0."
             )
         values = [after[0] - before[0], *after[1:-1], after[-1] - before[-1]]
     delta, P, *told, lost = values

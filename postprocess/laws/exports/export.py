@@ -80,9 +80,9 @@ class Program:
             of = f"total, of a pin of length {self.pin_length:g} ({self.length_unit})"
             rule = "do not multiply them by the length"
         return (
-            f"UNITS: displacements in {self.length_unit}; force P in {self.force_unit}, {of}: "
-            "P, stiffness and expected error are for a pin of length "
-            f"PIN_LENGTH = {self.pin_length:g}; {rule}."
+            f"UNITS: displacements in {self.length_unit}; force P in {self.force_unit}, {of}: P, "
+            "stiffness and expected error are for a pin of length PIN_LENGTH = "
+            f"{self.pin_length:g}; {rule}."
         )
 
     @property

@@ -256,7 +256,8 @@ MODELICA = Language(
     while_="while {} loop",
     for_="for k in 1:{} loop",
     ends=("end if;", "end while;", "end for;"),
-    warning='assert({} <= REACH, "delta is beyond the tables of this law", AssertionLevel.warning);',
+    warning='assert({} <= REACH, "delta is beyond the tables of this law", '
+    "AssertionLevel.warning);",
     types={"Table": "Real {}[:]", "float": "Real {}", "int": "Integer {}"},
 )
 

@@ -30,10 +30,13 @@ class Kernel:
 
     def between(self, one: Array, other: Array) -> Array:
         """Covariances ``(n, m)`` of points ``(n, d)`` and ``(m, d)``."""
-        a, b = one / self.lengths, other / self.lengths
+        a = one / self.lengths
+        b = other / self.lengths
         distance = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
         r = np.sqrt(7 * np.maximum(distance, 0.0))
-        return (1 + r * (1 + r * (0.4 + r / 15))) * np.exp(-r) + _WIDE * (1 + one @ other.T)
+        matern = (1 + r * (1 + r * (0.4 + r / 15))) * np.exp(-r)
+        mean = 1 + one @ other.T
+        return matern + _WIDE * mean
 
     def at(self, points: Array) -> Array:
         """Variances ``(n,)`` at points ``(n, d)``."""
@@ -41,12 +44,20 @@ class Kernel:
 
 
 class Process:
-    """A Gaussian process through ``values`` ``(n, outputs)`` at ``points`` ``(n, d)``, nan from
-    some row on in every column: ``size`` ``(outputs,)`` is the variance of each, ``likelihood`` the
-    logarithm of all data's."""
+    """A Gaussian process through ``values`` ``(n, outputs)`` at ``points`` ``(n, d)``; every column
+    of values is nan from some row on.
+
+    - ``points`` ``(n, d)``: inputs of the data
+    - ``factor`` ``(n, n)``: Cholesky's lower factor of the covariance
+    - ``known`` ``(n, outputs)``: whether a value is known
+    - ``weights`` ``(n, outputs)``: the factor's inverse times the values, 0 where unknown
+    - ``size`` ``(outputs,)``: variance of each output
+    - ``likelihood``: logarithm of the likelihood of all data
+    """
 
     def __init__(self, kernel: Kernel, points: Array, values: Array) -> None:
-        self.kernel, self.points = kernel, points
+        self.kernel = kernel
+        self.points = points
         covariance = np.zeros((len(points), len(points)))
         for start in range(0, len(points), _ROWS):  # of the half that Cholesky's factor needs
             rows = slice(start, start + _ROWS)
@@ -63,9 +74,8 @@ class Process:
         count = self.known.sum(0)
         self.size = (self.weights**2).sum(0) / np.maximum(count, 1)
         told = np.cumsum(np.log(np.diag(self.factor)))[np.maximum(count, 1) - 1]
-        self.likelihood = -(0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told)[
-            count > 0
-        ].sum()
+        logarithms = 0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told
+        self.likelihood = -logarithms[count > 0].sum()
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
@@ -77,8 +87,8 @@ class Process:
         return reduced.T @ self.weights, np.sqrt(left * self.size)
 
     def left_out(self) -> tuple[Array, Array]:
-        """What each point's values ``(n, outputs)`` are predicted to be by the others, less what
-        they are, and the standard deviation of that (section 5.4.2); nan where unknown."""
+        """Errors ``(n, outputs)`` of each point's values as the other points predict them, and the
+        standard deviations of these errors (section 5.4.2); nan where unknown."""
         off, deviation = np.full((2, *self.known.shape), np.nan)
         for count in np.unique(self.known.sum(0)):
             if count < 2:

@@ -25,7 +25,10 @@ from archord.postprocess.laws.general.yield_model import (
 from archord.report.version import VERSION
 
 NODES = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 60)])  # x = delta/dR
-NU, CLEARANCES, RATIOS = (0.0, 0.49), (1e-3, 0.02), (1 / 3, 10.0)  # the range
+# the range
+NU = (0.0, 0.49)
+CLEARANCES = (1e-3, 0.02)
+RATIOS = (1 / 3, 10.0)
 SMALLEST_S = {"strain": 0.15, "stress": 0.2}
 _LAST_DIGITS = 1e-3  # of the bounds, and of moduli that a scene has rounded
 _ELASTIC_ERROR = 1e-3  # of P, relative: that of 9 in 10 elastic joints is less
@@ -84,8 +87,8 @@ def outside(joint: LawJoint) -> str:
     nothing is."""
     if joint.hardens:
         return (
-            "a body hardens, and the law is of perfect plasticity; "
-            "archord fit RUN --table makes that of one joint"
+            "a body hardens, and the law is of perfect plasticity; archord fit RUN --table makes "
+            "that of one joint"
         )
     strain, p, m, n, clearance, *stresses = joint_numbers(joint)
     pin_nu, nu = (value / (1 + value) if strain else value for value in (m, n))
@@ -130,7 +133,10 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None) -> JointCurve:
     the nodes above zero (None: elastic)."""
     x = NODES[1:]
     base = elastic_model().at(joint, x)
-    y, dy, peak, angle = base.y, base.slope, base.peak, base.angle
+    y = base.y
+    dy = base.slope
+    peak = base.peak
+    angle = base.angle
     error = np.full_like(y, _ELASTIC_ERROR)
     ratio = np.ones_like(y)
     toe = np.zeros_like(y)

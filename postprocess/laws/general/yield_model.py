@@ -33,9 +33,14 @@ from archord.postprocess.laws.general.joint import Array
 
 DATA = Path(__file__).parent / "yield_model.npz"
 KERNELS = Path(__file__).parent / "yield_model.json"
-MULTIPLES = np.array([0.95, 1.05, 1.15, 1.27, 1.4, 1.55, 1.75, 2, 2.3, 2.65, 3.05, 3.5, 4.1, 4.8, 5.7, 6.8, 8.2, 10,
-                      12.3, 15.2, 19, 24, 30])  # fmt: skip
-PIN_ALONE, PIN_WEAKER = "strain pin alone", "strain pin weaker"
+# fmt: off
+MULTIPLES = np.array([
+    0.95, 1.05, 1.15, 1.27, 1.4, 1.55, 1.75, 2, 2.3, 2.65, 3.05, 3.5, 4.1, 4.8, 5.7, 6.8, 8.2, 10,
+    12.3, 15.2, 19, 24, 30,
+])
+# fmt: on
+PIN_ALONE = "strain pin alone"
+PIN_WEAKER = "strain pin weaker"
 # plane, and the body that yields first
 SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
@@ -43,10 +48,14 @@ ELASTIC_BELOW = 0.8  # u: nothing has yielded
 # stays elastic. In plane stress the first is that of a contact at the largest pressure of plastic
 # flow, 2/sqrt(3) sigY.
 _STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}
-_FELT, _DEEPER = 0.3, 3.0  # exponent of what a yielded pin leaves; x/x0 where that is asked
+# exponent of what a yielded pin leaves; x/x0 where that is asked
+_FELT = 0.3
+_DEEPER = 3.0
 _CURVES = ("force", "peak", "angle")
 _NINE_IN_TEN = 1.645  # standard deviations
-_STEP, _UNKNOWN = 1e-4, -32768  # of stored logarithms, and what stands for nan
+# of stored logarithms, and what stands for nan
+_STEP = 1e-4
+_UNKNOWN = -32768
 _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
 
 
