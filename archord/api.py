@@ -98,6 +98,7 @@ def solve(
     force: bool = False,
     restart: bool = False,
     fields: str | bool = "nodes",
+    own_fields: Mapping[str, Callable[[Any], Any]] | None = None,
     progress: bool = False,
     comm: MPI.Comm | None = None,
 ) -> Run:
@@ -120,6 +121,10 @@ def solve(
     fields : {"cells", "nodes", "points"} or False
         Of a `Problem`: where the run has stress and plastic strain, as means of cells, also at the
         nodes, or also at the integration points. A scene says it itself.
+    own_fields : dict
+        More fields of the cells by name, functions of the state at a body's integration points,
+        ``lambda at: at.stress[..., 0]``, which return an array ``(n, q)``: the run has the mean of
+        each cell. `PointFields` in archord/solver/body_points.py says what ``at`` has.
     progress : bool
         Report steps as ``archord solve`` does.
     comm : MPI.Comm
@@ -148,6 +153,7 @@ def solve(
     """
     from mpi4py import MPI
 
+    from archord.output.cell_fields import own_rows
     from archord.progress import solve_and_report
 
     folder = Path(folder)
@@ -168,6 +174,8 @@ def solve(
         options = {"force": True, "start": planned.start}
     if given is not None:
         options["problem"] = given
+    if own_fields is not None:
+        options["own_fields"] = own_rows(own_fields)
     _, outcome = solve_and_report(checked, folder, comm, silent=not progress, **options)
     if outcome.status == "interrupted":
         by_user = outcome.signal == signal.SIGINT

@@ -5,18 +5,21 @@ fields.h5 holds the arrays. fields.xdmf describes them to ParaView and pyvista, 
 whatever the degree of the elements. Arrays are in the order of the mesh generator, whatever the
 number of ranks.
 
-Displacements are nodal. So are the components of stress and plastic strain, and PEEQ, by
-superconvergent patch recovery. Stress measures, PEEQ and the contact are means over cells.
+Displacements are nodal. The others are the rows of `output.cell_fields`: means over cells, and what
+is recovered at the nodes by superconvergent patches.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
+from archord.output.cell_fields import CELL_FIELDS, CellField, cell_means
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import StepFile, times
 from archord.output.files.xdmf import CELLS, step_grid, steps_text
@@ -34,45 +37,31 @@ def collect_mesh(order: MeshOrder, at_points: bool = True) -> Arrays:
         found[f"edges/{name}"] = ends
     if at_points:
         parts = order.system.bulk.at_points(order.system.equilibrium.displacement())
-        found["points/coordinates"] = order.at_points("coordinates", parts)
+        found["points/coordinates"] = order.at_points(attrgetter("coordinates"), parts)
     return found
 
 
-def collect_fields(order: MeshOrder, at_points: bool = True) -> Arrays:
+def collect_fields(
+    order: MeshOrder, at_points: bool = True, own: Sequence[CellField] = ()
+) -> Arrays:
     """The last accepted state of the whole mesh by name, on rank 0; nothing elsewhere. Collective.
 
-    "displacement" ``(n, 2)`` of the nodes. Means of the cells: scalars ``(m,)``, and tensors
-    "cells/NAME" ``(m, 4)``. With ``at_points`` also values of the integration points:
-    "points/stress" ``(m, q, 4)`` and, where a body can yield, "points/plastic_strain" and
-    "points/peeq" ``(m, q)``.
+    "displacement" ``(n, 2)`` of the nodes. Means of the cells by the rows of `CELL_FIELDS` and the
+    user's ``own``: scalars ``(m,)``, and tensors "cells/NAME" ``(m, 4)``. With ``at_points`` also
+    those values at the integration points that are recovered at nodes, "points/NAME"
+    ``(m, q, ...)``.
     """
     system = order.system
     u = system.equilibrium.displacement()
     parts = list(system.bulk.at_points(u))
     found = {"displacement": order.collect(u)}
-    for name, values in (system.bulk.cell_fields(parts) | _contact_of_cells(order)).items():
+    written = [row for row in CELL_FIELDS if system.bulk.plastic or not row.of_yielding]
+    for name, values in cell_means(system, parts, [*written, *own]).items():
         found[name if values.ndim == 1 else f"cells/{name}"] = order.cells(values)
-    if at_points:
-        plastic = ["plastic_strain", "peeq"] if system.bulk.plastic else []
-        for name in ["stress", *plastic]:
-            found[f"points/{name}"] = order.at_points(name, parts)
+    for row in written:
+        if row.nodal and at_points:
+            found[f"points/{row.name}"] = order.at_points(row.values, parts)
     return found
-
-
-def _contact_of_cells(order: MeshOrder) -> Arrays:
-    """Share of a cell's contact edge that is in contact, and mean pressure on that edge; both
-    ``(n_cells,)``, and 0 where a cell has no such edge."""
-    length = np.zeros(order.n_cells)
-    closed = np.zeros(order.n_cells)
-    force = np.zeros(order.n_cells)
-    for pair in order.system.contact.pairs:
-        weight = pair.surface.weight
-        cells = pair.surface.cells
-        np.add.at(length, cells, weight.sum(axis=1))
-        np.add.at(closed, cells, (weight * (pair.pressure > 0)).sum(axis=1))
-        np.add.at(force, cells, (weight * pair.pressure).sum(axis=1))
-    length[length == 0] = 1.0
-    return {"contact_state": closed / length, "contact_pressure": force / length}
 
 
 class FieldWriter:
@@ -133,21 +122,22 @@ class FieldWriter:
         self._write_xdmf(list(of_nodes), of_cells)
 
     def _at_nodes(self, at_points: Arrays) -> Arrays:
-        """Nodal "stress_xx" and so on, and "peeq_nodal" ``(n,)``, from values ``(m, q, ...)`` at
-        the integration points."""
+        """Nodal ``(n,)`` components of tensors, as "stress_xx", and scalars, as "peeq_nodal", from
+        values ``(m, q, ...)`` at the integration points."""
         if self._recovery is None:
             return {}
         values = [v.reshape(*v.shape[:2], -1) for v in at_points.values()]
         recovered = self._recovery(np.concatenate(values, axis=2))
         found: Arrays = {}
-        for name in ("stress", "plastic_strain"):
-            if f"points/{name}" in at_points:
-                for k, component in enumerate(self._components):
-                    found[f"{name}_{component}"] = recovered[:, k]
-                recovered = recovered[:, len(self._components) :]
-        if "points/peeq" in at_points:
-            # the polynomials swing below zero where nothing yields
-            found["peeq_nodal"] = np.maximum(recovered[:, 0], 0.0)
+        column = 0
+        for row in CELL_FIELDS:
+            of_points = at_points.get(f"points/{row.name}")
+            if of_points is None:
+                continue
+            endings = ["nodal"] if of_points.ndim == 2 else self._components
+            for ending in endings:
+                found[f"{row.name}_{ending}"] = np.maximum(recovered[:, column], row.least)
+                column += 1
         return found
 
     def _write_xdmf(self, of_nodes: list[str], of_cells: list[str]) -> None:

@@ -3,7 +3,7 @@ run.json."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -19,6 +19,7 @@ from archord.measures.account import Account
 from archord.measures.edge import EdgeProfile
 from archord.measures.energies import Work
 from archord.measures.record import Record
+from archord.output.cell_fields import CellField
 from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
 from archord.output.files.disk import WriteError, replace_file
@@ -68,6 +69,7 @@ def solve_scene(
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
     problem: Problem | None = None,
+    own_fields: Sequence[CellField] = (),
     start: Start | None = None,
     timer: Timer | None = None,
     interrupt: Interrupt | None = None,
@@ -80,6 +82,7 @@ def solve_scene(
     Collective.
 
     A ``problem`` from Python, of which the scene tells, is solved in the place of the scene.
+    ``own_fields`` are written beside those of `CELL_FIELDS`.
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``,
     ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank, and
     ``on_iteration(load, result)`` what the present solve did so far. ``timer`` has the seconds
@@ -96,7 +99,7 @@ def solve_scene(
         account = without_stale_forms(lambda: account_of(scene, comm, timer, problem))
         account.system.solver.newton.watch = on_iteration
         on_start(account.system)
-        output = _Output(folder, account, begun, start, problem)
+        output = _Output(folder, account, begun, start, problem, own_fields)
         watched = nullcontext(interrupt) if interrupt else Interrupt()
         status = "done"
         message = ""
@@ -172,6 +175,7 @@ class _Output:
         begun: float,
         start: Start | None,
         problem: Problem | None,
+        own_fields: Sequence[CellField],
     ) -> None:
         self.folder = folder
         self.account = account
@@ -187,6 +191,7 @@ class _Output:
         self._contact: StepFile | None = None
         asked = account.scene.output.fields
         self._at_points = asked in ("nodes", "points")
+        self._own_fields = own_fields
         with self.system.timer("output"):
             self._order = MeshOrder(self.system)
             if asked:
@@ -244,7 +249,8 @@ class _Output:
             warnings = account.step_warnings(m, profiles, step.residual, self.steps)
             fields = None
             if account.scene.output.fields:
-                fields = self._of_fields.collect_fields(self._order, self._at_points)
+                order = self._order
+                fields = self._of_fields.collect_fields(order, self._at_points, self._own_fields)
             self.steps.append(m)
 
             def write() -> None:

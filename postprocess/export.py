@@ -87,9 +87,9 @@ def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     def values(step: int) -> Arrays:
         fields = run.fields(step)
         found = {"PointData/displacement": _in_space(fields.displacement)}
-        for name, nodal in (fields.nodal_fields() | fields.nodal_tensors()).items():
+        for name, nodal in (fields.nodal | fields.nodal_fields()).items():
             found[f"PointData/{name}"] = _for_vtk(nodal)
-        for name, means in (fields.cell_fields() | fields.cell_tensors).items():
+        for name, means in fields.cell.items():
             found[f"CellData/{name}"] = _for_vtk(means)
         return found
 
@@ -152,9 +152,9 @@ def _in_space(values: Array) -> Array:
 
 
 def _for_vtk(values: Array) -> Array:
-    """Scalars as they are; tensors ``(n, 4)`` with the components of VTK: xx, yy, zz, xy, yz,
-    xz."""
-    return values if values.ndim == 1 else np.pad(values, ((0, 0), (0, 2)))
+    """Tensors ``(n, 4)`` with the components of VTK: xx, yy, zz, xy, yz, xz; others as they
+    are."""
+    return np.pad(values, ((0, 0), (0, 2))) if values.shape[1:] == (4,) else values
 
 
 def _check_new(files: Iterable[Path], folder: Path, force: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -20,8 +20,7 @@ from archord.report.errors import InputError
 from archord.scene.sections.errors import toml_value
 
 BODIES = {"pin": 1, "block": 2}
-CELL_FIELDS = ("von_mises", "mean_stress", "peeq", "contact_state", "contact_pressure")
-TENSORS = ("stress", "plastic_strain")
+_NO_FIELDS = ("mesh", "edges", "points", "cells")  # groups of the file
 # Of VTK's second-order cells by their nodes: straight triangles to draw them by, and the edges,
 # each along it
 _SUBTRIANGLES = {
@@ -31,6 +30,11 @@ _SUBTRIANGLES = {
 _EDGES = {6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]], 9: [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]}
 
 
+def _known(kind: str, name: str, doc: str) -> property:
+    """The field ``name`` of a kind, None where the run has none."""
+    return property(lambda fields: getattr(fields, kind).get(name), doc=doc)
+
+
 @dataclass(frozen=True)
 class Fields:
     """Bodies (of the paper's joint the half x >= 0) at one step: ``n`` nodes and ``m`` curved cells
@@ -38,9 +42,10 @@ class Fields:
 
     ``cells`` has VTK's order: corners, then the nodes between the first two, the next two, ..., and
     the last and the first, and the node in the middle of four corners. Stress is positive in
-    tension, contact pressure in compression. PEEQ and plastic strain are None where no body can
-    yield, and all that is recovered at nodes where `output.fields` is "cells". All in the scene's
-    units.
+    tension, contact pressure in compression. All in the
+    scene's units. ``cell`` and ``nodal`` have all fields by name, a user's own, too. An attribute
+    is None where the run has no such field: PEEQ and plastic strain where no body can yield, and
+    what is recovered at nodes where `output.fields` is "cells".
     """
 
     step: int
@@ -49,18 +54,22 @@ class Fields:
     cells: np.ndarray  # (m, 6), or (m, 9) of quadrilaterals
     body: np.ndarray  # (m,) the tag of the cell's body
     displacement: Array  # (n, 2)
-    von_mises: Array  # (m,) means of cells, like the following
-    mean_stress: Array  # (m,) third of the trace
-    peeq: Array | None  # (m,) equivalent plastic strain
-    contact_state: Array  # (m,) share of the cell's contact edge that is in contact, 0 elsewhere
-    contact_pressure: Array  # (m,) mean over that edge
-    stress: Array | None = None  # (n, 4) recovered at the nodes, like the following
-    plastic_strain: Array | None = None  # (n, 4)
-    peeq_nodal: Array | None = None  # (n,)
+    cell: dict[str, Array]  # means of cells by name: scalars (m,), tensors (m, 4)
+    nodal: dict[str, Array]  # recovered at the nodes: scalars (n,), tensors (n, 4)
     components: tuple[str, ...] = PLANE_STRAIN.names  # of tensors (., 4)
-    cell_tensors: dict[str, Array] = field(default_factory=dict)  # (m, 4) means, by TENSORS
     bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
     edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along named sets
+
+    von_mises = _known("cell", "von_mises", "``(m,)``")
+    mean_stress = _known("cell", "mean_stress", "``(m,)`` third of the trace")
+    peeq = _known("cell", "peeq", "``(m,)`` equivalent plastic strain")
+    contact_state = _known(
+        "cell", "contact_state", "``(m,)`` share of the cell's contact edge that is in contact"
+    )
+    contact_pressure = _known("cell", "contact_pressure", "``(m,)`` mean over that edge")
+    stress = _known("nodal", "stress", "``(n, 4)``")
+    plastic_strain = _known("nodal", "plastic_strain", "``(n, 4)``")
+    peeq_nodal = _known("nodal", "peeq", "``(n,)``")
 
     @property
     def deformed(self) -> Array:
@@ -74,33 +83,24 @@ class Fields:
         found[self.cells] = self.body[:, None]
         return found
 
-    def nodal_tensors(self) -> dict[str, Array]:
-        """The recovered tensors ``(n, 4)`` by name."""
-        known = {name: getattr(self, name) for name in TENSORS}
-        return {name: tensor for name, tensor in known.items() if tensor is not None}
-
     def nodal_fields(self) -> dict[str, Array]:
-        """The recovered fields of the nodes by name ``(n,)``, with the principal stresses "p1" to
-        "p3" (the largest first), "principal_angle" (of the larger one in the plane, from the x
-        axis) and "von_mises" of their tensor."""
+        """The recovered fields of the nodes by name ``(n,)``, tensors by components, with the
+        principal stresses "p1" to "p3" (the largest first), "principal_angle" (of the larger one in
+        the plane, from the x axis) and "von_mises" of the stress."""
         found: dict[str, Array] = {}
-        for name, tensor in self.nodal_tensors().items():
+        for name, values in self.nodal.items():
+            if values.ndim == 1:
+                found[name] = values
+                continue
             for k, component in enumerate(self.components):
-                found[f"{name}_{component}"] = tensor[:, k]
+                found[f"{name}_{component}"] = values[:, k]
         if self.stress is not None:
             principal, angle = principal_stresses(self.stress)
             for k in range(3):
                 found[f"p{k + 1}"] = principal[:, k]
             found["principal_angle"] = angle
             found["von_mises"] = von_mises(self.stress)
-        if self.peeq_nodal is not None:
-            found["peeq"] = self.peeq_nodal
         return found
-
-    def cell_fields(self) -> dict[str, Array]:
-        """The fields of the cells by name; `peeq` only where a body can yield."""
-        known = {name: getattr(self, name) for name in CELL_FIELDS}
-        return {name: values for name, values in known.items() if values is not None}
 
     @property
     def triangles(self) -> np.ndarray:
@@ -133,33 +133,48 @@ def read_fields(
     Raises `InputError` if the run wrote none, or the file is missing, damaged or does not hold the
     step.
     """
-    at = step_name(step)
     _require(bool(scene.output.fields), folder, scene, "fields")
     with opened(folder, "fields", step) as file:
         components = AXISYMMETRIC.names if "stress_rr" in file else PLANE_STRAIN.names
-
-        def array(name: str) -> Any:
-            return file[f"{name}/{at}"][()] if f"{name}/{at}" in file else None
-
-        found = {name: array(name) for name in (*CELL_FIELDS, "peeq_nodal")}
-        for name in TENSORS:
-            columns = [array(f"{name}_{component}") for component in components]
-            known = all(values is not None for values in columns)
-            found[name] = np.stack(columns, axis=1) if known else None
-        means = {name: array(f"cells/{name}") for name in TENSORS}
+        body = file["mesh/body"][()]
+        arrays = _arrays_at(file, step)
+        displacement = arrays.pop("displacement")[:, :2]
+        cell = {name: values for name, values in arrays.items() if len(values) == len(body)}
+        if "cells" in file:
+            cell |= _arrays_at(file["cells"], step)
+        nodal = {name: values for name, values in arrays.items() if name not in cell}
         return Fields(
             step=step,
             delta=float(file["load"][step - 1]),
             coordinates=file["mesh/coordinates"][:, :2],
             cells=file["mesh/cells"][()],
-            body=file["mesh/body"][()],
-            displacement=file[f"displacement/{at}"][:, :2],
+            body=body,
+            displacement=displacement,
+            cell=cell,
+            nodal=_with_tensors(nodal, components),
             components=components,
-            cell_tensors={name: values for name, values in means.items() if values is not None},
             bodies=bodies,
             edges=dict(all_arrays(file["edges"])) if "edges" in file else {},
-            **found,
         )
+
+
+def _arrays_at(group: Any, step: int) -> dict[str, Array]:
+    """The arrays of a ``step`` in a group by name."""
+    at = step_name(step)
+    places = {name: f"{name}/{at}" for name in group if name not in _NO_FIELDS}
+    return {name: group[place][()] for name, place in places.items() if place in group}
+
+
+def _with_tensors(arrays: dict[str, Array], components: Sequence[str]) -> dict[str, Array]:
+    """Nodal ``arrays`` ``(n,)`` by name, those that are the ``components`` of a tensor as one array
+    ``(n, 4)``."""
+    found = dict(arrays)
+    first = f"_{components[0]}"
+    for name in [name.removesuffix(first) for name in arrays if name.endswith(first)]:
+        columns = [f"{name}_{component}" for component in components]
+        if found.keys() >= set(columns):
+            found[name] = np.stack([found.pop(column) for column in columns], axis=1)
+    return {name.removesuffix("_nodal"): values for name, values in found.items()}
 
 
 def read_points(folder: str | Path, scene: Any, step: int) -> dict[str, Array]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
+from archord.output.cell_fields import row_of
 from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
 from archord.presets.views import ProblemView
@@ -26,7 +27,8 @@ _CONTACT = {
     "gap": "gap",
     "contact_shear": "shear",
 }
-_UNITLESS = ("peeq", "plastic")  # beginnings of names
+_OF_LENGTH = ("ux", "uy", "gap")
+_OF_STRESS = (*_CONTACT, "hoop", "along", "normal", "shear", "p1", "p2", "p3")
 _GAP = 0.3  # degrees: the least gap in a circle
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
 _ROUND_OFF = 1e-6  # degrees
@@ -138,7 +140,7 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
     stress along the edge is "along";
     at the integration points of a surface "pressure", "gap" or, with friction, "contact_shear", or
     "facet_pressure", the mean of each facet, which scatters less where bodies yield. On a line a
-    nodal field (von Mises stress), linear between nodes.
+    nodal field (von Mises stress), linear between nodes, or else a field of the cells.
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
@@ -169,9 +171,12 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
 def _unit_of(quantity: str, units: Any) -> str:
     if quantity == "principal_angle":
         return "rad"
-    if quantity.startswith(_UNITLESS):
-        return ""
-    return units.length if quantity in ("ux", "uy", "gap") else units.stress
+    if quantity in _OF_LENGTH:
+        return str(units.length)
+    row = row_of(quantity)
+    if quantity in _OF_STRESS or (row and row.unit == "{stress}"):
+        return str(units.stress)
+    return ""
 
 
 def _contact(run: Probed, edge: str, quantity: str, step: int) -> _Along:
@@ -230,15 +235,27 @@ def _stress(run: Probed, edge: str, quantity: str, step: int) -> _Along:
 
 def _inside(run: Probed, line: Sequence[float], quantity: str, step: int) -> _Along:
     """The points of the line that are in a body before it is loaded."""
-    from matplotlib.tri import LinearTriInterpolator, Triangulation
-
     start = np.array(line[:2])
     end = np.array(line[2:])
     share = np.linspace(0, 1, _SAMPLES)
     x = start + share[:, None] * (end - start)
     fields = run.fields(step)
-    values = _nodal(run, fields, quantity)
-    found: Array = np.full(_SAMPLES, np.nan)
+    of_cells = fields.cell.get(quantity)
+    if of_cells is None or quantity in fields.nodal_fields():
+        found = _between_nodes(fields, x, _nodal(run, fields, quantity))
+    else:
+        found = _of_cells(fields, x, of_cells)
+    inside = ~np.isnan(found)
+    if not inside.any():
+        raise InputError(f"{run.folder}: no body lies on the line.")
+    return _Along(x[inside], share[inside] * np.linalg.norm(end - start), found[inside])
+
+
+def _between_nodes(fields: Fields, x: Array, values: Array) -> Array:
+    """Nodal ``values`` at ``x`` ``(k, 2)``, NaN outside the bodies."""
+    from matplotlib.tri import LinearTriInterpolator, Triangulation
+
+    found: Array = np.full(len(x), np.nan)
     for body in fields.bodies.values():
         triangles = fields.triangles[fields.body == body].reshape(-1, 3)
         interpolator = LinearTriInterpolator(
@@ -246,10 +263,22 @@ def _inside(run: Probed, line: Sequence[float], quantity: str, step: int) -> _Al
         )
         here = np.ma.filled(interpolator(*x.T), np.nan)
         found = np.where(np.isnan(found), here, found)
-    inside = ~np.isnan(found)
-    if not inside.any():
-        raise InputError(f"{run.folder}: no body lies on the line.")
-    return _Along(x[inside], share[inside] * np.linalg.norm(end - start), found[inside])
+    return found
+
+
+def _of_cells(fields: Fields, x: Array, values: Array) -> Array:
+    """The ``values`` of the cells in which ``x`` ``(k, 2)`` lie, NaN outside the bodies."""
+    from matplotlib.tri import Triangulation
+
+    found: Array = np.full(len(x), np.nan)
+    for body in fields.bodies.values():
+        cells = np.flatnonzero(fields.body == body)
+        triangles = fields.triangles[cells]
+        finder = Triangulation(*fields.coordinates.T, triangles.reshape(-1, 3)).get_trifinder()
+        triangle = finder(*x.T)
+        here = values[cells[triangle // triangles.shape[1]]]
+        found = np.where(np.isnan(found) & (triangle >= 0), here, found)
+    return found
 
 
 def _nodal(run: Probed, fields: Fields, quantity: str, nodes: Any = ..., **more: Array) -> Array:

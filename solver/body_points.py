@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
@@ -22,6 +22,7 @@ class PointFields(NamedTuple):
     - ``stress`` ``(n, q, 4)``: Cauchy's
     - ``plastic_strain`` ``(n, q, 4)``
     - ``peeq`` ``(n, q)``
+    - ``material``, and ``state``: its history at these ``n q`` points
     """
 
     cells: np.ndarray
@@ -30,6 +31,8 @@ class PointFields(NamedTuple):
     stress: Array
     plastic_strain: Array
     peeq: Array
+    material: Material
+    state: Any
 
 
 class BodyPoints:
@@ -106,4 +109,6 @@ class BodyPoints:
             stress.reshape(*shape, stress.shape[1]),
             plastic_strain.reshape(*shape, plastic_strain.shape[1]),
             self.points.peeq.reshape(shape),
+            self.points.material,
+            trial,
         )

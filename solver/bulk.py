@@ -8,7 +8,7 @@ compiled or stored.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import basix.ufl
@@ -20,7 +20,6 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, bulk_quadrature_degree
-from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.materials.material import Material, Points
 from archord.solver.assembly import assemble, matrix
@@ -52,7 +51,7 @@ class Bulk:
         self.kinematics = kinematics
         self.degree = V.element.basix_element.degree
         self._rule = bulk_quadrature_degree(V.mesh.basix_cell(), self.degree)
-        n_owned = self._n_cells
+        n_owned = self.n_cells
         self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         self.distortion = DistortionMeter(V, self.cells, kinematics)
         self.plastic = any(m.yields for m in materials.values())
@@ -72,7 +71,7 @@ class Bulk:
             self.stiffness.assemble()
 
     @property
-    def _n_cells(self) -> int:
+    def n_cells(self) -> int:
         """Cells that this rank owns."""
         topology = self.V.mesh.topology
         return topology.index_map(topology.dim).size_local
@@ -236,26 +235,6 @@ class Bulk:
                 body = self._body_points(tag)
                 body.update(u)
             yield body.fields()
-
-    def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
-        """Cell means of `at_points`: "von_mises" and "mean_stress" ``(n_cells,)``, "stress"
-        ``(n_cells, 4)``; where a body can yield "peeq" and "plastic_strain"."""
-        fields: dict[str, Array] = {}
-        for part in parts:
-            values = {
-                "von_mises": von_mises(part.stress),
-                "mean_stress": mean_stress(part.stress),
-                "stress": part.stress,
-            }
-            if self.plastic:
-                values["peeq"] = part.peeq
-                values["plastic_strain"] = part.plastic_strain
-            share = part.weight / part.weight.sum(axis=1, keepdims=True)
-            for name, value in values.items():
-                if name not in fields:
-                    fields[name] = np.zeros((self._n_cells, *value.shape[2:]))
-                fields[name][part.cells] = np.einsum("nq,nq...->n...", share, value)
-        return fields
 
 
 def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:

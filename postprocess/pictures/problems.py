@@ -10,6 +10,7 @@ import numpy as np
 
 from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
+from archord.output.cell_fields import row_of
 from archord.postprocess.fields import Fields
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
@@ -29,16 +30,14 @@ _ALONG = {  # short names along edges
     "pressure": "facet_pressure",
     "contact_pressure": "facet_pressure",
 }
-_NAMED = {  # what fields are called, and their units
-    "von_mises": ("von Mises stress", "{stress}"),
-    "mean_stress": ("mean stress", "{stress}"),
-    "peeq": ("equivalent plastic strain", "%"),
-    "contact_state": ("share of the edge in contact", "-"),
-    "contact_pressure": ("contact pressure", "{stress}"),
+_NAMED = {  # what fields are called that are no rows of `CELL_FIELDS`, and their units
     "displacement": ("displacement", "{length}"),
     "ux": ("displacement in {0}", "{length}"),
     "uy": ("displacement in {1}", "{length}"),
     "principal_angle": ("angle of the first principal stress", "rad"),
+    "p1": ("p1", "{stress}"),
+    "p2": ("p2", "{stress}"),
+    "p3": ("p3", "{stress}"),
 }
 # points of a parabola from the nodes of an edge
 _EDGE = np.array(
@@ -123,7 +122,7 @@ def draw_field(
     name = _FIELDS.get(field, field) or ("peeq" if yielded else "von_mises")
     label, scale = field_words(run, name)
     values = scale * _values(run, fields, name)
-    of_cells = len(values) == len(fields.cells) and name in fields.cell_fields()
+    of_cells = len(values) == len(fields.cells)
     in_cells = values if of_cells else values[fields.cells].mean(axis=1)
     triangles = fields.triangles[shown]
     flat = triangles.reshape(-1, 3)
@@ -200,7 +199,8 @@ def _values(run: Run, fields: Fields, name: str) -> Array:
     """A field of the cells ``(m,)`` or else of the nodes ``(n,)``. Raises `InputError`."""
     ux, uy = fields.displacement.T
     moved = {"displacement": np.hypot(ux, uy), "ux": ux, "uy": uy}
-    known = fields.nodal_fields() | moved | fields.cell_fields()
+    means = {name: values for name, values in fields.cell.items() if values.ndim == 1}
+    known = fields.nodal_fields() | moved | means
     if name not in known:
         names = ", ".join(dict.fromkeys([*_FIELDS, *known]))
         raise InputError(f"{run.folder}: has no field {name!r}; its fields are {names}.")
@@ -209,10 +209,15 @@ def _values(run: Run, fields: Fields, name: str) -> Array:
 
 def field_words(run: Run, name: str) -> tuple[str, float]:
     """What a field is called on an axis, with its unit, and the factor to that unit."""
-    said, unit = _NAMED.get(name, (name.replace("_", " "), "{stress}"))
-    if name.startswith("plastic_strain"):
-        unit = "%"
+    said, unit = _NAMED.get(name, (name.replace("_", " "), ""))
+    row = row_of(name)
+    if row:
+        unit = row.unit
+        if name == row.name:
+            said = row.label
     said = said.format(*kinematics(run.scene.analysis.plane).axes)
+    if not unit:
+        return said, 1.0
     unit_name = unit.format(**run.scene.units.model_dump())
     return f"{said} [{unit_name}]", 100.0 if unit == "%" else 1.0
 

@@ -9,7 +9,7 @@ contact edge depends on the ranks.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import basix
 import numpy as np
@@ -144,10 +144,11 @@ class MeshOrder:
                 found[name] = np.searchsorted(self._nodes.unique, each_once)
         return found
 
-    def at_points(self, name: str, parts: Iterable[PointFields]) -> np.ndarray:
-        """The attribute ``name`` of `PointFields` of all cells ``(n, q, ...)`` on rank 0.
-        Collective."""
-        cells, values = zip(*((part.cells, getattr(part, name)) for part in parts), strict=True)
+    def at_points(
+        self, values_of: Callable[[PointFields], Array], parts: Iterable[PointFields]
+    ) -> np.ndarray:
+        """The ``values_of`` all ``parts``, of all cells ``(n, q, ...)`` on rank 0. Collective."""
+        cells, values = zip(*((part.cells, values_of(part)) for part in parts), strict=True)
         whole = np.zeros((self.n_cells, *values[0].shape[1:]))
         whole[np.concatenate(cells)] = np.concatenate(values)
         return self.cells(whole)

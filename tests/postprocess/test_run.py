@@ -49,7 +49,7 @@ def test_the_fields_are_those_of_the_scene(runs, name):
     )
     assert np.abs(fields.displacement[~pin & (np.abs(y) < 1e-12)]).max() == 0
     assert (fields.peeq is not None) == run.scene.plastic
-    assert set(fields.cell_fields()) >= {"von_mises", "mean_stress", "contact_pressure"}
+    assert set(fields.cell) >= {"von_mises", "mean_stress", "contact_pressure"}
 
 
 def test_the_contact_lies_on_the_deformed_outline(runs):

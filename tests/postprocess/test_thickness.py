@@ -36,7 +36,7 @@ def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
             abs(second.get_ylim()[1] / axes.get_ylim()[1] * P / run.columns["P/(E* R)"][-1] - 1)
             < 1e-9
         )
-    last = type("Step", (), {name: values[-1] for name, values in thick.columns.items()})
+    last = {name: values[-1] for name, values in thick.columns.items()}
     assert abs(quantities(thick.scene, last)["P/(E* R)"] / thick.columns["P/(E* R)"][-1] - 1) < 1e-9
     assert command(["compare", str(thin.folder), str(thick.folder), "--no-pictures"]) == 0
 
