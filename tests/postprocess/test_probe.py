@@ -67,6 +67,20 @@ def test_hoop_stress_at_the_hole_is_that_of_other_codes(lug, step):
     assert hoop.s[-1] == pytest.approx(10 * np.pi, rel=1e-6)
 
 
+def test_the_shear_is_the_stress_in_axes_along_an_edge_and_to_its_left(lug):
+    """On the straight clamp, which runs along y, and on the round hole."""
+    stress = {name: lug.probe("clamp", f"stress_{name}").values for name in ("xx", "yy", "xy")}
+    shear = lug.probe("clamp", "shear").values
+    assert np.abs(shear).max() > 0
+    np.testing.assert_allclose(shear, -stress["xy"], rtol=1e-12)
+    hole = lug.probe("hole", "shear")
+    xx, yy, xy = (lug.probe("hole", f"stress_{name}").values for name in ("xx", "yy", "xy"))
+    x, y = hole.x.T / 10
+    expected = (xx - yy) * x * y + xy * (y**2 - x**2)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(hole.values, expected, rtol=0, atol=0.02 * size)
+
+
 def test_the_stress_normal_to_an_edge_is_its_traction(lug):
     """None beyond the contact and on the free end, but for the error of the recovery; the contact
     pressure within."""
