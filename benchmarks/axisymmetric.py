@@ -7,8 +7,8 @@ Coordinates are x = r and y = z; the axis is x = 0. Every mesh has at most 3000 
   The sphere that yields up to the radius c carries ``2 sigY (ln(c/a) + (1 - c^3/b^3)/3)`` and moves
   outside by ``(1 - nu) sigY c^3/(E b^2)`` (Hill 1950, chapter V). The cylinder in plane strain
   carries ``2/sqrt(3) sigY ln(b/a)``.
-- A rigid ball on a half-space: Hertz, from the depth or, of radius and pressure, from the force.
-  The half-space is a ball of 300 contact radii, whose outside is held.
+- A rigid and an elastic ball on a half-space: Hertz, whose P follows from the depth, a and p0 from
+  the force. The half-space is a ball of 300 contact radii, whose outside is held.
 - A rigid ball pressed deep into a half-space that yields perfectly, against a mesh twice as fine
   and steps half as long.
 - A ring of finite length on a longer solid shaft, against CalculiX 2.20 (CAX8, twice as fine).
@@ -38,6 +38,7 @@ from archord.report.table import Table
 
 E = 1.0
 NU = 0.3
+MODULUS = E / (1 - NU**2)
 SIGY = 1e-3
 INNER = 1.0  # radii of the thick sphere and the thick cylinder
 OUTER = 2.0
@@ -178,13 +179,16 @@ def half_space_mesh(near: str, fine: float) -> TaggedMesh:
     """A quarter of a disc below y = 0, with elements of the size ``near`` the ball up to the radius
     ``fine``, growing beyond."""
     sketch = Sketch(["body"], ["surface", "axis", "far"])
+    _draw_half_space(sketch, fine)
+    sketch.sizes["body"] = f"{near} + 0.3 * Max(Sqrt(x*x + y*y) - {fine!r}, 0)"
+    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+
+
+def _draw_half_space(sketch: Sketch, fine: float) -> None:
     surface = sketch.path("body", (0.0, 0.0), (fine, 0.0), (FAR, 0.0))
     far = sketch.path("body", (FAR, 0.0), (0.0, -FAR), on=Circle("far", (0.0, 0.0), FAR))
     axis = sketch.path("body", (0.0, -FAR), (0.0, -fine), (0.0, 0.0))
     sketch.face("body", surface=surface, far=far, axis=axis)
-    beyond = f"Sqrt(x*x + y*y) - {fine!r}"
-    sketch.sizes["body"] = f"{near} + 0.15 * ({beyond} + Abs({beyond}))"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
 def _ball(
@@ -205,15 +209,54 @@ def _ball(
 _EDGE = "Min(0.02 + 0.1 * Sqrt((x - 1)^2 + y*y), 0.11)"
 
 
-def _hertz(run: archord.Run) -> Iterator[Compared]:
-    modulus = E / (1 - NU**2)
+def balls_mesh() -> TaggedMesh:
+    """A half ball on a quarter of a disc, which touch in the origin."""
+    names = ["ball surface", "ball top", "ball axis", "surface", "axis", "far"]
+    sketch = Sketch(["ball", "body"], names)
+    fine = 1.5
+    near = "Min(0.03 + 0.15 * Sqrt((x - 1)^2 + y*y), 0.15)"
+    size = f"{near} + 0.45 * Max(Sqrt(x*x + y*y) - {fine}, 0)"
+    angle = fine / BALL
+    below = (BALL * math.sin(angle), BALL - BALL * math.cos(angle))
+    on_ball = Circle("ball surface", (0.0, BALL), BALL)
+    sketch.face(
+        "ball",
+        **{
+            "ball surface": sketch.path("ball", (0.0, 0.0), below, (BALL, BALL), on=on_ball),
+            "ball top": sketch.path("ball", (BALL, BALL), (0.0, BALL)),
+            "ball axis": sketch.path("ball", (0.0, BALL), (0.0, fine), (0.0, 0.0)),
+        },
+    )
+    _draw_half_space(sketch, fine)
+    sketch.sizes |= {"ball": size, "body": size}
+    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+
+
+def _balls() -> archord.Problem:
+    return archord.Problem(
+        balls_mesh(),
+        [archord.Body("ball", _elastic()), archord.Body("body", _elastic())],
+        [archord.Interaction("contact", ("ball surface", "surface"))],
+        [
+            archord.Support("far", fixed="xy"),
+            archord.Support("axis", fixed="x"),
+            archord.Support("ball axis", fixed="x"),
+        ],
+        [archord.Load("ball", on="ball top", direction="y", displacement=-1 / BALL)],
+        steps=4,
+        kinematics="axisymmetric",
+    )
+
+
+def _hertz(run: archord.Run, modulus: float) -> Iterator[Compared]:
+    """P from the depth, a and p0 from the force, by the contact ``modulus`` E*."""
     force = abs(run.columns["ball force"][-1])
     depth = abs(run.columns["ball displacement"][-1])
     radius = (3 * force * BALL / (4 * modulus)) ** (1 / 3)
     pressure = 3 * force / (2 * math.pi * radius**2)
     exact = 4 / 3 * modulus * math.sqrt(BALL) * depth**1.5
+    area = run.columns["contact contact area"][-1]
     yield Compared("P", exact, "Hertz", force)
-    area = run.columns["contact contact length"][-1]  # of the whole ring
     yield Compared("a", radius, "Hertz", math.sqrt(area / math.pi))
     yield Compared("p0", pressure, "Hertz", run.columns["contact largest pressure"][-1])
 
@@ -393,8 +436,9 @@ CASES = (
     Case(
         "rigid ball on a half-space",
         lambda: _ball(half_space_mesh(_EDGE, 1.5), _elastic(), BALL, 1 / BALL, 4),
-        _hertz,
+        lambda run: _hertz(run, MODULUS),
     ),
+    Case("elastic ball on a half-space", _balls, lambda run: _hertz(run, MODULUS / 2)),
     Case(
         "rigid ball deep in a half-space",
         lambda: _ball(half_space_mesh("0.28", 6.0), _perfect(), SMALL_BALL, 0.5, 20),

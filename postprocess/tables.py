@@ -222,8 +222,15 @@ def _where(run: Run, name: str, k: int) -> str:
     known."""
     if not name.endswith(" peeq_max"):
         return ""
-    x, y = (run.columns[name.replace("peeq_max", f"at {axis}")][k] for axis in "xy")
-    return f", x = {x:.4g}, y = {y:.4g}" if x or y else ""
+    before = name.replace("peeq_max", "at ")  # and x and y, or r and z
+    place = {
+        axis.removeprefix(before): values[k]
+        for axis, values in run.columns.items()
+        if axis.startswith(before)
+    }
+    if not any(place.values()):
+        return ""
+    return "".join(f", {axis} = {value:.4g}" for axis, value in place.items())
 
 
 def cost_of(run: Run) -> Iterator[tuple[str, str]]:
