@@ -47,7 +47,8 @@ def start(
 def archord(*arguments: str, cwd: Path) -> subprocess.CompletedProcess:
     """Run ``archord`` to its end, which must come within five minutes."""
     with tempfile.TemporaryDirectory() as place:
-        out, err = Path(place, "out"), Path(place, "err")
+        out = Path(place, "out")
+        err = Path(place, "err")
         process = start(list(arguments), cwd, out, err)
         process.join(300)
         assert process.exitcode is not None

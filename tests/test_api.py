@@ -25,9 +25,10 @@ SECTIONS = {
 def test_importing_archord_imports_nothing():
     """Names are there, but what they need is loaded when they are used."""
     code = (
-        "import sys, archord; print({'load', 'solve', 'Scene', 'InputError', 'load_scene'} <= {*dir(archord)}, "
-        "{'numpy', 'pydantic', 'mpi4py', 'pandas', 'h5py'} & {*sys.modules}); "
-        "archord.load; print({'pandas', 'mpi4py', 'dolfinx', 'scipy', 'matplotlib'} & {*sys.modules})"
+        "import sys, archord; print({'load', 'solve', 'Scene', 'InputError', 'load_scene'} <= "
+        "{*dir(archord)}, {'numpy', 'pydantic', 'mpi4py', 'pandas', 'h5py'} & {*sys.modules}); "
+        "archord.load; print({'pandas', 'mpi4py', 'dolfinx', 'scipy', 'matplotlib'} & "
+        "{*sys.modules})"
     )
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60
@@ -111,7 +112,8 @@ def test_solve_takes_the_table_of_a_scene_and_refuses_what_is_none(tmp_path):
         archord.solve(table | {"joint": joint | {"radius": -1.0}}, tmp_path / "bad")
     with pytest.raises(
         InputError,
-        match=r"archord.solve: problem must be a Problem, a scene, a scene file or its table, not \[1\]",
+        match=r"archord.solve: problem must be a Problem, a scene, a scene file or its table, not "
+        r"\[1\]",
     ):
         archord.solve([1], tmp_path / "bad")
     assert not (tmp_path / "bad").exists()
@@ -150,7 +152,8 @@ PARTS[archord.Problem] = {
     "bodies": [archord.Body(**PARTS[archord.Body])],
     "loads": [archord.Load(**PARTS[archord.Load])],
 }
-BODY, LOAD = 'archord.Body: body "lug".', 'archord.Load: load "pull".'
+BODY = 'archord.Body: body "lug".'
+LOAD = 'archord.Load: load "pull".'
 FAULTS = [
     (archord.Body, {"name": ""}, 'archord.Body: body "".name = "" must be a name.'),
     (archord.Body, {"material": 3}, f"{BODY}material = 3 must be the name of a metal, or a "),

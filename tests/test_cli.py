@@ -70,11 +70,15 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
     ]
     assert [line.split()[0] for line in lines[4:]] == ["1", "2", "3", "4", "4"]
     history = (tmp_path / "runs" / "steel_pin" / "history.csv").read_text()
-    said = "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it with --force.\n"
+    said = (
+        "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it "
+        "with --force.\n"
+    )
     assert archord("solve", SCENE, *COARSE, cwd=tmp_path, code=2).stderr == said
     assert (tmp_path / "runs" / "steel_pin" / "history.csv").read_text() == history
     for options, printed in (({}, ""), ({"PETSC_OPTIONS": "-log_view"}, "SNESSolve")):
-        command, environment = [*SOLVE, *COARSE, "--force", "--quiet"], ENVIRONMENT | options
+        command = [*SOLVE, *COARSE, "--force", "--quiet"]
+        environment = ENVIRONMENT | options
         quiet = subprocess.run(
             command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
         )
@@ -87,11 +91,10 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
 def test_a_terminal_shows_how_far_a_solve_is(tmp_path, quiet):
     """Between two lines of steps, in one line that moves; nothing of it with -q."""
     ours, theirs = pty.openpty()
-    command, environment = (
-        [*SOLVE, *COARSE, *quiet],
-        ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "120"},
-    )
-    process, said = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=theirs), b""
+    command = [*SOLVE, *COARSE, *quiet]
+    environment = ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "120"}
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=theirs)
+    said = b""
     os.close(theirs)
     with (
         contextlib.suppress(OSError),
@@ -178,7 +181,10 @@ def test_a_load_beyond_small_strains_is_doubted_before_it_is_solved(tmp_path):
         "joint.relative_element_size=0.2",
     ]
     result = archord("solve", SCENE, *elastic, *far, "-o", "run", cwd=tmp_path)
-    said = "load.displacement moves the pin by 0.15 R: small-strain theory makes P about 2.4 % too low there"
+    said = (
+        "load.displacement moves the pin by 0.15 R: small-strain theory makes P about 2.4 % too "
+        "low there"
+    )
     assert result.stderr.startswith(f"archord: warning: {said}")
     assert result.stderr.count("small-strain") == 1
     assert json.loads((tmp_path / "run" / "run.json").read_text())["warnings"][0].startswith(said)

@@ -20,7 +20,8 @@ class Run:
     reported."""
 
     def __init__(self, folder: Path, *arguments: str) -> None:
-        self.out, self.err = folder / "out", folder / "err"
+        self.out = folder / "out"
+        self.err = folder / "err"
         for file in (self.out, self.err):
             file.write_text("")
         self.process = forked.start(["solve", *arguments], folder, self.out, self.err)
@@ -48,7 +49,8 @@ class Run:
 def test_a_run_survives_any_number_of_kills(tmp_path, request):
     """Killed at random and restarted until the kills are used up; finished runs are compared, and
     the next begins."""
-    kills, chance = request.config.getoption("--kills"), random.Random(1)
+    kills = request.config.getoption("--kills")
+    chance = random.Random(1)
     whole = Run(tmp_path, SCENE, *OPTIONS, "-o", "whole")
     assert whole.end() == 0
     seconds = time.monotonic() - whole.begun
@@ -66,14 +68,16 @@ def test_a_run_survives_any_number_of_kills(tmp_path, request):
             *(["--restart"] if folder.exists() else []),
         )
         code = run.end(chance.uniform(0, 0.7 * seconds) if len(caught_at) < kills else None)
-        before, steps = steps, accepted_steps(folder) if folder.exists() else 0
+        before = steps
+        steps = accepted_steps(folder) if folder.exists() else 0
         assert steps >= max(before, run.printed)
         if code != 0:
             caught_at.append(steps)
             continue
         assert steps == 15
         same_run(tmp_path / "whole", folder, 1e-12)
-        finished, steps = finished + 1, 0
+        finished = finished + 1
+        steps = 0
     assert finished > 0
     assert (
         len(set(caught_at)) > min(kills, 10) / 3

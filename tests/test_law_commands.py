@@ -256,15 +256,29 @@ def test_laws_fit_the_terminal(monkeypatch, capsys, columns, width):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--set", "joint.model=ring", "--set", "load.displacement=none", "--set", "load.relative_force=0.001",
-          "--export", "joint.py"], "ring"),
-        (["--set", "joint.relative_clearance=0.1", "--export", "joint.py"], "dR/R = 0.1 is outside"),
+        (
+            [
+                "--set",
+                "joint.model=ring",
+                "--set",
+                "load.displacement=none",
+                "--set",
+                "load.relative_force=0.001",
+                "--export",
+                "joint.py",
+            ],
+            "ring",
+        ),
+        (
+            ["--set", "joint.relative_clearance=0.1", "--export", "joint.py"],
+            "dR/R = 0.1 is outside",
+        ),
         (["--deepest", "5"], "must be from 0 to 3 clearances"),
         (["--deepest", "1", "--by-load"], "does not go with --by-load"),
         (["--deepest", "1", "--export", "joint.py"], "does not go with --deepest"),
         (["paper", "--deepest", "1"], "is for the law archord alone"),
     ],
-)  # fmt: skip
+)
 def test_what_the_law_of_solved_joints_cannot_say_is_refused(
     options, said, tmp_path, monkeypatch, capsys
 ):
@@ -391,8 +405,8 @@ def test_all_that_is_missing_is_asked_for_at_once(refused):
         ([], f"{every}: missing; give all, {scene}"),
         (
             ["paper-plastic", "dubowsky-freudenstein"],
-            f"{every}, --yield-stress, --length: missing; paper-plastic needs --yield-stress; dubowsky-freudenstein "
-            f"needs --length; give all, {scene}",
+            f"{every}, --yield-stress, --length: missing; paper-plastic needs --yield-stress; "
+            f"dubowsky-freudenstein needs --length; give all, {scene}",
         ),
         (
             ["--export", "x.h"],

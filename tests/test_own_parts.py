@@ -104,9 +104,14 @@ def test_the_folder_tells_of_the_objects(run):
 
 @pytest.mark.parametrize(
     "command",
-    [["show", "{run}"], ["report", "{run}", "-o", "{to}.pdf"], ["picture", "{run}", "-o", "{to}.png"],
-     ["probe", "{run}", "--edge", "lower top"], ["export", "{run}", "--csv", "{to}"]],
-)  # fmt: skip
+    [
+        ["show", "{run}"],
+        ["report", "{run}", "-o", "{to}.pdf"],
+        ["picture", "{run}", "-o", "{to}.png"],
+        ["probe", "{run}", "--edge", "lower top"],
+        ["export", "{run}", "--csv", "{to}"],
+    ],
+)
 def test_a_run_of_own_objects_is_read_as_any_other(run, tmp_path, command, capsys):
     words = [word.format(run=run.folder, to=tmp_path / "out") for word in command]
     assert cli.run(words) == 0, capsys.readouterr().err

@@ -12,7 +12,8 @@ from tests.output.run_files import rewrite_report
 from tests.test_cli import SCENE, archord
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
-RUN, OTHER = "{coarse}", "{elastic}"
+RUN = "{coarse}"
+OTHER = "{elastic}"
 
 
 @pytest.mark.parametrize(
@@ -70,11 +71,13 @@ RUN, OTHER = "{coarse}", "{elastic}"
         ),
         (
             ["solve", SCENE, "--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"],
-            "--set joint.growth=0.5: joint.growth must not be given together with analysis.accuracy, which chooses it.",
+            "--set joint.growth=0.5: joint.growth must not be given together with "
+            "analysis.accuracy, which chooses it.",
         ),
         (
             ["solve", RUN],
-            f"{RUN}: is a run; --restart or --extend continues it, and its scene is {RUN}/scene.toml.",
+            f"{RUN}: is a run; --restart or --extend continues it, and its scene is "
+            f"{RUN}/scene.toml.",
         ),
         (["solve", "empty"], "empty: is no scene but a folder, and no run is in it."),
         (

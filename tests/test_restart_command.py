@@ -87,7 +87,10 @@ def test_what_cannot_be_continued_is_refused_once(tmp_path, whole):
     (tmp_path / "run").symlink_to(whole)
     before = {path.name: path.stat().st_mtime_ns for path in whole.iterdir()}
     lists = [["solve", *arguments] for arguments, _ in REFUSED]
-    code = f"import sys; from archord.cli import run; sys.exit(2 if {{*map(run, {lists})}} == {{2}} else 1)"
+    code = (
+        f"import sys; from archord.cli import run; sys.exit(2 if {{*map(run, {lists})}} == {{2}} "
+        "else 1)"
+    )
     command = ["mpirun", "-n", "2", sys.executable, "-c", code]
     result = subprocess.run(
         command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120

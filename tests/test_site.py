@@ -78,7 +78,8 @@ def test_the_scene_of_a_page_is_a_scene(page, displacement, tmp_path):
 def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
     """Each number of the last line of the program to 5 %, as the law may be fitted to more
     joints."""
-    [scene], [program] = code("docs/tutorial.md", "toml"), code("docs/tutorial.md", "c")
+    [scene] = code("docs/tutorial.md", "toml")
+    [program] = code("docs/tutorial.md", "c")
     (tmp_path / "bolt.toml").write_text(scene, encoding="utf-8")
     (tmp_path / "impact.c").write_text(program, encoding="utf-8")
     law = [sys.executable, "-m", "archord", "law", "--scene", "bolt.toml", "--export", "bolt_pin.h"]

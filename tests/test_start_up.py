@@ -33,7 +33,10 @@ LAUNCHER = {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK
 def test_commands_load_only_what_they_need(runs, tmp_path, arguments, environment, needless):
     """No plotting library without a picture, no solver and no MPI without a solve, not even under a
     launcher; an elastic scene leaves the return map alone."""
-    code = "import sys; from archord.cli import run; print(run(sys.argv[1:]), *sys.modules, file=sys.stderr)"
+    code = (
+        "import sys; from archord.cli import run; print(run(sys.argv[1:]), *sys.modules, "
+        "file=sys.stderr)"
+    )
     command = [sys.executable, "-c", code, *(argument.format(**runs) for argument in arguments)]
     result = subprocess.run(
         command,

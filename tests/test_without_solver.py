@@ -10,9 +10,11 @@ import pytest
 BLOCKED = """
 import sys
 
+BLOCKED = "dolfinx dolfinx_solver petsc4py mpi4py gmsh basix ufl ffcx".split()
+
 class Blocked:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in "dolfinx dolfinx_solver petsc4py mpi4py gmsh basix ufl ffcx".split():
+        if name.partition(".")[0] in BLOCKED:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Blocked())
@@ -25,7 +27,8 @@ from archord.cli import run
 for command in json.loads(sys.argv[1]):
     print("#", run(command), flush=True)
 joint = archord.load(sys.argv[2])
-print(len(joint.history["P"]), joint.pressure(step=2).shape[0] > 0, joint.fields(step=2).displacement.shape[1])
+has_pressure = joint.pressure(step=2).shape[0] > 0
+print(len(joint.history["P"]), has_pressure, joint.fields(step=2).displacement.shape[1])
 """
 SCENE = "scenes/steel_pin.toml"
 
@@ -42,7 +45,8 @@ def without_solver(tmp_path, commands, run):
 
 
 def test_runs_are_read_fitted_drawn_and_exported_and_laws_tell_joints(runs, tmp_path):
-    plastic, elastic = runs["plastic"], runs["elastic"]
+    plastic = runs["plastic"]
+    elastic = runs["elastic"]
     commands = [
         ["show", plastic, "-o", tmp_path / "shown.png"],
         ["picture", plastic, "-o", tmp_path / "drawn.png"],
@@ -71,7 +75,7 @@ def test_what_solves_says_in_one_sentence_what_it_needs(command, runs, tmp_path)
     result = without_solver(tmp_path, [words], runs["elastic"])
     assert "# 2" in result.stdout
     assert result.stderr == (
-        f"archord {command[0]}: No module named 'mpi4py'; "
-        "pip install 'archord[solve]' brings what solves (docs/containers.md).\n"
+        f"archord {command[0]}: No module named 'mpi4py'; pip install 'archord[solve]' brings what "
+        "solves (docs/containers.md).\n"
     )
     assert not (tmp_path / "out").exists()

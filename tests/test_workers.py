@@ -50,7 +50,8 @@ def test_a_worker_of_a_pool_solves(scene, method):
     program.write_text(
         "import multiprocessing, archord\n"
         "def job(k):\n"
-        f"    return archord.solve({str(scene)!r}, {str(scene.with_name('pool'))!r} + str(k)).status\n"
+        f"    return archord.solve({str(scene)!r}, {str(scene.with_name('pool'))!r} + "
+        "str(k)).status\n"
         "if __name__ == '__main__':\n"
         f"    with multiprocessing.get_context({method!r}).Pool(2) as pool:\n"
         "        print(pool.map(job, [1, 2]))\n"
@@ -71,7 +72,8 @@ def test_a_thread_solves(scene):
 def test_a_thread_may_load_archord_first(scene):
     program = (
         "import threading, archord\n"
-        f"job = threading.Thread(target=archord.solve, args=({str(scene)!r}, {str(scene.with_name('first'))!r}))\n"
+        f"job = threading.Thread(target=archord.solve, args=({str(scene)!r}, "
+        f"{str(scene.with_name('first'))!r}))\n"
         "job.start()\njob.join()\n"
         f"print(archord.load({str(scene.with_name('first'))!r}).status)\n"
     )

@@ -123,7 +123,10 @@ def test_a_general_scene_is_compared_by_force_and_stresses(tmp_path):
     """A lug 5 mm thick, whose forces are those of the whole: half a percent of force, 2 % of
     stresses."""
     scene = tmp_path / "lug.toml"
-    lug = "[lug]\nradius = 9.9\nclearance = 0.1\nwidth = 40.0\nedge_distance = 20.0\nlength = 60.0\nelement_size = 1.0\n"
+    lug = (
+        "[lug]\nradius = 9.9\nclearance = 0.1\nwidth = 40.0\nedge_distance = 20.0\nlength = "
+        "60.0\nelement_size = 1.0\n"
+    )
     steel = "E = 210000.0\nnu = 0.3\n"
     rest = "[load]\ndisplacement = 0.1\nsteps = 2\n[analysis]\nthickness = 5.0\n"
     scene.write_text(f"{lug}[pin]\n{steel}[plate]\n{steel}{rest}", encoding="utf-8")

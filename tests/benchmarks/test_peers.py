@@ -84,7 +84,8 @@ def test_return_map_of_scikit_fems_peer(monkeypatch):
         str(Path(installed.__file__).parent)
     )  # scripts find each other there
     monkeypatch.setitem(sys.modules, "skfem", ModuleType("skfem"))
-    script, sigy = import_module("joint_script"), 0.02
+    script = import_module("joint_script")
+    sigy = 0.02
     strain = np.random.default_rng(1).normal(size=(40, 2, 3)) * 0.01
     stress, tangent, history = import_module("skfem_joint").return_map(
         strain, np.zeros((40, 2, 4)), sigy

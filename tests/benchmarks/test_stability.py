@@ -51,7 +51,8 @@ def test_the_table_is_whole():
     """At least 160 scenes, 40 of them general; what a case is compared with exists and is another.
     Fine scenes are the same joint with smaller elements of one size, and more steps where a body
     can yield."""
-    table, fine = cases(), json.loads(FILE.read_text(encoding="utf-8"))
+    table = cases()
+    fine = json.loads(FILE.read_text(encoding="utf-8"))
     assert len({slug(name) for name in table}) == len(table) >= 160
     assert sum(not isinstance(case.scene, Scene) for case in table.values()) >= 40
     for case in table.values():
@@ -60,7 +61,8 @@ def test_the_table_is_whole():
             assert expected.value != case.name
             if expected.value == FINE:
                 assert expected.quantity in fine[case.name]
-                own, scene = case.scene, fine_scene(case.scene)
+                own = case.scene
+                scene = fine_scene(case.scene)
                 assert (scene.pin, scene.block, scene.load.stages) == (
                     own.pin,
                     own.block,

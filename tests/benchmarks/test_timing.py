@@ -15,7 +15,10 @@ def named(folder, *command, **options):
 
 def test_a_process_is_timed_from_outside(tmp_path):
     """Its sleep, its memory but not its parent's, one thread."""
-    code = "import os, time; a = bytearray(60_000_000); time.sleep(0.2); print(os.environ['OMP_NUM_THREADS'])"
+    code = (
+        "import os, time; a = bytearray(60_000_000); time.sleep(0.2); "
+        "print(os.environ['OMP_NUM_THREADS'])"
+    )
     run = run_once(named(tmp_path, sys.executable, "-S", "-c", code, read=lambda: "result"))
     assert 0.2 < run.seconds < 5
     assert 0 < run.cpu < run.seconds
@@ -53,7 +56,8 @@ def test_failures_are_recorded_with_their_sentence(tmp_path):
 
 def test_repeats_are_interleaved(tmp_path):
     """Round robin, after one untimed run of each kind; what was written before is cleared."""
-    said, seen = [], []
+    said = []
+    seen = []
     processes = [
         named(tmp_path / n, "touch", "old", kind=n[0], clear=("old",), read=partial(seen.append, n))
         for n in ("a1", "a2", "b1")

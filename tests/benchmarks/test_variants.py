@@ -90,7 +90,8 @@ def test_a_sweep_is_solved_on_each_number_of_ranks(tmp_path, monkeypatch):
     """Its cases again in every run, by both ranks together; a command that fails is no
     measurement."""
     (tmp_path / "few.sweep.toml").write_text(
-        'base = "elastic_pin.toml"\n[grid]\npin.E = [1.0, 1.82]\njoint.relative_element_size = [0.3]\n'
+        'base = "elastic_pin.toml"\n[grid]\npin.E = [1.0, 1.82]\njoint.relative_element_size = '
+        "[0.3]\n"
     )
     scenes = Path(module.__file__).resolve().parents[2] / "scenes"
     (tmp_path / "elastic_pin.toml").write_text((scenes / "elastic_pin.toml").read_text())

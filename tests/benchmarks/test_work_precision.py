@@ -177,7 +177,9 @@ def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
     where it fails."""
 
     class Peer:
-        label, version, time_limit = "other", "1.2", 20.0
+        label = "other"
+        version = "1.2"
+        time_limit = 20.0
         series = {"elastic": ((0.2, 2), (0.1, 4))}  # noqa: RUF012
 
         def command(self, case, size, order, steps, output):

@@ -36,7 +36,10 @@ def test_a_stack_of_squares_is_exact(run_of):
     """Between walls the pressure of elastic squares is M strain, with M the modulus without lateral
     strain. A square that yields in plane strain has the pressure K strain + 2/3 sigY (J2). Weak
     springs hold the squares until they touch."""
-    E, nu, yield_stress, depth = 1.0, 0.3, 0.002, 0.02
+    E = 1.0
+    nu = 0.3
+    yield_stress = 0.002
+    depth = 0.02
     M = E * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
     K = E / (3 * (1 - 2 * nu))
     exact = (depth + 2 * yield_stress / (3 * K)) / (2 / M + 1 / K)

@@ -20,7 +20,9 @@ def test_the_energies_of_a_mechanism_with_clearance_balance(example, name):
     """Within 1 % of what the joint stores at most, through the impacts after a quarter of a turn;
     an elastic joint loses nothing by its law, one that yields loses more and more."""
     _, P, energies, _ = example["study"](example["laws"]()[name], steps=20000, turns=0.3)
-    stored, lost, total = energies["stored"], energies["lost, law"], sum(energies.values())
+    stored = energies["stored"]
+    lost = energies["lost, law"]
+    total = sum(energies.values())
     assert np.ptp(total) < 0.01 * stored.max()
     assert ((P[1:] > 0) & (P[:-1] == 0)).sum() >= 3  # impacts
     assert np.diff(lost).min() > -1e-3 * stored.max()

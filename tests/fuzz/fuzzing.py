@@ -21,11 +21,12 @@ from tests.forked import start
 from tests.fuzz.mesh_mutations import mutate_mesh
 from tests.fuzz.mutations import GENERAL, base_scenes, mutate
 
-_MEMORY, _FILE = 8 * 2**30, 2 * 2**30  # bytes that a case may use
-_LIMIT, _GRACE = (
-    20.0,
-    10.0,
-)  # seconds that a case may take, and between SIGTERM and SIGKILL after them
+# bytes that a case may use
+_MEMORY = 8 * 2**30
+_FILE = 2 * 2**30
+# seconds that a case may take, and between SIGTERM and SIGKILL after them
+_LIMIT = 20.0
+_GRACE = 10.0
 SLOW = 128 + signal.SIGTERM
 _NOISE = ("Traceback", "PETSC ERROR", "RuntimeWarning", "Error:", "Warning :", "terminate called")
 
@@ -89,7 +90,8 @@ def _limit_resources() -> None:
 def faults(folder: Path, code: int) -> list[str]:
     """What is wrong with a case that ended with ``code`` in ``folder``."""
     said = (folder / "stderr").read_text(encoding="utf-8", errors="replace")
-    run, lines = folder / "run", said.splitlines()
+    run = folder / "run"
+    lines = said.splitlines()
     wrong = {f"{word!r} on stderr": word in said for word in _NOISE} | {
         f"exit code {code}": code not in (0, 2, 3, SLOW),
         "refused, yet a run folder was left": code == 2 and run.exists(),

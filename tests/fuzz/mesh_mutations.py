@@ -21,7 +21,8 @@ def mutate_mesh(rng: Random, text: str) -> tuple[str, str]:
 
 def _rows(lines: list[str], keyword: str) -> list[int]:
     """Where the rows below a keyword stand."""
-    found, inside = [], False
+    found = []
+    inside = False
     for k, line in enumerate(lines):
         if line.startswith("*"):
             inside = line.upper().startswith(f"*{keyword}")

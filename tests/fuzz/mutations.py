@@ -254,11 +254,9 @@ def mutate(rng: Random, text: str) -> tuple[str, bytes]:
 
 def _bytes(rng: Random, text: str) -> bytes:
     raw = text.encode() or b"\n"
-    at, other, length = (
-        rng.randrange(len(raw)),
-        rng.randrange(len(raw)),
-        rng.choice((1, 1, 2, 5, 40)),
-    )
+    at = rng.randrange(len(raw))
+    other = rng.randrange(len(raw))
+    length = rng.choice((1, 1, 2, 5, 40))
     odd = rng.choice(
         (b"\0", b"\xff", b"\r", b"\x1b[31m", b"\t", b"\xc3\x28", b"\xe2\x80\xae", b"[", b'"')
     )
@@ -303,7 +301,8 @@ def _structure(rng: Random, text: str) -> bytes:
         return "".join(lines).encode()
     data = tomllib.loads(text)
     section, table = rng.choice(_tables(data) or [("", {})])
-    key, copy = rng.choice(list(table) or ["radius"]), dict(table)
+    key = rng.choice(list(table) or ["radius"])
+    copy = dict(table)
     nested: Any = table.get(key, 1)
     for _ in range(rng.choice((1, 3, 30, 80))):
         nested = {key: nested}
@@ -321,7 +320,8 @@ def _structure(rng: Random, text: str) -> bytes:
     elif change == 4:
         data = {section: data}
     else:
-        some, other = rng.choice(lists), rng.choice(lists)
+        some = rng.choice(lists)
+        other = rng.choice(lists)
         some.insert(0, other.pop(rng.randrange(len(other))) if rng.random() < 0.7 else other[-1])
     return tomli_w.dumps(data).encode()
 
@@ -332,9 +332,11 @@ def _values(rng: Random, text: str) -> bytes:
     data = tomllib.loads(text)
     tables = [(name, table) for name, table in _tables(data) if name in _KEYS]
     for _ in range(rng.choice((1, 1, 2, 3)) if tables else 0):
-        (section, table), kind = rng.choice(tables), rng.random()
+        (section, table) = rng.choice(tables)
+        kind = rng.random()
         if kind < 0.1:
-            names, scale = rng.choice(_UNITS), 10 ** rng.uniform(-40, 40)
+            names = rng.choice(_UNITS)
+            scale = 10 ** rng.uniform(-40, 40)
             for _, other in tables:
                 other.update(
                     {key: other[key] * scale for key in names if isinstance(other.get(key), float)}
@@ -343,7 +345,8 @@ def _values(rng: Random, text: str) -> bytes:
             key = rng.choice(
                 [key for key, value in table.items() if isinstance(value, float)] or ["radius"]
             )
-            far, value = rng.choice((1, 3, 12)), table.get(key, 1.0)
+            far = rng.choice((1, 3, 12))
+            value = table.get(key, 1.0)
             table[key] = (value if isinstance(value, float) else 1.0) * float(
                 f"{10 ** rng.uniform(-far, far):.3g}"
             )

@@ -14,7 +14,9 @@ from tests.fuzz.mutations import KINDS, base_scenes
 def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
     """Nothing but `InputError`, in lines that end like sentences; a file that is accepted is
     resolved to itself."""
-    path, refused, kinds = tmp_path / "scene.toml", 0, set()
+    path = tmp_path / "scene.toml"
+    refused = 0
+    kinds = set()
     for number in range(300):
         kind, content = scene_of(number)
         assert (kind, content) == scene_of(number)

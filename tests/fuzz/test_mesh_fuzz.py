@@ -67,7 +67,9 @@ def files(tmp_path_factory) -> dict[str, tuple[bytes, str]]:
 def mutate(rng: Random, raw: bytes) -> bytes:
     """One to three changes of bytes, lines or numbers."""
     for _ in range(rng.choice((1, 1, 2, 3))):
-        at, length, kind = rng.randrange(len(raw)), rng.choice((1, 1, 2, 8, 60)), rng.randrange(6)
+        at = rng.randrange(len(raw))
+        length = rng.choice((1, 1, 2, 8, 60))
+        kind = rng.randrange(6)
         if kind == 0:
             raw = raw[:at] + bytes([raw[at] ^ 1 << rng.randrange(8)]) + raw[at + 1 :]
         elif kind == 1:

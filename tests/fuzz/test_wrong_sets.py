@@ -42,18 +42,20 @@ def test_sets_as_meant_have_nothing_said_of_them(tmp_path):
         (
             "9, 15, 16, 20, 19",
             "9, 19, 20, 16, 15",
-            "the facet set 'top of upper' has 1 of its 3 facets inside a body, as at (0.5, 1.5): look whether",
+            "the facet set 'top of upper' has 1 of its 3 facets inside a body, as at (0.5, 1.5): "
+            "look whether",
         ),
         (
             "8, S3\n9, S3\n",
             "8, S3\n",
-            "the facet set 'top of upper' leaves out 1 single facets that no set has, as at (0.5, 2)",
+            "the facet set 'top of upper' leaves out 1 single facets that no set has, as at (0.5, "
+            "2)",
         ),
         (
             "NAME=bottom of lower\n",
             "NAME=bottom of lower\n6, S1\n",
-            "the set 'bottom of lower' of 'floor' has 1 facets of the surface 'bottom of upper' of 'contact', as at "
-            "(0.5, 1), which it moves whatever they touch",
+            "the set 'bottom of lower' of 'floor' has 1 facets of the surface 'bottom of upper' of "
+            "'contact', as at (0.5, 1), which it moves whatever they touch",
         ),
         (
             "17, 1.000000, 1.500000",

@@ -54,7 +54,8 @@ def test_gradients_of_linear_fields_are_exact_on_curved_cells():
 def test_gradients_are_the_derivatives_of_the_shape_functions():
     """Central differences along both axes, through the curved map, on cells of either
     orientation."""
-    X, h = np.array([[0.2, 0.3], [0.6, 0.1]]), 1e-5
+    X = np.array([[0.2, 0.3], [0.6, 0.1]])
+    h = 1e-5
     _, basis = mesh_and_basis(X)
     chain = np.einsum("nqai,nqij->nqaj", basis.gradient, basis.jacobian)
     for j in range(2):

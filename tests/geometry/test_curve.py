@@ -60,7 +60,8 @@ def on_curve(c: Curve, facet, xi, displacement=0.0):
     """Points and unit outward normals at ``xi`` of ``facet``."""
     N, dN = c.shapes(xi)
     nodes = (c.X + displacement)[c.connectivity[facet]]
-    y, t = np.einsum("ma,mai->mi", N, nodes), np.einsum("ma,mai->mi", dN, nodes)
+    y = np.einsum("ma,mai->mi", N, nodes)
+    t = np.einsum("ma,mai->mi", dN, nodes)
     return y, np.stack([t[:, 1], -t[:, 0]], axis=1) / np.linalg.norm(t, axis=1)[:, None]
 
 
@@ -68,14 +69,16 @@ def scatter(c: Curve, distance: float, displacement=0.0, n: int = 500, seed: int
     """Random points up to ``distance`` off the curve, on both sides of it, and outward normals of a
     body facing it."""
     rng = np.random.default_rng(seed)
-    facet, xi = rng.integers(0, c.n_facets, n), rng.uniform(size=n)
+    facet = rng.integers(0, c.n_facets, n)
+    xi = rng.uniform(size=n)
     y, normal = on_curve(c, facet, xi, displacement)
     return y + normal * (distance * rng.uniform(-1, 1, n))[:, None], -normal
 
 
 def brute_force(c: Curve, x, displacement=0.0, per_facet: int = 200):
     """Distance of ``x`` from the nearest of many points of the curve."""
-    facet, xi = np.repeat(np.arange(c.n_facets), per_facet + 1), np.linspace(0, 1, per_facet + 1)
+    facet = np.repeat(np.arange(c.n_facets), per_facet + 1)
+    xi = np.linspace(0, 1, per_facet + 1)
     samples, _ = on_curve(c, facet, np.tile(xi, c.n_facets), displacement)
     return np.array([np.sqrt(((samples - p) ** 2).sum(axis=1).min()) for p in x])
 
@@ -84,7 +87,8 @@ def brute_force(c: Curve, x, displacement=0.0, per_facet: int = 200):
 def test_shape_functions_are_lagrange_polynomials(degree):
     """One at their own node, zero at the others; they reproduce every power up to their degree and
     its derivative."""
-    nodes, xi = np.linspace(0, 1, degree + 1), np.linspace(-0.05, 1.05, 7)
+    nodes = np.linspace(0, 1, degree + 1)
+    xi = np.linspace(-0.05, 1.05, 7)
     values = np.vander(nodes, increasing=True) @ lagrange(degree).T
     np.testing.assert_allclose(values, np.eye(degree + 1), atol=1e-14)
     s = np.linspace(0, 1, 2 * degree + 1)
@@ -138,7 +142,8 @@ def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
     x, outward = scatter(c, distance)
     p = closest(c, x, outward)
     assert p.found.all()
-    found, sampled = np.linalg.norm(x - p.point, axis=1), brute_force(c, x)
+    found = np.linalg.norm(x - p.point, axis=1)
+    sampled = brute_force(c, x)
     assert np.all(found <= sampled + 1e-14)
     spacing = 1.1 * np.linalg.norm(p.tangent, axis=1).max() / 200
     assert np.all(
@@ -159,10 +164,8 @@ def test_closest_points_of_a_displaced_curve(f):
     c = interpolate(f, 12)
     u = 0.03 * np.sin(2 * c.X[:, ::-1] + 1)
     x, outward = scatter(c, 0.2, u)
-    p, q = (
-        c.closest_point(x, outward, u),
-        Curve(c.X + u, 2).closest_point(x, outward, np.zeros_like(u)),
-    )
+    p = c.closest_point(x, outward, u)
+    q = Curve(c.X + u, 2).closest_point(x, outward, np.zeros_like(u))
     np.testing.assert_array_equal(p.point, q.point)
     assert np.all(np.linalg.norm(x - p.point, axis=1) <= brute_force(c, x, u) + 1e-14)
 
@@ -227,7 +230,8 @@ def linearisation(p, x, dx, du):
     """Directional derivatives of gap, normal and closest point that the fields of a projection
     stand for; ``du`` ``(nodes, 2)``, or ``(2,)`` of a rigid circle."""
     speed = np.linalg.norm(p.tangent, axis=1)
-    d, du = x - p.point, np.atleast_2d(du)
+    d = x - p.point
+    du = np.atleast_2d(du)
     gap = (d * p.normal).sum(1)
     dy_fixed, dt = (np.einsum("ma,mai->mi", N, du[p.nodes]) for N in (p.shape, p.slope))
     dxi = ((dx - dy_fixed) * p.tangent).sum(1) + (d * dt).sum(1)
@@ -241,8 +245,11 @@ def linearisation(p, x, dx, du):
 def assert_derivative(project, x, u, h=1e-6):
     """`linearisation` against central differences of the projection, in a random direction."""
     rng = np.random.default_rng(4)
-    dx, du = rng.normal(size=x.shape), 0.1 * rng.normal(size=u.shape)
-    p, plus, minus = project(x, u), project(x + h * dx, u + h * du), project(x - h * dx, u - h * du)
+    dx = rng.normal(size=x.shape)
+    du = 0.1 * rng.normal(size=u.shape)
+    p = project(x, u)
+    plus = project(x + h * dx, u + h * du)
+    minus = project(x - h * dx, u - h * du)
     same = (
         (plus.facet == p.facet)
         & (minus.facet == p.facet)
@@ -276,7 +283,8 @@ def test_linearisation_at_a_corner():
     c = roof()
     angle = np.random.default_rng(4).uniform(np.radians(50), np.radians(130), 50)
     x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    outward, u = np.tile([0.0, -1.0], (50, 1)), np.zeros_like(c.X)
+    outward = np.tile([0.0, -1.0], (50, 1))
+    u = np.zeros_like(c.X)
     p = c.closest_point(x, outward, u)
     assert not p.slides.any()
     assert_derivative(lambda x, u: c.closest_point(x, outward, u, p.facet), x, u)
@@ -345,12 +353,14 @@ def joined(*pieces):
 def test_closest_points_on_several_pieces(n, start):
     """Points within two holes find the nearest point of theirs, wherever the search starts; of few
     facets, too."""
-    c, rng = joined(circle(n), circle(n, (2.5, 0.0))), np.random.default_rng(1)
+    c = joined(circle(n), circle(n, (2.5, 0.0)))
+    rng = np.random.default_rng(1)
     assert c.n_pieces == 2
     lengths = c.arc_length(np.array([0.0, 1.0]))
     np.testing.assert_allclose(lengths[[0, n], 0], 0, atol=1e-15)
     assert lengths[n - 1, 1] == pytest.approx(lengths[-1, 1], rel=1e-12)
-    hole, angle = np.arange(40) % 2, rng.uniform(-np.pi, np.pi, 40)
+    hole = np.arange(40) % 2
+    angle = rng.uniform(-np.pi, np.pi, 40)
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     x = 0.9 * ray + [2.5, 0.0] * hole[:, None]
     facet = {"near": None, "other": n * (1 - hole)}.get(start, np.full(40, start))

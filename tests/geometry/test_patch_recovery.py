@@ -15,7 +15,10 @@ from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Problem
 from tests.solver.parts import quarter_annulus
 
-A, B, E, NU = 1.0, 2.0, 1.0, 0.3
+A = 1.0
+B = 2.0
+E = 1.0
+NU = 0.3
 
 
 def ring(size, comm=MPI.COMM_SELF, **options):
@@ -32,7 +35,8 @@ def test_polynomials_of_the_degree_are_reproduced_at_every_node(degree, size, qu
     """Also where walls are one cell thick and vertices have no neighbour inside."""
     order = MeshOrder(ring(size, quads=quads))
     nodes = SecondOrder(order.kind, order.nodes_of_cell)
-    x, places = nodes(order.coordinates)[:, :2], collect_mesh(order)["points/coordinates"]
+    x = nodes(order.coordinates)[:, :2]
+    places = collect_mesh(order)["points/coordinates"]
     corners = [0, 1, 3, 2] if quads else [0, 1, 2]
     recovery = PatchRecovery(x, nodes.cells[:, corners], nodes.between, places, degree)
 
@@ -68,11 +72,10 @@ def test_stress_of_lames_cylinder_converges_faster_than_that_of_its_cells(tmp_pa
         fields = recovered(system, tmp_path)
         pressure = E / (1 + NU) / (A**2 / (B**2 - A**2) * ((1 - 2 * NU) * A + B**2 / A))
         r = np.hypot(*fields.coordinates.T)
-        (c, s), (xx, yy, zz, xy) = fields.coordinates.T / r, fields.stress.T
-        hoop, radial = (
-            xx * s**2 + yy * c**2 - 2 * xy * c * s,
-            xx * c**2 + yy * s**2 + 2 * xy * c * s,
-        )
+        (c, s) = fields.coordinates.T / r
+        (xx, yy, zz, xy) = fields.stress.T
+        hoop = xx * s**2 + yy * c**2 - 2 * xy * c * s
+        radial = xx * c**2 + yy * s**2 + 2 * xy * c * s
         lame = pressure * A**2 / (B**2 - A**2) * (1 + np.outer([1, -1], B**2 / r**2))
         misfit = np.abs([hoop - lame[0], radial - lame[1]]) / pressure
         inner = fields.edges["inner"]

@@ -11,7 +11,8 @@ from archord.kernels.compat import RESIDUAL_NOT_FINITE, ghosted_vector, versions
 @pytest.mark.mpi
 def test_a_ghosted_vector_knows_the_values_of_the_other_ranks(comm):
     vertices = create_unit_square(comm, 3, 3).topology.index_map(0)
-    n, ghosts = vertices.size_local, vertices.num_ghosts
+    n = vertices.size_local
+    ghosts = vertices.num_ghosts
     vector = ghosted_vector(vertices, 3)
     vector.array[:] = np.repeat(vertices.local_to_global(np.arange(n, dtype=np.int32)), 3)
     vector.ghostUpdate()

@@ -10,7 +10,8 @@ from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.materials.kinematics import AXISYMMETRIC
 
-E, NU = 210000.0, 0.3
+E = 210000.0
+NU = 0.3
 TABLE = TabularHardening(((0.0, 355.0), (0.02, 400.0), (0.1, 500.0), (0.3, 550.0)))
 MATERIALS = {
     "elastic": Elastic(E, NU),
@@ -49,7 +50,8 @@ def test_the_tangent_is_the_derivative_of_the_stress(material):
 def test_without_hoop_strain_it_is_plane_strain(material):
     """The same stresses, tangents and states, step by step."""
     ring = material.under(AXISYMMETRIC)
-    state, state_ring = material.state(50), ring.state(50)
+    state = material.state(50)
+    state_ring = ring.state(50)
     for seed in range(3):
         plane = 0.003 * np.random.default_rng(seed).normal(size=(50, 3))
         stress, tangent, state = material.update(plane, state)
@@ -78,7 +80,8 @@ def test_the_tangent_at_large_strain_is_the_derivative_of_the_nominal_stress(mat
 
 @every_material
 def test_small_strains_are_a_limit(material):
-    small, m = material.under(AXISYMMETRIC), LargeStrain(material).under(AXISYMMETRIC)
+    small = material.under(AXISYMMETRIC)
+    m = LargeStrain(material).under(AXISYMMETRIC)
     gradient = 1e-7 * np.random.default_rng(2).normal(size=(20, 5))
     stress, _, new = m.update(gradient, m.state(20))
     expected, _, _ = small.update(gradient @ AXISYMMETRIC.small.T, small.state(20))
@@ -147,10 +150,13 @@ def test_the_work_of_large_strains_is_stored_or_dissipated(name, plane):
     if name == "back stresses":
         soft = type(material)(E, NU, plane, LinearHardening(0.04 * E), ((0.2 * E, 5.0),))
     m = LargeStrain(soft)
-    n, k = 1500, 5 if plane == "axisymmetric" else 4
+    n = 1500
+    k = 5 if plane == "axisymmetric" else 4
     end = np.zeros((1, k))
     end[0, :2] = -0.3, 0.05
-    state, work, last = m.state(1), 0.0, np.zeros((1, k))
+    state = m.state(1)
+    work = 0.0
+    last = np.zeros((1, k))
     for at in np.linspace(0, 1, n + 1)[1:]:
         stress, _, state = m.update(at * end, state)
         work += float(((stress + last) / 2 * end / n).sum())

@@ -7,7 +7,8 @@ import pytest
 
 from archord.materials.elasticity import Elastic, contact_modulus, mean_stress, von_mises
 
-E, NU = 200e3, 0.3
+E = 200e3
+NU = 0.3
 
 
 @pytest.fixture
@@ -29,8 +30,10 @@ def hooke(stress, nu=NU):
 
 def turned(xx, yy, xy):
     """Components of a tensor in the plane along axes at 0.7 rad."""
-    c, s = np.cos(0.7), np.sin(0.7)
-    Q, t = np.array([[c, s], [-s, c]]), np.array([[xx, xy], [xy, yy]])
+    c = np.cos(0.7)
+    s = np.sin(0.7)
+    Q = np.array([[c, s], [-s, c]])
+    t = np.array([[xx, xy], [xy, yy]])
     t = np.einsum("ik,kl...,jl->ij...", Q, t, Q)
     return t[0, 0], t[1, 1], t[0, 1]
 

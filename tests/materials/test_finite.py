@@ -11,7 +11,8 @@ from archord.materials.hardening import LinearHardening, TabularHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 
-E, NU = 210000.0, 0.3
+E = 210000.0
+NU = 0.3
 TABLE = TabularHardening(((0.0, 355.0), (0.02, 400.0), (0.1, 500.0), (0.3, 550.0)))
 MATERIALS = {
     **{f"elastic, {plane}": Elastic(E, NU, plane) for plane in ("strain", "stress")},
@@ -30,8 +31,10 @@ MATERIALS = {
 @pytest.mark.parametrize("name", MATERIALS)
 def test_the_tangent_is_the_derivative_of_the_stress(name, size):
     """In plane stress, at points that flow, but for how the yield stress follows the volume."""
-    m, rng = LargeStrain(MATERIALS[name]), np.random.default_rng(1)
-    gradient, state = size * rng.normal(size=(60, 4)), m.state(60)
+    m = LargeStrain(MATERIALS[name])
+    rng = np.random.default_rng(1)
+    gradient = size * rng.normal(size=(60, 4))
+    state = m.state(60)
     _, tangent, new = m.update(gradient, state)
     h = 1e-6 * max(size, 1e-3)
     found = [
@@ -39,7 +42,8 @@ def test_the_tangent_is_the_derivative_of_the_stress(name, size):
         for d in h * np.eye(4)
     ]
     off = np.abs(np.stack(found, axis=2) - tangent).max(axis=(1, 2)) / np.nanmax(np.abs(tangent))
-    known, flows = ~np.isnan(off), np.broadcast_to(m.peeq(new), 60) > 0
+    known = ~np.isnan(off)
+    flows = np.broadcast_to(m.peeq(new), 60) > 0
     assert known.sum() > 40
     exact = known if m.plane == "strain" else known & ~flows
     assert off[exact].max(initial=0) < 2e-6
@@ -49,7 +53,8 @@ def test_the_tangent_is_the_derivative_of_the_stress(name, size):
 @pytest.mark.parametrize("name", MATERIALS)
 def test_small_strains_are_a_limit(name):
     """Of gradients without rotation: nominal and Cauchy's stress are that of small strain."""
-    small, m = MATERIALS[name], LargeStrain(MATERIALS[name])
+    small = MATERIALS[name]
+    m = LargeStrain(MATERIALS[name])
     gradient = 1e-7 * np.random.default_rng(2).normal(size=(20, 4))
     state = m.state(20)
     stress, _, new = m.update(gradient, state)
@@ -70,11 +75,9 @@ def turned(angle, F):
 @pytest.mark.parametrize("name", MATERIALS)
 def test_a_rotation_turns_the_stress_with_it(name):
     """And makes none."""
-    m, F, R = (
-        LargeStrain(MATERIALS[name]),
-        np.array([[1.1, 0.2], [0.0, 0.95]]),
-        turned(0.7, np.eye(2)),
-    )
+    m = LargeStrain(MATERIALS[name])
+    F = np.array([[1.1, 0.2], [0.0, 0.95]])
+    R = turned(0.7, np.eye(2))
     assert np.abs(m.update(R, m.state(1))[0]).max() < 1e-12 * E
     Q = np.array([[R[0, 0] + 1, R[0, 2]], [R[0, 3], R[0, 1] + 1]])
     stresses = []
@@ -88,7 +91,8 @@ def test_a_rotation_turns_the_stress_with_it(name):
 @pytest.mark.parametrize("g", [1e-3, 0.1, 0.5, 2.0])
 def test_simple_shear_of_hencky(g):
     """tau/G = 4 asinh(g/2)/sqrt(4 + g^2), also the derivative of the energy."""
-    m, gradient = LargeStrain(Elastic(2.6, 0.3, "strain")), np.array([[0.0, 0.0, g, 0.0]])
+    m = LargeStrain(Elastic(2.6, 0.3, "strain"))
+    gradient = np.array([[0.0, 0.0, g, 0.0]])
     stress, _, _ = m.update(gradient, None)
     tau = 4 * np.arcsinh(g / 2) / np.sqrt(4 + g * g)
     assert m.true_stress(gradient, stress, None)[0, 3] == pytest.approx(tau, rel=1e-12)
@@ -102,7 +106,8 @@ def test_uniaxial_tension_with_a_table(steps):
     """Nominal stresses at stretches of 1.05, 1.1 and 1.2 where Cauchy's stress is that of the
     table."""
     m = LargeStrain(J2Material(E, NU, "stress", TABLE))
-    state, found = m.state(1), []
+    state = m.state(1)
+    found = []
     for stretch, last in zip((1.05, 1.1, 1.2), (1.0, 1.05, 1.1), strict=True):
         for at in np.linspace(last, stretch, steps + 1)[1:]:
 

@@ -57,7 +57,8 @@ def random_path(
 ) -> tuple[np.ndarray, PlasticState]:
     """Strains and histories after ``steps`` random increments of ``size`` yield strains: some
     points never yielded."""
-    strain, state = np.zeros((n, 3)), m.state(n)
+    strain = np.zeros((n, 3))
+    state = m.state(n)
     for _ in range(steps):
         strain = strain + size * YIELD_STRAIN * rng.normal(size=(n, 3))
         _, _, state = m.update(strain, state)
@@ -73,7 +74,8 @@ def random_increment(m: J2Material, rng, size: float = 1.0) -> tuple[np.ndarray,
 def on_the_surface(m: J2Material, rng, n: int = N) -> tuple[np.ndarray, PlasticState, np.ndarray]:
     """States on the yield surface, and strain increments (unit length) that load them
     plastically."""
-    strain, state = np.zeros((n, 3)), m.state(n)
+    strain = np.zeros((n, 3))
+    state = m.state(n)
     for _ in range(3):
         strain = strain + 20 * YIELD_STRAIN * rng.normal(size=(n, 3))
         stress, _, state = m.update(strain, state)
@@ -107,7 +109,8 @@ def assert_tangent_is_derivative(m, strain, old, h, *, flowing):
     """The consistent tangent is symmetric and the derivative of the stress, to 1e-6, by differences
     of step ``h`` where these keep to one branch."""
     _, tangent, new = m.update(strain, old)
-    D, flows = np.zeros((len(strain), 3, 3)), new.peeq > old.peeq
+    D = np.zeros((len(strain), 3, 3))
+    flows = new.peeq > old.peeq
     one_branch = np.ones(len(strain), dtype=bool)
     for j in range(3):
         (plus, _, ahead), (minus, _, behind) = (
@@ -153,7 +156,8 @@ def test_tangent_of_equibiaxial_tension_in_plane_stress(m):
 def test_pressure_alone_never_yields(m):
     """At zero deviator, however large the pressure, the response is elastic and finite."""
     if m.plane == "stress":
-        strain, old = np.zeros((1, 3)), m.state(1)
+        strain = np.zeros((1, 3))
+        old = m.state(1)
     else:
         e = YIELD_STRAIN * np.array([-1e3, -1.0, 0.0, 1.0, 1e3])
         strain = np.stack(
@@ -190,7 +194,8 @@ def test_flow_is_incompressible_and_peeq_is_its_length(m, rng):
     _, _, new = m.update(strain, old)
     scale = np.abs(new.plastic_strain).max()
     assert np.abs(new.plastic_strain[:, :3].sum(axis=1)).max() < 8 * ROUND_OFF * scale
-    flow, grown = new.plastic_strain - old.plastic_strain, new.peeq - old.peeq
+    flow = new.plastic_strain - old.plastic_strain
+    grown = new.peeq - old.peeq
     assert grown.min() >= 0
     length = np.sqrt(2 / 3 * ((flow[:, :3] ** 2).sum(axis=1) + 2 * flow[:, 3] ** 2))
     np.testing.assert_allclose(grown, length, rtol=0, atol=32 * ROUND_OFF * scale)
@@ -259,7 +264,8 @@ def test_the_kernel_of_linear_hardening_is_the_return_map_of_any(name, size, rng
     """Closed form in C and Newton's method in numpy: the same stress, tangent and history."""
     m = J2Material(E, NU, "strain", HARDENINGS[name])
     strain, old = random_increment(m, rng, size)
-    (stress, tangent, new), found = m.update(strain, old), return_map(strain, old, m, m.hardening)
+    (stress, tangent, new) = m.update(strain, old)
+    found = return_map(strain, old, m, m.hardening)
     assert (new.peeq > old.peeq).mean() > 0.05
     np.testing.assert_array_equal(found[2].peeq > old.peeq, new.peeq > old.peeq)
     np.testing.assert_allclose(found[0], stress, rtol=0, atol=1e-13 * np.abs(stress).max())
@@ -335,7 +341,8 @@ def test_axes_do_not_matter(m, rng):
 def follow(m, strains):
     """Stresses and PEEQ ``(n, 4)``, ``(n,)`` of one point along a path of strains ``(n, 3)``."""
     state = m.state(1)
-    stresses, peeqs = [], []
+    stresses = []
+    peeqs = []
     for strain in strains:
         stress, _, state = m.update(strain[None], state)
         stresses.append(stress[0])
@@ -380,7 +387,9 @@ def test_energy_balance(m, rng):
     end = 5 * YIELD_STRAIN * rng.normal(size=(50, 3))
 
     def missing(steps):
-        work, before, state = np.zeros(len(end)), np.zeros((len(end), 4)), m.state(len(end))
+        work = np.zeros(len(end))
+        before = np.zeros((len(end), 4))
+        state = m.state(len(end))
         for k in range(1, steps + 1):
             stress, _, state = m.update(end * (k / steps), state)
             work += ((stress + before)[:, [0, 1, 3]] / 2 * end / steps).sum(axis=1)
@@ -408,7 +417,8 @@ SMOOTH = pytest.mark.parametrize("name", ["H = 0.02 E", "Voce", "Swift", "platea
 @SMOOTH
 def test_slope_is_the_derivative_and_work_the_integral_of_the_yield_stress(name):
     """By differences, away from the kinks of a table and beyond its end."""
-    hardening, h = HARDENINGS[name], 1e-4 * YIELD_STRAIN
+    hardening = HARDENINGS[name]
+    h = 1e-4 * YIELD_STRAIN
     peeq = YIELD_STRAIN * np.array([0.5, 3.0, 4.5, 20.0, 100.0])
     for function, derivative in (
         (hardening.stress, hardening.slope),

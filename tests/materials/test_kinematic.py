@@ -24,7 +24,8 @@ def rng():
 
 
 def on_random_paths(m, rng, n=200, steps=4, size=2.0):
-    strain, state = np.zeros((n, 3)), m.state(n)
+    strain = np.zeros((n, 3))
+    state = m.state(n)
     for _ in range(steps):
         strain = strain + size * YIELD_STRAIN * rng.normal(size=(n, 3))
         stress, tangent, state = m.update(strain, state)
@@ -36,8 +37,10 @@ def on_random_paths(m, rng, n=200, steps=4, size=2.0):
     "isotropic", [LinearHardening(SIGY), LinearHardening(SIGY, 0.02 * E), ISOTROPIC]
 )
 def test_without_back_stresses_it_is_isotropic(plane, isotropic, rng):
-    m, j2 = KinematicMaterial(E, NU, plane, isotropic, ()), J2Material(E, NU, plane, isotropic)
-    state, expected = m.state(300), j2.state(300)
+    m = KinematicMaterial(E, NU, plane, isotropic, ())
+    j2 = J2Material(E, NU, plane, isotropic)
+    state = m.state(300)
+    expected = j2.state(300)
     strain = np.zeros((300, 3))
     for _ in range(5):
         strain = strain + 3 * YIELD_STRAIN * rng.normal(size=strain.shape)
@@ -56,12 +59,11 @@ def test_without_back_stresses_it_is_isotropic(plane, isotropic, rng):
 def test_tangent_is_the_derivative_of_the_stress(plane, size, nu, rng):
     m = KinematicMaterial(E, nu, plane, ISOTROPIC, BACK)
     strain, _, _, old = on_random_paths(m, rng)
-    strain, h = (
-        strain + size * YIELD_STRAIN * rng.normal(size=strain.shape),
-        (1e-3 if size > 10 else 1e-5) * YIELD_STRAIN,
-    )
+    strain = strain + size * YIELD_STRAIN * rng.normal(size=strain.shape)
+    h = (1e-3 if size > 10 else 1e-5) * YIELD_STRAIN
     _, tangent, new = m.update(strain, old)
-    D, flows = np.zeros_like(tangent), new.peeq > old.peeq
+    D = np.zeros_like(tangent)
+    flows = new.peeq > old.peeq
     one_branch = np.ones(len(strain), dtype=bool)
     for j in range(3):
         (plus, _, ahead), (minus, _, behind) = (
@@ -96,7 +98,8 @@ def test_every_point_obeys_the_laws_of_the_model(plane, nu, rng):
     twice = np.array([1, 1, 1, 2])
     deviator = stress - stress[:, :3].mean(axis=1)[:, None] * [1, 1, 1, 0]
     relative = deviator - new.back_stress.sum(axis=1)
-    q, flows = np.sqrt(1.5 * relative**2 @ twice), new.peeq > old.peeq
+    q = np.sqrt(1.5 * relative**2 @ twice)
+    flows = new.peeq > old.peeq
     excess = q - m.hardening.stress(new.peeq)
     assert excess.max() < 1e-10 * SIGY
     assert np.abs(excess[flows]).max() < 1e-10 * SIGY
@@ -151,7 +154,9 @@ def sheared(m, stress, strain, state):
 def test_a_stable_loop_has_the_closed_form_range(plane):
     """Armstrong and Frederick: between plastic strains -a and a the stress swings by sigY + C /
     gamma tanh(gamma a)."""
-    C, gamma, steps = 0.2 * E, 300.0, 200
+    C = 0.2 * E
+    gamma = 300.0
+    steps = 200
     m = KinematicMaterial(E, NU, plane, LinearHardening(SIGY), ((C, gamma),))
     state = m.state(1)
     for shear in 0.01 * np.concatenate(
@@ -168,13 +173,18 @@ def test_a_stable_loop_has_the_closed_form_range(plane):
 def test_ratcheting_is_the_closed_form():
     """Under stresses with a mean each cycle adds the same plastic strain (Chaboche and Nouailhas,
     1989)."""
-    C, gamma, top, bottom = 0.1 * E, 200.0, 1.3 * SIGY, -1.1 * SIGY
+    C = 0.1 * E
+    gamma = 200.0
+    top = 1.3 * SIGY
+    bottom = -1.1 * SIGY
     limit = (C / gamma) ** 2
     expected = np.log((limit - (bottom + SIGY) ** 2) / (limit - (top - SIGY) ** 2)) / gamma
     errors = []
     m = KinematicMaterial(E, NU, "strain", LinearHardening(SIGY), ((C, gamma),))
     for steps in (20, 40):
-        strain, state, ends = 0.0, m.state(1), []
+        strain = 0.0
+        state = m.state(1)
+        ends = []
         for _ in range(5):
             for stress in np.concatenate(
                 [
@@ -198,12 +208,10 @@ def test_energy_balance(plane, rng):
     ends = 4 * YIELD_STRAIN * rng.normal(size=(2, 20, 3))
 
     def missing(steps):
-        work, before, state, strain = (
-            np.zeros(20),
-            np.zeros((20, 4)),
-            m.state(20),
-            np.zeros((20, 3)),
-        )
+        work = np.zeros(20)
+        before = np.zeros((20, 4))
+        state = m.state(20)
+        strain = np.zeros((20, 3))
         for end in ends:
             step = (end - strain) / steps
             for _ in range(steps):

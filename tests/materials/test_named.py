@@ -52,7 +52,8 @@ def test_tables_are_those_of_the_formulas(name):
     """To the digits printed; true stress over PEEQ, the first point at the stress of first yield
     itself."""
     m = metals()[name]
-    f, fu = m["yield"], m["tensile"]
+    f = m["yield"]
+    fu = m["tensile"]
     if name.startswith("S"):
         points = quad_linear(f, fu, m["E"])
     else:
@@ -89,7 +90,8 @@ SCALES = {
 
 @pytest.mark.parametrize(("unit", "scale"), SCALES.items())
 def test_stresses_are_in_the_unit_asked_for(unit, scale):
-    found, m = metal("S355", unit), metals()["S355"]
+    found = metal("S355", unit)
+    m = metals()["S355"]
     assert (found["E"], found["nu"], found["yield"]) == pytest.approx(
         (210000 * scale, 0.3, 355 * scale)
     )
@@ -180,7 +182,8 @@ def test_strengths_listed_in_ksi_are_those_of_the_source(name, ksi):
 def test_straight_lines_are_close_to_the_model(name):
     """As near as docs/materials.md says, beyond PEEQ 2e-4."""
     m = metals()[name]
-    f, last = m["yield"], m["elongation"]
+    f = m["yield"]
+    last = m["elongation"]
     n = exponent(f, m["tensile"], at_strength(f) if "EN 1999" in m["source"] else last)
     plastic = np.geomspace(2e-4, last, 1000)
     stress = f * (plastic / 0.002) ** (1 / n)

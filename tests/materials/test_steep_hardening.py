@@ -12,7 +12,9 @@ from archord.materials.hardening import Hardening, LinearHardening, SwiftHardeni
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 
-E, NU, START = 210000.0, 0.3, 200.0
+E = 210000.0
+NU = 0.3
+START = 200.0
 MU = E / (2 * (1 + NU))
 in_both_planes = pytest.mark.parametrize("plane", ["strain", "stress"])
 

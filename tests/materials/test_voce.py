@@ -40,7 +40,8 @@ VOCE = Voce(YIELD_STRESS, 2 * YIELD_STRESS, 0.01)
 
 def test_hardening_is_the_slope_and_work_the_integral():
     """By differences; from ``start`` to ``end``."""
-    peeq, h = np.linspace(0, 0.05, 7), 1e-6
+    peeq = np.linspace(0, 0.05, 7)
+    h = 1e-6
     assert VOCE.stress(np.array([0.0, 1.0])) == pytest.approx([YIELD_STRESS, 2 * YIELD_STRESS])
     for function, derivative in ((VOCE.stress, VOCE.slope), (VOCE.work, VOCE.stress)):
         assert (function(peeq + h) - function(peeq - h)) / (2 * h) == pytest.approx(
@@ -58,10 +59,13 @@ def test_blocks_pressed_together_follow_the_closed_form(plane):
     walls, ``s / E + p`` and ``s`` without.
     """
     peeq = np.linspace(0, 0.01, 2001)
-    s, mu, bulk = VOCE.stress(peeq), E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
+    s = VOCE.stress(peeq)
+    mu = E / (2 * (1 + NU))
+    bulk = E / (3 * (1 - 2 * NU))
     strain = (s + 3 * mu * peeq) / (2 * mu) if plane == "strain" else s / E + peeq
     pressure = bulk * strain + 2 / 3 * s if plane == "strain" else s
-    material, walls = J2Material(E, NU, plane, VOCE), ("left", "right")[: 1 + (plane == "strain")]
+    material = J2Material(E, NU, plane, VOCE)
+    walls = ("left", "right")[: 1 + (plane == "strain")]
     supports = [
         Dirichlet("base", "base", 1),
         Dirichlet("lid", "lid", 1, -2.0),

@@ -50,7 +50,8 @@ def test_the_energy_of_springs_goes_on(tmp_path):
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Numbers ``(n,)`` and coordinates ``(n, 2)`` of all points that may have a history, on every
     rank."""
-    joint, here = order.system, {}
+    joint = order.system
+    here = {}
     for place, _, number in order._points():
         kind, name = place.split()
         if kind == "contact":

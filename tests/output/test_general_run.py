@@ -48,7 +48,10 @@ def scene(steps: int = 3, thickness: float | None = None, **changes):
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lug")
     outcome = solve_scene(scene(), folder, MPI.COMM_SELF)
-    off = "the work of the loads, a sum of trapezoids over accepted steps, and the energies stored and dissipated"
+    off = (
+        "the work of the loads, a sum of trapezoids over accepted steps, and the energies stored "
+        "and dissipated"
+    )
     assert outcome.status == "done"
     assert outcome.warnings == [
         f"{off} differ by 1.7 % of the largest work: more steps bring them together"
@@ -100,7 +103,8 @@ def test_ranks_agree(comm, tmp_path_factory):
         solve_scene(scene(), one, MPI.COMM_SELF)
     solve_scene(scene(), several, comm)
     comm.barrier()
-    a, b = Run(one).columns, Run(several).columns
+    a = Run(one).columns
+    b = Run(several).columns
     for name in a:
         if name not in ("seconds", "force_balance", "iterations"):
             assert b[name] == pytest.approx(
@@ -135,7 +139,8 @@ def test_a_run_goes_on_with_further_stages(tmp_path):
 
 def test_an_accuracy_is_reached_by_finer_meshes(tmp_path):
     """Of the force, against a mesh of three times as many dofs."""
-    coarse, fine = scene(), pressed(0.1, steps=[1])
+    coarse = scene()
+    fine = pressed(0.1, steps=[1])
     asked = coarse.model_copy(
         update={"analysis": coarse.analysis.model_copy(update={"accuracy": 3e-3})}
     )

@@ -31,7 +31,8 @@ def square(comm):
     sides = [
         locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0, 1)
     ]
-    facets, order = np.concatenate(sides), np.argsort(np.concatenate(sides))
+    facets = np.concatenate(sides)
+    order = np.argsort(np.concatenate(sides))
     values = np.repeat([3, 8], [len(side) for side in sides]).astype(np.int32)
     every = np.arange(
         mesh.topology.index_map(2).size_local + mesh.topology.index_map(2).num_ghosts,

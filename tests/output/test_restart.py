@@ -272,7 +272,8 @@ def halted(crashed, tmp_path):
 def test_only_step_control_may_change(halted):
     """Another key is named with both values; [stepping] and max_iterations are free, and the run
     goes on with them. A run without its checkpoint is not overwritten by another scene either."""
-    folder, lost = halted, shutil.copytree(halted, halted.with_name("lost"))
+    folder = halted
+    lost = shutil.copytree(halted, halted.with_name("lost"))
     (lost / "checkpoint.h5").unlink()
     own = tomllib.loads(resolved(scene(0.25, 3)))
     for section, key, value in (

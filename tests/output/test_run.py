@@ -36,7 +36,8 @@ def test_all_files_are_there_and_say_done(run):
     """The run folder of a finished run; counts of the steps add up to the totals."""
     assert sorted(p.name for p in run.folder.iterdir()) == sorted((*FILES, CHECKPOINT, APART))
     report = json.loads((run.folder / "run.json").read_text())
-    steps, totals = report["steps"], report["totals"]
+    steps = report["steps"]
+    totals = report["totals"]
     assert report["status"] == "done"
     assert totals["accepted_steps"] == 4
     assert totals["newton_iterations"] == sum(m.iterations for m in run.steps)
@@ -128,7 +129,8 @@ def test_fields_open_with_their_steps_in_order(run):
     assert set(np.unique(last["body"])) == {1, 2}
     first = {name: values[0] for name, values in data[0][2].items()}
     assert 0 < (first["contact_state"] > 0).sum() < (last["contact_state"] > 0).sum()
-    corner, middle = cells[0].data[:, :3], cells[0].data[:, 3:]
+    corner = cells[0].data[:, :3]
+    middle = cells[0].data[:, 3:]
     chord = (points[corner] + points[np.roll(corner, -1, axis=1)]) / 2
     sides = np.linalg.norm(points[corner] - points[np.roll(corner, -1, axis=1)], axis=-1)
     assert (np.linalg.norm(points[middle] - chord, axis=-1) < 0.1 * sides).all()
@@ -162,7 +164,8 @@ def test_contact_file_integrates_to_the_force(run):
         assert file["load"][()] == pytest.approx([m["delta"] for m in run.steps])
         for k in range(1, 5):
             for side in ("pin", "hole"):
-                s, w = file[f"{side}/s"][()], file[f"{side}/weight"][()]
+                s = file[f"{side}/s"][()]
+                w = file[f"{side}/weight"][()]
                 p, raw, gap = (
                     file[f"{side}/{name}/{k:04d}"][()]
                     for name in ("pressure", "raw_pressure", "gap")
@@ -282,7 +285,8 @@ def test_a_contact_that_reaches_the_end_of_the_arc_is_named(tmp_path):
 def test_bodies_that_never_touch_are_named(tmp_path, load, capfd):
     """Drawn apart, or not pressed at all: a warning in run.json and on the screen, and none of what
     is left of P, round-off."""
-    scene_file, folder = tmp_path / "apart.toml", tmp_path / "run"
+    scene_file = tmp_path / "apart.toml"
+    folder = tmp_path / "run"
     scene_file.write_text(resolved(scene(0.3, 1, load=load)), encoding="utf-8")
     assert cli.run(["solve", str(scene_file), "-o", str(folder)]) == 0
     report = json.loads((folder / "run.json").read_text())
@@ -307,7 +311,8 @@ def test_bodies_that_touch_after_all_are_not_said_to_be_apart(tmp_path):
 def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
     """Where the run says nothing, P of a rigid pin is within 3 % of that on elements half as
     long."""
-    force, said = [], []
+    force = []
+    said = []
     for size in (0.16, 0.08, 0.04, 0.02):
         thin = scene(
             size, 1, joint={"clearance": 1e-6}, pin={"rigid": True}, block={"E": 0.91, "nu": 0.3}
@@ -324,7 +329,8 @@ def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
 def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path):
     """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's
     work any more. Another error is raised."""
-    half, tried = tmp_path / "libffcx_forms_0.c", []
+    half = tmp_path / "libffcx_forms_0.c"
+    tried = []
     half.touch()
 
     def make():

@@ -84,7 +84,8 @@ def test_a_file_of_version_0_1_goes_on(tmp_path):
     with h5py.File(path, "w") as old:
         for name, array in FIXED.items():
             old[name] = array
-        old["accepted"], old["load"] = np.int64(2), np.array([0.1, 0.2, 0.0])
+        old["accepted"] = np.int64(2)
+        old["load"] = np.array([0.1, 0.2, 0.0])
         for step in (1, 2, 3):
             for name, array in values(step).items():
                 old[f"{name}/{step:04d}"] = array if step < 3 else 0 * array

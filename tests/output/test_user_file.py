@@ -128,7 +128,10 @@ def test_pipes_and_devices_are_written_to(tmp_path):
         new.write_text("gone")
     assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
     program = "from pathlib import Path; from archord.output.user_file import *\n"
-    program += "p = Path('/dev/stdout'); check_target(p, force=False)\nwith writing(p) as new: new.write_text('told')"
+    program += (
+        "p = Path('/dev/stdout'); check_target(p, force=False)\nwith writing(p) as new: "
+        "new.write_text('told')"
+    )
     with (tmp_path / "out").open("w") as out:
         subprocess.run([sys.executable, "-c", program], stdout=out, cwd=ROOT, check=True)
     assert (tmp_path / "out").read_text() == "told"

@@ -34,12 +34,14 @@ def curve(
     material = {"E": E * modulus} | ({"yield_stress": sigY * modulus} if sigY else {})
     joint = {"radius": R, "clearance": dR * R, "element_size": h * R}
     scene = paper_joint(joint=joint, pin=material, block=material, analysis=analysis or {})
-    E_star, gap = scene.E_star, dR * R
+    E_star = scene.E_star
+    gap = dR * R
     delta = LOADS * gap
     law = LawJoint(
         R, gap, E_star, block_yield=sigY * modulus if c and sigY else None, k=k, c=c or 1.0
     )
-    state, peeq = plastic_winkler(law, delta), np.maximum(delta - law.first_yield, 0.0)
+    state = plastic_winkler(law, delta)
+    peeq = np.maximum(delta - law.first_yield, 0.0)
     random = np.random.default_rng(seed)
     P = state.load + noise * E_star * gap * random.standard_normal(len(delta))
     p0 = state.peak_pressure + noise * E_star * gap / R * random.standard_normal(len(delta))

@@ -34,7 +34,8 @@ def test_the_chord_integral_is_the_arc_integral(eps):
 def test_the_projection_is_along_the_radius():
     """The point of the chord at x lies on the ray at phi: the chord leaves the deepest point at
     eps/2 to the horizontal."""
-    R, eps = 2.0, 1.1
+    R = 2.0
+    eps = 1.1
     phi = np.linspace(0, eps, 9)
     x = chord_coordinate(phi, eps, R)
     assert x[0] == 0
@@ -50,7 +51,8 @@ def test_a_random_pressure_on_random_points_keeps_its_force(degrees, start):
     """The default weights are the trapezoidal rule on the arc, also where the first point is past
     the axis; and the trapezoidal rule over x, which knows nothing of weights, tends to it. Points
     with pressure beyond the edge stay."""
-    random, eps = np.random.default_rng(degrees), np.radians(degrees)
+    random = np.random.default_rng(degrees)
+    eps = np.radians(degrees)
     phi = np.sort(random.uniform(start * eps, eps, 30))
     pressure = random.uniform(0, 5, 30)
     arc = 2 * 7.0 * np.trapezoid(pressure * np.cos(phi), phi)
@@ -109,10 +111,18 @@ def test_a_runs_chord_carries_its_force(runs, name):
 
 @pytest.mark.parametrize(
     ("phi", "pressure", "eps"),
-    [([0, 1], [1, 1], 0.0), ([0, 1], [1, 1], np.nan), ([1, 0], [1, 1], 1.0), ([-0.1, 1], [1, 1], 1.0),
-     ([0, np.nan], [1, 1], 1.0), ([0, 1], [1, np.nan], 1.0), ([0, 2], [1, 1], 1.0), ([0, 1], [1, 1, 1], 1.0),
-     ([0], [1], 1.0)],
-)  # fmt: skip
+    [
+        ([0, 1], [1, 1], 0.0),
+        ([0, 1], [1, 1], np.nan),
+        ([1, 0], [1, 1], 1.0),
+        ([-0.1, 1], [1, 1], 1.0),
+        ([0, np.nan], [1, 1], 1.0),
+        ([0, 1], [1, np.nan], 1.0),
+        ([0, 2], [1, 1], 1.0),
+        ([0, 1], [1, 1, 1], 1.0),
+        ([0], [1], 1.0),
+    ],
+)
 def test_arrays_that_are_no_arc(phi, pressure, eps):
     with pytest.raises(ValueError, match="must"):
         chord_projection(phi, pressure, eps, 1.0)

@@ -20,10 +20,8 @@ from tests.output.run_files import solved
 def more(tmp_path_factory):
     """The joint of "coarse" 20 times as large and 1e5 times as stiff, with other steps, and pressed
     and let go."""
-    solid, joint = (
-        {"E": E * 1e5, "nu": 0.3},
-        {"radius": 20.0, "clearance": 0.1, "element_size": 3.0},
-    )
+    solid = {"E": E * 1e5, "nu": 0.3}
+    joint = {"radius": 20.0, "clearance": 0.1, "element_size": 3.0}
     scenes = {
         "scaled": paper_joint(0.15, 6, joint=joint, pin=solid, block=solid),
         "stepped": paper_joint(0.15, 4),
@@ -70,15 +68,14 @@ def test_the_same_joint_larger_and_stiffer_is_the_same_in_dimensionless_form(
 
 def test_other_steps_are_interpolated(runs, more):
     """Exactly at common displacements, and to a percent and between the neighbours elsewhere."""
-    comparison, steps = (
-        compare_runs([Run(runs["coarse"]), Run(more["stepped"])]),
-        Run(more["stepped"]).curve,
-    )
+    comparison = compare_runs([Run(runs["coarse"]), Run(more["stepped"])])
+    steps = Run(more["stepped"]).curve
     assert not comparison.step_by_step
     at_step = np.isclose(comparison.load[:, None], steps.delta, rtol=1e-9).any(axis=1)
     np.testing.assert_array_equal(comparison.interpolated[1], ~at_step)
     for name, values in comparison.values.items():
-        relative, own = np.abs(comparison.relative(name)[1]), getattr(steps, name)
+        relative = np.abs(comparison.relative(name)[1])
+        own = getattr(steps, name)
         assert relative[at_step].max() < 1e-8
         assert relative.max() < (0.02 if name == "eps" else 0.01)
         assert own.min() <= values[1].min() <= values[1].max() <= own.max()
@@ -87,7 +84,8 @@ def test_other_steps_are_interpolated(runs, more):
 def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
     """Against itself step by step; against another run up to where the pin first goes back, also if
     it later goes further than before; runs that share no range of that are not compared."""
-    released, stepped = Run(more["released"]), Run(more["stepped"])
+    released = Run(more["released"])
+    stepped = Run(more["stepped"])
     assert len(compare_runs([released, released]).load) == 6
     for pair in ([stepped, released], [released, stepped]):
         comparison = compare_runs(pair)
@@ -98,7 +96,8 @@ def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
     stepped.curve = RunCurve("x", paper_joint(), *5 * [delta])
     with pytest.raises(InputError, match="shares no range of loads"):
         compare_runs([released, stepped])
-    there, lower = np.array([1.0, 2.0, 1.0]), np.array([1.0, 2.0, 0.3])
+    there = np.array([1.0, 2.0, 1.0])
+    lower = np.array([1.0, 2.0, 0.3])
     released.curve = RunCurve("x", paper_joint(), there, *4 * [lower])
     for values in compare_runs([released, released]).values.values():
         np.testing.assert_allclose(values / values[:, :1], [lower, lower], rtol=1e-15)
@@ -117,10 +116,8 @@ def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
     as stiff as far."""
     runs = []
     for name, modulus in (("soft", 70000.0), ("stiff", 210000.0)):
-        lug, steel = (
-            {"radius": 10.0, "clearance": 0.1, "width": 40.0, "element_size": 3.0},
-            {"E": modulus, "nu": 0.3},
-        )
+        lug = {"radius": 10.0, "clearance": 0.1, "width": 40.0, "element_size": 3.0}
+        steel = {"E": modulus, "nu": 0.3}
         load = {"force": modulus / 140, "steps": 2}
         scene = parse_any({"lug": lug, "pin": steel, "plate": steel, "load": load})
         runs.append(archord.solve(scene, tmp_path / name))

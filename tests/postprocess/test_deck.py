@@ -43,7 +43,9 @@ from archord.solver.problem import (
 )
 
 ccx = shutil.which("ccx")
-W, DR, STEPS = 4.0, 0.005, 3
+W = 4.0
+DR = 0.005
+STEPS = 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
 
 
@@ -56,7 +58,8 @@ def written_deck(data):
     system = system_of(data)
     mesh = deck_mesh(system)
     found = read(deck(system, mesh, data.targets))
-    found.system, found.mesh = system, mesh
+    found.system = system
+    found.mesh = mesh
     return found
 
 
@@ -150,7 +153,8 @@ def test_surfaces_cover_the_arcs(written):
 
 def test_sets_lie_where_their_names_say(written):
     """Supports and loaded edge, on both bodies where both are cut."""
-    nodes, sets = written.nodes, written.sets
+    nodes = written.nodes
+    sets = written.sets
     for name, height in (("PIN_TOP", -DR), ("BLOCK_HELD", 0.0)):
         assert [nodes[n][1] for n in sets[name]] == pytest.approx(
             [height] * len(sets[name]), abs=1e-14
@@ -208,8 +212,11 @@ def test_materials_and_elements_of_the_plane(plane, family):
 
 def test_a_table_of_hardening_is_that_of_the_deck():
     """Stress before PEEQ; a law is a table that straight lines follow to 0.1 % up to PEEQ 1."""
-    data = scene(None, pin={"hardening": [[0, 0.002], [0.1, 0.003]]},
-                 block={"yield_stress": 0.002, "hardening": {"offset": 0.01, "exponent": 0.2}})  # fmt: skip
+    data = scene(
+        None,
+        pin={"hardening": [[0, 0.002], [0.1, 0.003]]},
+        block={"yield_stress": 0.002, "hardening": {"offset": 0.01, "exponent": 0.2}},
+    )
     found = written_deck(data).blocks
     pin, block = (np.array(rows, float) for keyword, _, rows in found if keyword == "*PLASTIC")
     assert pin.tolist() == [[0.002, 0], [0.003, 0.1]]
@@ -264,10 +271,15 @@ def press_fit(drawn):
     ]
     drives = [Drive("press", (0.0, 0.0, 100.0), "force")]
     problem = Problem(
-        joint, bodies, [Interaction("inside", ("pin", "sleeve 1 inside")), fit],
+        joint,
+        bodies,
+        [Interaction("inside", ("pin", "sleeve 1 inside")), fit],
         [*supports, Dirichlet("press", "flat", 0, 1.0, "press")],
-        drives=drives, fit=True, stabilise=True, symmetry=2.0,
-    )  # fmt: skip
+        drives=drives,
+        fit=True,
+        stabilise=True,
+        symmetry=2.0,
+    )
     system = System(problem)
     mesh = deck_mesh(system)
     return read(deck(system, mesh, [1.0, 1.5, 2.0])), mesh

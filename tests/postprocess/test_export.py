@@ -22,7 +22,8 @@ def test_vtk_reads_back_fields_and_contact(runs, tmp_path):
     bodies, contact = (VtkFile(tmp_path / f"{name}.vtkhdf") for name in ("bodies", "contact"))
     assert bodies.times == contact.times == run.columns["delta"]
     for step in (1, run.steps):
-        (mesh, arcs), fields = (bodies.at(step), contact.at(step)), run.fields(step)
+        (mesh, arcs) = (bodies.at(step), contact.at(step))
+        fields = run.fields(step)
         assert set(mesh.celltypes) == {_QUADRATIC_TRIANGLE}
         np.testing.assert_array_equal(mesh.cells.reshape(-1, 7)[:, 1:], fields.cells)
         np.testing.assert_array_equal(mesh.points[:, :2], fields.coordinates)
@@ -66,7 +67,10 @@ def test_a_step_alone_and_nothing_overwritten_without_force(runs, tmp_path, caps
     assert capsys.readouterr().out == f"{folder}/bodies.vtkhdf\n{folder}/contact.vtkhdf\n"
     assert {file.name for file in folder.iterdir()} == {"bodies.vtkhdf", "contact.vtkhdf"}
     (folder / "contact.vtkhdf").write_text("mine")
-    said = f"{folder}/bodies.vtkhdf: is there already; choose another file, or overwrite it with --force.\n"
+    said = (
+        f"{folder}/bodies.vtkhdf: is there already; choose another file, or overwrite it with "
+        "--force.\n"
+    )
     assert refused(arguments) == said
     assert (folder / "contact.vtkhdf").read_text() == "mine"
     assert command([*arguments[:-2], "--force"]) == 0

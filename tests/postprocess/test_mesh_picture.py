@@ -15,7 +15,8 @@ def ring(n=12, order=1):
     "seam" on a line."""
     angle = np.arange(n) * 2 * np.pi / n
     x = np.concatenate([r * np.stack([np.cos(angle), np.sin(angle)], axis=1) for r in (1, 2, 2, 3)])
-    k, after = np.arange(n), (np.arange(n) + 1) % n
+    k = np.arange(n)
+    after = (np.arange(n) + 1) % n
     cells = np.concatenate(
         [np.stack([k, after, k + n, after + n], axis=1) + shift for shift in (0, 2 * n)]
     )

@@ -113,7 +113,8 @@ def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, 
 def test_show_cuts_no_word(unloaded):
     """In a terminal of 80 characters every line fits, and what is said is what is said without
     one."""
-    wide, narrow = run_text(unloaded), run_text(unloaded, 80)
+    wide = run_text(unloaded)
+    narrow = run_text(unloaded, 80)
     assert " ... " not in wide
     assert max(map(len, narrow.splitlines())) <= 80
     assert set(wide.split()) <= set(narrow.split())

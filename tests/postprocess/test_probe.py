@@ -150,13 +150,15 @@ def test_a_whole_hole_runs_round_once(tmp_path):
     assert hoop.angle[[0, -1]] == pytest.approx([0, 360], abs=1e-3)
     assert hoop.s[-1] == pytest.approx(20 * np.pi, rel=1e-3)
     assert hoop.at(90) == pytest.approx(hoop.at(270), rel=0.05)
-    fields, arc = run.fields(), run.arc(side="hole")
+    fields = run.fields()
+    arc = run.arc(side="hole")
 
     def kept(x):
         angle = np.degrees(np.arctan2(*x.T[::-1]))
         return (abs(angle) < 30) | ((angle > 50) & (angle < 100))
 
-    edge, facets = fields.edges["hole"], kept(arc.X.mean(axis=1))
+    edge = fields.edges["hole"]
+    facets = kept(arc.X.mean(axis=1))
     edges = {"hole": edge[kept(fields.coordinates[edge[:, 1]])]}
     run.fields = lambda step: replace(fields, edges=edges)
     run.arc = lambda step, side: replace(

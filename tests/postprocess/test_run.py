@@ -22,7 +22,8 @@ def test_the_history_is_history_csv(runs):
     run = archord.load(runs["plastic"])
     with (runs["plastic"] / "history.csv").open(newline="") as file:
         headings, *rows = csv.reader(file)
-    names, units = [heading.split(" [")[0] for heading in headings], run.history.attrs["units"]
+    names = [heading.split(" [")[0] for heading in headings]
+    units = run.history.attrs["units"]
     assert list(run.history) == names
     np.testing.assert_array_equal(run.history.to_numpy(), np.array(rows, dtype=float))
     assert run.history["iterations"].dtype.kind == "i"
@@ -37,11 +38,9 @@ def test_the_fields_are_those_of_the_scene(runs, name):
     body can yield."""
     run = archord.load(runs[name])
     fields = run.fields(3)
-    (x, y), (ux, uy), pin = (
-        fields.coordinates.T,
-        fields.displacement.T,
-        fields.body_of_node == BODIES["pin"],
-    )
+    (x, y) = fields.coordinates.T
+    (ux, uy) = fields.displacement.T
+    pin = fields.body_of_node == BODIES["pin"]
     assert fields.delta == pytest.approx(run.history["delta"][2], rel=1e-11)
     assert np.abs(ux[np.abs(x) < 1e-12]).max() < 1e-14
     np.testing.assert_allclose(
@@ -56,7 +55,8 @@ def test_the_contact_lies_on_the_deformed_outline(runs):
     """Undeformed points of the table, displaced, are on the boundary of the deformed mesh, as
     curved as that."""
     run = archord.load(runs["elastic"])
-    fields, R = run.fields(), run.scene.joint.radius
+    fields = run.fields()
+    R = run.scene.joint.radius
     t = np.linspace(0, 1, 41)
     shape = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
     outline = (shape @ fields.deformed[fields.outline()]).reshape(-1, 2)
@@ -112,12 +112,14 @@ def test_the_clearance_grows_by_the_factor(runs, factor):
     """Before loading the pin keeps its circle, touches at the bottom, and the hole's radius is R +
     factor dR. Factor 1 is the deformed mesh itself."""
     run = archord.load(runs["elastic"])
-    fields, (R, dR) = run.fields(), (run.scene.joint.radius, run.scene.joint.dR)
+    fields = run.fields()
+    (R, dR) = (run.scene.joint.radius, run.scene.joint.dR)
     x = magnified(run.scene, fields, factor, displaced=False)
     if factor == 1:
         np.testing.assert_allclose(x, fields.coordinates, atol=1e-14)
         np.testing.assert_allclose(magnified(run.scene, fields, 1.0), fields.deformed, atol=1e-14)
-    down, pin = np.array([0.0, -dR]), fields.body_of_node == BODIES["pin"]
+    down = np.array([0.0, -dR])
+    pin = fields.body_of_node == BODIES["pin"]
     hole = ~pin & (np.abs(np.hypot(*fields.coordinates.T) - R - dR) < 1e-9)
     arc = pin & (np.abs(np.hypot(*(fields.coordinates - down).T) - R) < 1e-9)
     np.testing.assert_allclose(np.hypot(*x[hole].T), R + factor * dR, rtol=1e-12)

@@ -17,7 +17,8 @@ def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
     """Every step of history.csv in the table, the peaks below, and a picture that is not empty."""
     target = tmp_path / "new.png"
     assert command(["show", str(runs["plastic"]), "-o", str(target)]) == 0
-    printed, run = capsys.readouterr().out, Run(runs["plastic"])
+    printed = capsys.readouterr().out
+    run = Run(runs["plastic"])
     rows = {row[0]: row for line in printed.splitlines() if len(row := line.split()) == 13}
     for k in range(run.steps):
         for place, name in (

@@ -35,7 +35,8 @@ def test_the_tables_are_those_of_the_folder(sweep):
     assert loaded.cases["status"].tolist() == ["done", "done", "done", "stopped"]
     assert np.isnan(loaded.cases["P"].iloc[3])
     for case in (1, 2, 3):
-        rows, run = loaded.history[loaded.history["case"] == case], loaded.run(case)
+        rows = loaded.history[loaded.history["case"] == case]
+        run = loaded.run(case)
         for name in ("delta", "P", "eps", "iterations"):
             np.testing.assert_array_equal(rows[name], run.history[name])
         assert loaded.cases["P"][case - 1] == run.history["P"].iloc[-1]
@@ -59,7 +60,8 @@ def test_show_prints_the_cases_and_draws_them(sweep, tmp_path, capsys):
     """Varied keys, last values, why one stopped; and a picture, of the runs that can be read."""
     copy = shutil.copytree(sweep, tmp_path / "sweep")
     assert command(["show", str(copy)]) == 0
-    printed, loaded = capsys.readouterr().out, archord.load(copy)
+    printed = capsys.readouterr().out
+    loaded = archord.load(copy)
     assert printed.startswith(
         f"{copy}: 4 cases: 3 done, 1 stopped\nin all cases: analysis.plane = strain"
     )
@@ -83,7 +85,10 @@ def test_broken_tables_are_one_sentence(tmp_path, refused, text):
         == f"{tmp_path}/cases.csv: cannot be read as a table of a sweep.\n"
     )
     (tmp_path / "cases.csv").unlink()
-    said = f"is not the folder of a sweep: cases.csv is missing; archord sweep {tmp_path} --gather writes it."
+    said = (
+        f"is not the folder of a sweep: cases.csv is missing; archord sweep {tmp_path} --gather "
+        "writes it."
+    )
     assert said in refused(["show", str(tmp_path)])
 
 

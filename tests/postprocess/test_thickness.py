@@ -23,7 +23,8 @@ def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
     assert (thin.units["P"], thick.units["P"]) == ("N/mm", "N")
     assert abs(thick.columns["P"][-1] / thin.columns["P"][-1] / THICK - 1) < 1e-9
     for run in (thin, thick):
-        text, P = run_text(run), run.columns["P"][-1]
+        text = run_text(run)
+        P = run.columns["P"][-1]
         assert f"P [{run.units['P']}]" in text
         assert f"P = {P:.6g} {run.units['P']} at step 2" in text
         assert run.history.attrs["units"]["peeq_integral"] == ("mm2" if run is thin else "mm3")

@@ -85,9 +85,11 @@ def test_tensors_have_the_components_of_vtk(run, tmp_path):
     assert command(["export", str(run.folder), "--vtk", str(tmp_path)]) == 0
     file = VtkFile(tmp_path / "bodies.vtkhdf")
     assert file.times == pytest.approx(run.columns["delta"], rel=1e-12)
-    grid, fields = file.at(2), run.fields(2)
+    grid = file.at(2)
+    fields = run.fields(2)
     for name in ("stress", "plastic_strain"):
-        nodal, means = grid.point_data[name], grid.cell_data[name]
+        nodal = grid.point_data[name]
+        means = grid.cell_data[name]
         np.testing.assert_array_equal(nodal[:, :4], getattr(fields, name))
         assert not nodal[:, 4:].any()
         assert not means[:, 4:].any()
@@ -103,7 +105,9 @@ def test_integration_points_are_vertices_with_their_values(run, tmp_path):
     """Where they are, moved as the cells around; stress and PEEQ as the solver has them."""
     files = export_vtk(run, tmp_path, 2)
     assert [file.name for file in files] == ["bodies.vtkhdf", "contact.vtkhdf", "points.vtkhdf"]
-    grid, points, fields = VtkFile(files[2]).at(1), run.points(2), run.fields(2)
+    grid = VtkFile(files[2]).at(1)
+    points = run.points(2)
+    fields = run.fields(2)
     np.testing.assert_array_equal(grid.points[:, :2], points["coordinates"].reshape(-1, 2))
     np.testing.assert_array_equal(grid["stress"][:, :4], points["stress"].reshape(-1, 4))
     np.testing.assert_array_equal(grid["peeq"], points["peeq"].ravel())
@@ -111,5 +115,6 @@ def test_integration_points_are_vertices_with_their_values(run, tmp_path):
     around = fields.displacement[fields.cells]
     assert (of_cells.mean(axis=1) >= around.min(axis=1) - 1e-5).all()
     assert (of_cells.mean(axis=1) <= around.max(axis=1) + 1e-5).all()
-    at_points, middles = points["coordinates"].mean(axis=1), fields.coordinates[fields.cells]
+    at_points = points["coordinates"].mean(axis=1)
+    middles = fields.coordinates[fields.cells]
     assert np.abs(at_points - middles.mean(axis=1)).max() < 0.15

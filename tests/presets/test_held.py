@@ -57,7 +57,8 @@ def test_two_squares_are_no_fault(squares):
     [
         (
             {"support": []},
-            "'lower': it is free in x; add a ..support.. to it, or to a body that it touches: 'upper'",
+            "'lower': it is free in x; add a ..support.. to it, or to a body that it touches: "
+            "'upper'",
         ),
         (
             {"support": [{"name": "base", "on": "lower b", "fixed": ["y"]}]},
@@ -224,7 +225,10 @@ def by_force_on_an_edge(order):
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_force_on_an_edge_that_a_support_ends_is_refused(squares, order):
-    said = r"'wall' .on 'upper l'. fixes the node at .0, 10. in x, which 'pull' .on 'upper b'. moves together with"
+    said = (
+        r"'wall' .on 'upper l'. fixes the node at .0, 10. in x, which 'pull' .on 'upper b'. "
+        r"moves together with"
+    )
     with pytest.raises(InputError, match=said):
         account(squares, **by_force_on_an_edge(order))
 

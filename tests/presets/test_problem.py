@@ -81,10 +81,8 @@ def test_a_force_moves_a_straight_edge_as_far_as_it_takes(pressed):
 def test_loads_in_turn_end_where_loads_together_do():
     """Of an elastic body without contact."""
     on = {"pin": "none", "supports": [CLAMP], "half": False}
-    pull, side = (
-        load(on="hole", force=100.0),
-        load("side", on="end", direction="y", displacement=0.01),
-    )
+    pull = load(on="hole", force=100.0)
+    side = load("side", on="end", direction="y", displacement=0.01)
     together = solved([pull, side], **on)[1]
     in_turn = solved(
         [pull | {"force": [100.0, 100.0]}, side | {"displacement": [0.0, 0.01]}], **on
@@ -208,7 +206,8 @@ def test_a_joint_stands_for_a_general_scene(changes):
     interference arises."""
     scene = paper_joint(0.2, 2, **changes)
     general = parse_any(general_joint(scene))
-    account, steps = account_of(general, MPI.COMM_SELF), []
+    account = account_of(general, MPI.COMM_SELF)
+    steps = []
 
     def done(step, position):
         q, force = account.driven()

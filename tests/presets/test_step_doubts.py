@@ -58,7 +58,8 @@ def lug(pull, E=210000.0, **analysis):
 
 def warnings_of(account):
     """Those of every step."""
-    records, said = [], []
+    records = []
+    said = []
 
     def done(step, position):
         profiles = account.profiles()
@@ -148,7 +149,8 @@ def test_the_work_after_the_contact_opened_counts():
 def test_forces_after_unloading_balance_to_the_largest_force_of_the_run():
     """What a solve leaves is a part of that force, not of the little that is left of it."""
     account = lug([0.1, 1e-6])
-    system, records = account.system, []
+    system = account.system
+    records = []
     for load in (1.0, 2.0):
         system.solve([load])
         records.append(account.step([], Step(load), account.profiles(), 0.0, 0.0))

@@ -106,7 +106,10 @@ CONTACT = archord.Interaction("contact", ("lower top", "upper bottom"))
 def test_a_facet_belongs_to_one_interaction():
     """Two on the same facets counted contact twice: forces rose by 2 %, without a word."""
     twice = [CONTACT, archord.Interaction("second", ("again", "other"))]
-    said = r"'lower top' of the interaction 'contact' and 'again' of 'second' have 4 facets in common, .* \(0.125, 0\)"
+    said = (
+        r"'lower top' of the interaction 'contact' and 'again' of 'second' have 4 facets in "
+        r"common, .* \(0.125, 0\)"
+    )
     with pytest.raises(InputError, match=said):
         told_first(problem(twice))
 

@@ -218,7 +218,8 @@ def test_an_interference_has_a_stage_of_its_own():
                     "pin": "half",
                 }
             },
-            'analysis.plane = "axisymmetric" must be .strain. or .stress. for the shape of a preset',
+            'analysis.plane = "axisymmetric" must be .strain. or .stress. for the shape of a '
+            "preset",
         ),
         ("analysis", {"coarse_start": False}, "analysis.coarse_start = false is not a known key"),
         ("format", 3, "format = 3 is for a newer archord"),
@@ -301,7 +302,8 @@ NAMED = {
     ("load", 0, " press"): "must not begin or end with a space",
     ("support", 0, "a\u2028b"): "must be text on one line",
     ("support", 0, "contact force"): (
-        'interaction "contact".name = "contact" makes the column \'contact force x\' of history.csv, '
+        'interaction "contact".name = "contact" makes the column \'contact force x\' of '
+        "history.csv, "
         "as the support 'contact force' does: rename one of them"
     ),
     ("load", 0, "lug at"): None,

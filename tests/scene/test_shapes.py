@@ -376,10 +376,8 @@ def test_a_loaded_pin_without_clearance():
     x = system.V.tabulate_dof_coordinates()[nodes, 0]
     assert system.equilibrium.displacement()[nodes[x.argmax()], 0] == pytest.approx(0.760, rel=5e-3)
     side = system.sides["hole"]
-    pressure, first = (
-        system.contact.pair_of(side).pressure,
-        side.point[..., 0].mean(axis=1).argmax(),
-    )
+    pressure = system.contact.pair_of(side).pressure
+    first = side.point[..., 0].mean(axis=1).argmax()
     assert (side.weight * pressure)[first].sum() / side.weight[first].sum() == pytest.approx(
         189.0, rel=0.02
     )
@@ -439,7 +437,12 @@ def test_a_bonded_bushing_of_the_same_metal_is_a_plain_lug():
 def test_the_fit_of_a_bushing_in_a_wide_lug_is_that_of_lame():
     """Before the pin touches, in a plate of 60 radii in plane stress: the pressure of a ring in an
     infinite plate."""
-    E, nu, plate, a, wall, fit = 110000.0, 0.34, 70000.0, 10.0, 2.0, 0.01
+    E = 110000.0
+    nu = 0.34
+    plate = 70000.0
+    a = 10.0
+    wall = 2.0
+    fit = 0.01
     lug = {
         "radius": 9.9,
         "clearance": 0.1,

@@ -31,14 +31,16 @@ from archord.solver.path.system import System
 from archord.solver.problem import Problem
 from tests.geometry.shapes.measures import Cells
 
-E, NU = 1.82, 0.3
+E = 1.82
+NU = 0.3
 FRICTION = 0.3
 YIELD_STRESS = 0.01
 ELASTIC = Elastic(E, NU, "strain")
 PERFECT = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS))
 HARDENING = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS, 0.1 * E))
 PLANE_STRESS = J2Material(E, NU, "stress", LinearHardening(YIELD_STRESS, 0.02 * E))
-R, DR = 1.0, 0.005
+R = 1.0
+DR = 0.005
 
 
 def partition(owner: Callable[[np.ndarray, np.ndarray], np.ndarray]):

@@ -20,8 +20,10 @@ from tests.solver.parts import (
     quarter_annulus,
 )
 
-A, B = 1.0, 2.0
-E, SIGY = 1.0, 0.001
+A = 1.0
+B = 2.0
+E = 1.0
+SIGY = 0.001
 # Hill's axial stress is the mean of the others, which von Mises yields with if elastically
 # incompressible
 NU = 0.499
@@ -48,12 +50,13 @@ class Cylinder:
         supports = [Dirichlet("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
         supports += [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
         system = System(Problem(mesh, [body], supports=supports))
-        self.cells, self.V, self.bulk = mesh.cells, system.V, system.bulk
-        self.problem, self.solver = system.equilibrium, system.solver
-        inner, self.outer = (
-            edge_nodes(self.V, mesh.facets, INNER),
-            edge_nodes(self.V, mesh.facets, OUTER),
-        )
+        self.cells = mesh.cells
+        self.V = system.V
+        self.bulk = system.bulk
+        self.problem = system.equilibrium
+        self.solver = system.solver
+        inner = edge_nodes(self.V, mesh.facets, INNER)
+        self.outer = edge_nodes(self.V, mesh.facets, OUTER)
         self.radial = np.zeros_like(coordinates(self.V))
         self.radial[inner] = coordinates(self.V)[inner] / A
 

@@ -51,7 +51,8 @@ def warped():
 
 def warped_annulus(comm, size=0.4):
     tagged = quarter_annulus(comm, 1.0, 2.0, size)
-    mesh, x = tagged.mesh, tagged.mesh.geometry.x
+    mesh = tagged.mesh
+    x = tagged.mesh.geometry.x
     x[:, :2] += 0.02 * np.stack(
         [np.sin(9 * x[:, 0] + 5 * x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1
     )

@@ -79,10 +79,13 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
     """The fine joint goes on by itself."""
     scene = paper_joint(0.1, 4, yield_stress=0.002)
     plain, _ = run(scene, tmp_path / "plain")
-    make, few = preset._coarser, {"max_iterations": 2}
-    coarser = lambda s: make(s).model_copy(
-        update={"analysis": make(s).analysis.model_copy(update=few)}
-    )
+    make = preset._coarser
+    few = {"max_iterations": 2}
+
+    def coarser(given):
+        made = make(given)
+        return made.model_copy(update={"analysis": made.analysis.model_copy(update=few)})
+
     monkeypatch.setattr(preset, "_coarser", coarser)
     assert [m["P"] for m in run(scene, tmp_path / "left")[0]] == pytest.approx(
         [m["P"] for m in plain], rel=1e-8
@@ -91,7 +94,8 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
 
 def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):
     """The fine joint is solved as if there were none."""
-    joint, asked = joint_system(SCENES["elastic"], MPI.COMM_SELF), []
+    joint = joint_system(SCENES["elastic"], MPI.COMM_SELF)
+    asked = []
 
     def too_coarse(problem):
         asked.append(problem.mesh.mesh.topology.index_map(2).size_global)

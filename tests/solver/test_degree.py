@@ -45,7 +45,8 @@ def test_fields_of_third_order_are_written_on_second_order_triangles(tmp_path):
     solve_scene(problem, tmp_path)
     u = solve(problem).joint.equilibrium.displacement()
     with h5py.File(tmp_path / "fields.h5") as file:
-        x, cells = file["mesh/coordinates"][:, :2], file["mesh/cells"][()]
+        x = file["mesh/coordinates"][:, :2]
+        cells = file["mesh/cells"][()]
         written = file["displacement"][step_name(1)][()]
     assert cells.shape[1] == 6
     assert len(x) == len(written) == cells.max() + 1

@@ -36,7 +36,8 @@ from tests.solver.parts import (
     solve,
 )
 
-BAR, LENGTH = Elastic(E, 0.0, "strain"), 4.0
+BAR = Elastic(E, 0.0, "strain")
+LENGTH = 4.0
 END = (LENGTH, -0.5)
 WALL = [Dirichlet("wall", "left", axis) for axis in (0, 1)]
 NAMES = ("x", "y", "turn")
@@ -126,7 +127,8 @@ def test_forces_at_once_and_in_turn_add_up():
 def test_a_mean_displacement_takes_the_force_that_gives_it():
     """At a point off the edge: a Lagrange multiplier, against forces on the same coupling;
     statically equivalent."""
-    point, q = (5.0, 0.3), np.array([1e-3, -2e-3, 1e-3])
+    point = (5.0, 0.3)
+    q = np.array([1e-3, -2e-3, 1e-3])
     given = {name: (0, level) for name, level in zip(NAMES, q, strict=True)}
     means = coupling("tip", "right", point)
     prescribed = solve(bar(means=means, drives=drives("displacement", **given)), [1.0])
@@ -193,7 +195,8 @@ def test_the_bordered_tangent_is_the_derivative_of_the_residual():
     """With plastic points, contact, a forced disc, a reference point and a multiplier, in random
     directions."""
     system = System(pressed(disc="force"))
-    equilibrium, rng = system.equilibrium, np.random.default_rng(0)
+    equilibrium = system.equilibrium
+    rng = np.random.default_rng(0)
     equilibrium.load = 1.0
     state = 1e-3 * rng.normal(size=len(equilibrium.state()))
     state[1 : 2 * equilibrium.unknowns.n_local : 2] -= (
@@ -210,7 +213,8 @@ def test_the_bordered_tangent_is_the_derivative_of_the_residual():
     assert (
         len(equilibrium.drives.unknown) == 3 + 1 + 3
     )  # forces, a multiplier, and the anchors of its body
-    n, sides = x.local_size, []
+    n = x.local_size
+    sides = []
     free = np.append(
         ~equilibrium.unknowns.fixed.ravel(),
         np.ones(n - equilibrium.unknowns.fixed.size, dtype=bool),
@@ -245,7 +249,9 @@ def test_drives_find_the_same_on_any_ranks(comm):
 
 def test_pressure_in_a_thick_cylinder_is_lames():
     """Plane strain, by a pressure inside, whose displacement is the volume that it sweeps."""
-    a, b, p = 1.0, 2.0, 0.01
+    a = 1.0
+    b = 2.0
+    p = 0.01
     mesh = quarter_annulus(MPI.COMM_SELF, a, b, 0.1)
     supports = [Dirichlet("x", "x", 1), Dirichlet("y", "y", 0)]
     loads = [DeadLoad(facets="inner", pressure=1.0, drive="pressure")]
@@ -259,7 +265,8 @@ def test_pressure_in_a_thick_cylinder_is_lames():
         symmetry=4.0,
     )
     system = solve(problem, [1.0])
-    A, B = p * a**2 / (b**2 - a**2), p * a**2 * b**2 / (b**2 - a**2)
+    A = p * a**2 / (b**2 - a**2)
+    B = p * a**2 * b**2 / (b**2 - a**2)
     u = lambda r: (1 + NU) / E * ((1 - 2 * NU) * A * r + B / r)  # noqa: E731
     X = coordinates(system.V)
     r = np.linalg.norm(X, axis=1)
@@ -350,12 +357,16 @@ def test_a_press_fit_is_lames():
     pressures = []
     for interference, overlap in ((0.02, 0.0), (0.0, 0.02)):
         system = fitted(interference, overlap)
-        a, b, c, d = 10.05, 14.0, 14.0 - overlap, 30.0
+        a = 10.05
+        b = 14.0
+        c = 14.0 - overlap
+        d = 30.0
 
         def flexibility(
             r, other, modulus, nu
         ):  # radial displacement of a ring under a pressure at r, free at the other
-            k, C = (1 + nu) / modulus, r**2 / (other**2 - r**2)
+            k = (1 + nu) / modulus
+            C = r**2 / (other**2 - r**2)
             return k * C * ((1 - 2 * nu) * r + other**2 / r)
 
         give = flexibility(c, d, 70.0, 0.33) - flexibility(b, a, 110.0, 0.34)

@@ -88,8 +88,10 @@ def test_secants_change_the_derivative_alone():
     law = Coulomb(0.3)
     given = law.respond(*points())
     other = law.by_secants().respond(*points())
-    traction, state = given.traction, given.state
-    secant, also = other.by_trial, other.state
+    traction = given.traction
+    state = given.state
+    secant = other.by_trial
+    also = other.state
     np.testing.assert_array_equal(other.traction, traction)
     np.testing.assert_array_equal(other.branch, given.branch)
     for name in ("elastic_slip", "pressure", "dissipated"):
@@ -106,8 +108,10 @@ def test_the_elastic_law_holds_what_touched():
     work."""
     opening, trial, gamma, before, dt = points()
     response = Coulomb(0.3).elastic().respond(opening, trial, gamma, before, dt)
-    traction, after = response.traction, response.state
-    touches, touched = trial[:, 0] > 0, before.pressure > 0
+    traction = response.traction
+    after = response.state
+    touches = trial[:, 0] > 0
+    touched = before.pressure > 0
     sticks = trial[:, 1] - gamma[:, 1] * before.elastic_slip
     np.testing.assert_allclose(traction[:, 1], np.where(touches & touched, sticks, 0.0))
     np.testing.assert_array_equal(traction[:, 0], np.maximum(trial[:, 0], 0))

@@ -18,7 +18,8 @@ from tests.solver.solving import joint_system
 
 pytestmark = pytest.mark.mpi
 
-E, NU = 210000.0, 0.3
+E = 210000.0
+NU = 0.3
 STEEL = Elastic(E, NU, "strain")
 MU = 0.3
 
@@ -115,7 +116,8 @@ def rings(comm: MPI.Comm, radii: tuple[float, float, float], size: float):
 def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
     """T = 2 pi mu p r^2, from p before it turns; sticking before, and no more beyond, all round and
     round again."""
-    r, mu = 10.0, 0.2
+    r = 10.0
+    mu = 0.2
     mesh = rings(MPI.COMM_WORLD, (6.0, r, 18.0), 1.5)
     turn = [
         Dirichlet("bore", "inside", 0, lambda x: -x[:, 1], "turn"),
@@ -127,7 +129,10 @@ def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
     problem = Problem(
         mesh, bodies, [fit], [*turn, *held("outside")], drives=[Drive("turn", path)], fit=True
     )
-    system, full, torque, on_contact = System(problem), [], [], []
+    system = System(problem)
+    full = []
+    torque = []
+    on_contact = []
     for load in (1.0, 2.0, 3.0, 4.0):
         system.solve([load])
         pressed = sum(
@@ -177,7 +182,9 @@ def test_sliding_forth_and_back_loses_what_the_loads_put_in():
     system = System(
         Problem(mesh, bodies, [contact], [*held("base"), *supports, *up], drives=drives + weight)
     )
-    work, last, lost = 0.0, (np.zeros(2), np.zeros(2)), [0.0]
+    work = 0.0
+    last = (np.zeros(2), np.zeros(2))
+    lost = [0.0]
     for load in np.linspace(0, 4, 161)[1:]:
         system.solve([load])
         q, f = system.driven()
@@ -236,10 +243,12 @@ def cylinder_on_block(comm: MPI.Comm, R: float, size: float, near: float):
 def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
     """c/a = sqrt(1 - Q/(mu P)) and the shear at the centre, mu p0 (1 - c/a) (Johnson 1985, section
     7.2)."""
-    R, P = 10.0, 1000.0
+    R = 10.0
+    P = 1000.0
     modulus = E / (2 * (1 - NU**2))
     a = np.sqrt(4 * P * R / (np.pi * modulus))
-    p0, shares = 2 * P / (np.pi * a), [0.25, 0.5, 0.75]
+    p0 = 2 * P / (np.pi * a)
+    shares = [0.25, 0.5, 0.75]
     supports, drives = lid("x", "y", x=[0, 0, *(MU * P * q for q in shares)], y=[0, *4 * [-P]])
     contact = Interaction("contact", ("arc", "lower top"), friction=MU, slide=a)
     bodies = [Body(name, STEEL) for name in ("upper", "lower")]
@@ -285,7 +294,8 @@ def test_the_joint_of_the_paper_with_friction():
         load={"displacement": 2.0, "steps": 20},
     )
     joint = joint_system(scene, MPI.COMM_WORLD)
-    work, last = 0.0, (0.0, 0.0)
+    work = 0.0
+    last = (0.0, 0.0)
     for load in scene.targets:
         joint.solve([load])
         delta = joint.drive_displacement("")

@@ -175,7 +175,8 @@ def test_hertz_is_the_limit_of_small_contacts():
     small = {"clearance": 0.5, "element_size": 0.006, "growth": 0.5, "block_size": 6.0}
     m = solve(scene(steps=1, joint=small, load={"displacement": 0.006})).steps[-1]
     radius = 1 / (1 - 1 / 1.5)
-    half_width, peak = np.sqrt(4 * m["P"] * radius / np.pi), np.sqrt(m["P"] / (np.pi * radius))
+    half_width = np.sqrt(4 * m["P"] * radius / np.pi)
+    peak = np.sqrt(m["P"] / (np.pi * radius))
     assert 0.03 < half_width < 0.08
     assert m["p0"] == pytest.approx(peak, rel=1e-2)
     assert m.contact_area / 2 == pytest.approx(half_width, rel=1e-2)
@@ -191,7 +192,8 @@ def test_results_do_not_depend_on_the_units(sigma_y):
         )
         sized = {"radius": length, "clearance": 0.005 * length, "element_size": 0.08 * length}
         solution = solve(scene(steps=4, joint=sized, pin=solid, block=solid))
-        m, force = solution.steps[-1], stress * length
+        m = solution.steps[-1]
+        force = stress * length
         energies = (m.elastic_energy, m.plastic_dissipation, m.work)
         rows.append(
             [
@@ -260,16 +262,13 @@ def test_peeq_is_told_by_body_and_near_the_contact(tmp_path):
     ).values()
     run = Run(folder)
     for step in (1, 2, 3):
-        points, fields, row = (
-            run.points(step),
-            run.fields(step),
-            {k: v[step - 1] for k, v in run.columns.items()},
-        )
-        x, peeq = points["coordinates"], points["peeq"]
-        angle, depth = (
-            np.arctan2(x[..., 0], -x[..., 1]),
-            np.abs(np.hypot(*np.moveaxis(x, -1, 0)) - 1),
-        )
+        points = run.points(step)
+        fields = run.fields(step)
+        row = {k: v[step - 1] for k, v in run.columns.items()}
+        x = points["coordinates"]
+        peeq = points["peeq"]
+        angle = np.arctan2(x[..., 0], -x[..., 1])
+        depth = np.abs(np.hypot(*np.moveaxis(x, -1, 0)) - 1)
         places = {
             name: np.broadcast_to((fields.body == tag)[:, None], peeq.shape)
             for name, tag in run.bodies.items()

@@ -97,11 +97,13 @@ def test_the_tangent_of_the_bulk_is_the_derivative_of_its_force(small):
     stress."""
     mesh, cells, _ = warped_annulus(MPI.COMM_SELF)
     bulk = Bulk(space(mesh), {1: cells.find(1)}, {1: LargeStrain(small)})
-    x, rng = coordinates(bulk.V), np.random.default_rng(0)
+    x = coordinates(bulk.V)
+    rng = np.random.default_rng(0)
     u = 0.05 * np.stack([np.sin(x[:, 0] + x[:, 1]), x[:, 1] ** 2 / 4], axis=1)
     u += 0.05 * YIELD_STRESS / E * rng.normal(size=u.shape)
     bulk.update(u)
-    K, h = stiffness(bulk), 1e-9
+    K = stiffness(bulk)
+    h = 1e-9
     for _ in range(3):
         d = rng.normal(size=u.shape)
         difference = (internal_force(bulk, u + h * d) - internal_force(bulk, u - h * d)).ravel() / (
@@ -115,7 +117,8 @@ def test_a_body_that_turns_has_no_forces():
     """By 40 degrees, where small strain sees 20 per cent."""
     mesh, cells, _ = warped_annulus(MPI.COMM_SELF)
     bulk = Bulk(space(mesh), {1: cells.find(1)}, {1: LargeStrain(PERFECT)})
-    c, s = np.cos(0.7), np.sin(0.7)
+    c = np.cos(0.7)
+    s = np.sin(0.7)
     u = coordinates(bulk.V) @ (np.array([[c, -s], [s, c]]) - np.eye(2)).T
     assert np.abs(internal_force(bulk, u)).max() < 1e-12 * E
     bulk.update(np.zeros((n_nodes(bulk.V), 2)))
@@ -204,7 +207,8 @@ def test_the_elastic_joint_by_three_laws(law, more):
     """At 2 dR of the paper's elastic joint P is above that of small strain by this. Other codes
     have the last two; in confined compression, P = M (e + k e^2) with k = -1.5 and 0.9 of these,
     Hencky's has 1.5: on a line with them."""
-    small, scene = joint("small"), joint_scene("large")
+    small = joint("small")
+    scene = joint_scene("large")
     problem = joint_problem(scene, MPI.COMM_WORLD)
     if law is not None:
         problem = replace(
@@ -230,10 +234,12 @@ def test_energy_balances_where_metal_flows_far():
     system = System(
         Problem(mesh, [Body(n, metal) for n in ("lower", "upper")], [contact], supports)
     )
-    work, last = 0.0, (0.0, 0.0)
+    work = 0.0
+    last = (0.0, 0.0)
     for load in np.linspace(0, 0.3, 61)[1:]:
         system.solve([load])
-        q, force = system.drive_displacement(""), system.drive_force("")
+        q = system.drive_displacement("")
+        force = system.drive_force("")
         work += (q - last[0]) * (force + last[1]) / 2
         last = q, force
     stored, dissipated = system.energies()

@@ -64,7 +64,8 @@ def test_force_control_does_not_depend_on_the_ranks(comm, pin):
         block={"E": 1.82, "nu": 0.3, "yield_stress": 0.002},
         **({"pin": pin} if pin else {}),
     )
-    many, one = solve(problem, comm), solve(problem, MPI.COMM_SELF)
+    many = solve(problem, comm)
+    one = solve(problem, MPI.COMM_SELF)
     np.testing.assert_allclose(
         [m["delta"] for m in many.steps], [m["delta"] for m in one.steps], rtol=1e-8
     )
@@ -94,7 +95,10 @@ def test_unloading_from_a_plastic_state_is_elastic_and_leaves_a_dent():
     force of zero leaves a displacement and residual stress; pressed again to the old force, the
     joint is back where it was."""
     steps = solve(by_force([0.006, 0.0, 0.006], [3, 6, 6], yield_stress=0.002)).steps
-    top, first, free, again = steps[2], steps[3], steps[8], steps[14]
+    top = steps[2]
+    first = steps[3]
+    free = steps[8]
+    again = steps[14]
     assert top.plastic_dissipation > 0
     assert first.plastic_dissipation == pytest.approx(top.plastic_dissipation, rel=1e-3)
     slope = (top["P"] - first["P"]) / (top["delta"] - first["delta"])
@@ -162,8 +166,8 @@ def test_zero_load_is_no_load():
 def write(folder, load):
     path = folder / "joint.toml"
     path.write_text(
-        "[joint]\nradius = 1.0\nrelative_clearance = 0.005\n[pin]\nrigid = true\n[block]\nE = 1.0\nnu = 0.3\n[load]\n"
-        + load,
+        "[joint]\nradius = 1.0\nrelative_clearance = 0.005\n[pin]\nrigid = true\n[block]\nE = "
+        "1.0\nnu = 0.3\n[load]\n" + load,
         encoding="utf-8",
     )
     return path
@@ -179,10 +183,8 @@ def test_paths_from_a_csv_file(tmp_path):
     assert twice.targets == pytest.approx([0.0025, 0.005, 0.00375, 0.0025, 0.00625, 0.01])
 
 
-CYCLE, IN_A_ROW = (
-    'path = "cycle.csv"',
-    "cycle.csv: must have a decimal number like 0.5 .* in every row; row",
-)
+CYCLE = 'path = "cycle.csv"'
+IN_A_ROW = "cycle.csv: must have a decimal number like 0.5 .* in every row; row"
 
 
 @pytest.mark.parametrize(

@@ -51,10 +51,12 @@ LEGAL = {
     "a displacement ends at a clamp": [*WALL, *MOVED],
     "supports agree": [*WALL, Dirichlet("foot", "bottom", 0), MOVED[1]],
     "a displacement that is zero where a support is": [
-        *WALL, Dirichlet("shear", "bottom", 0, lambda x: x[:, 0], "pull"), MOVED[0]
+        *WALL,
+        Dirichlet("shear", "bottom", 0, lambda x: x[:, 0], "pull"),
+        MOVED[0],
     ],
     "two sets that move alike": [*WALL, MOVED[1], Dirichlet("foot", "bottom", 0, 1.0, "pull too")],
-}  # fmt: skip
+}
 
 
 @pytest.mark.mpi
@@ -120,26 +122,48 @@ def moves(name, facets, axis=0, rate=1.0):
     return Dirichlet(name, facets, axis, rate, name)
 
 
-ALIKE = r"'end' .on 'right'. and 'foot' .on 'bottom'. move their common node at .4, -1. differently in x: leave it"
-RIGID = r"'wall' .on 'left'. fixes the node at .0, 0. in {}, which 'lid' .on 'top'. moves together with all its set: fix"
+ALIKE = (
+    r"'end' .on 'right'. and 'foot' .on 'bottom'. move their common node at .4, -1. "
+    r"differently in x: leave it"
+)
+RIGID = (
+    r"'wall' .on 'left'. fixes the node at .0, 0. in {}, which 'lid' .on 'top'. moves "
+    r"together with all its set: fix"
+)
 REFUSED = {
-    "two displacements": (ALIKE, [moves("end", "right"), moves("foot", "bottom", 0, 3.0)], "displacement"),
+    "two displacements": (
+        ALIKE,
+        [moves("end", "right"), moves("foot", "bottom", 0, 3.0)],
+        "displacement",
+    ),
     "two forces": (ALIKE, [moves("end", "right"), moves("foot", "bottom")], "force"),
     "a force on an edge that a clamp ends": (RIGID.format("y"), [moves("lid", "top", 1)], "force"),
-    "a rigid point beside a clamp": (RIGID.format("x"), reference_point("lid", "top"), "displacement"),
+    "a rigid point beside a clamp": (
+        RIGID.format("x"),
+        reference_point("lid", "top"),
+        "displacement",
+    ),
     "two rigid points": (
-        "'foot' .on 'bottom'. and 'lid' .on 'right'. move their common node at .4, -1. differently in x",
-        [*reference_point("lid", "right"), *(Dirichlet("foot", "bottom", k, 1.0, f"foot {k}") for k in (0, 1))],
+        "'foot' .on 'bottom'. and 'lid' .on 'right'. move their common node at .4, -1. differently "
+        "in x",
+        [
+            *reference_point("lid", "right"),
+            *(Dirichlet("foot", "bottom", k, 1.0, f"foot {k}") for k in (0, 1)),
+        ],
         "force",
     ),
     "nothing is left to move": (
-        "'a' .on 'left'. moves nothing: supports fix all its nodes in x, 'wall' .on 'left'. the one at .0, -1.; move",
-        [moves("a", "left")], "displacement"
+        "'a' .on 'left'. moves nothing: supports fix all its nodes in x, 'wall' .on 'left'. the "
+        "one at .0, -1.; move",
+        [moves("a", "left")],
+        "displacement",
     ),
     "the same twice": (
-        "'end' gives 'right' two rates in x by the drive 'end'", [moves("end", "right")] * 2, "displacement"
+        "'end' gives 'right' two rates in x by the drive 'end'",
+        [moves("end", "right")] * 2,
+        "displacement",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.mpi

@@ -63,8 +63,10 @@ def test_half_a_problem_with_symmetry_two_is_the_whole(control):
 def test_a_second_call_goes_on_from_the_first(monkeypatch):
     """By its own rules, through loads between the two: a little unloading in four steps is
     elastic."""
-    system, loads = solve(columns(), [DEPTH]), []
-    peeq, accept = system.peeq(), LoadPath.accept
+    system = solve(columns(), [DEPTH])
+    loads = []
+    peeq = system.peeq()
+    accept = LoadPath.accept
     assert peeq[0] > 0
     monkeypatch.setattr(
         LoadPath, "accept", lambda path, load: (loads.append(load), accept(path, load))
@@ -98,8 +100,10 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
     problem = Problem(
         mesh, bodies, (), supports, [DeadLoad("lower", (0.0, -1.0))], symmetry=symmetry
     )
-    system, weight = solve(problem, [0.01]), 0.01
-    modulus, y = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)), coordinates(system.V)[:, 1]
+    system = solve(problem, [0.01])
+    weight = 0.01
+    modulus = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
+    y = coordinates(system.V)[:, 1]
     u = system.equilibrium.displacement()
     lower = system.nodes_of(bodies[0])
     exact = -weight / symmetry / modulus * (1 - y[lower] ** 2) / 2
@@ -114,7 +118,8 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
 
 def test_a_load_is_spread_as_its_density_says():
     """Its first moment is that of the density, its sum the force."""
-    mesh, load = blocks(MPI.COMM_SELF, 3, 3), DeadLoad("upper", (3.0, 4.0), lambda x: x[0] * x[1])
+    mesh = blocks(MPI.COMM_SELF, 3, 3)
+    load = DeadLoad("upper", (3.0, 4.0), lambda x: x[0] * x[1])
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     equilibrium = System(
         Problem(mesh, bodies, (), [Dirichlet("base", "base", 1)], [load])
@@ -127,10 +132,12 @@ def test_a_load_is_spread_as_its_density_says():
 
 
 def test_a_guess_moves_bodies_rigidly():
-    mesh, bodies = blocks(MPI.COMM_SELF, 2, 3), [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    mesh = blocks(MPI.COMM_SELF, 2, 3)
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     problem = Problem(mesh, bodies, guess=lambda load: Guess(2 * load, {"upper": (load, -load)}))
     system = System(replace(problem, supports=[Dirichlet("base", "base", 1)]))
-    state, y = system.first_guess(0.5), coordinates(system.V)[:, 1]
+    state = system.first_guess(0.5)
+    y = coordinates(system.V)[:, 1]
     assert state[-1] == 1.0
     np.testing.assert_array_equal(
         state[:-1].reshape(-1, 2)[y > 0.01], 0.5 * np.array([[1, -1]] * (y > 0.01).sum())

@@ -55,7 +55,8 @@ def test_contact_patch(order, degree, quads, comm):
     """Uniform pressure and linear displacement across lines whose nodes do not match, whatever the
     cells."""
     system = pressed(comm, order, degree, quads)
-    pressure, x = E / (1 - NU**2) * DEPTH / 2, coordinates(system.V)
+    pressure = E / (1 - NU**2) * DEPTH / 2
+    x = coordinates(system.V)
     assert -system.reaction("lid")[1] == pytest.approx(pressure, rel=1e-9)
     for pair in system.contact.pairs:
         np.testing.assert_allclose(pair.pressure, pressure, rtol=1e-9)
@@ -99,7 +100,8 @@ def test_lames_cylinder_converges(degree, quads):
         system = solve(
             Problem(mesh, [Body("ring", ELASTIC)], supports=supports, degree=degree), [DEPTH]
         )
-        x, u = coordinates(system.V), system.equilibrium.displacement()
+        x = coordinates(system.V)
+        u = system.equilibrium.displacement()
         r = np.linalg.norm(x, axis=1)
         lame = ((1 - 2 * NU) * r + 4 / r) / ((1 - 2 * NU) + 4) * DEPTH
         errors.append(np.abs((u * x).sum(axis=1) / r - lame).max() / DEPTH)
@@ -109,7 +111,8 @@ def test_lames_cylinder_converges(degree, quads):
 def punch(gmsh):
     """A block of 5 by 3, of which the "punch" is the unit of its top at the plane of symmetry,
     "left"."""
-    geo, gap = gmsh.model.geo, 0.2
+    geo = gmsh.model.geo
+    gap = 0.2
     points = [geo.addPoint(x, y, 0) for x, y in ((0, -3), (5, -3), (5, 0), (1, 0), (0, 0))]
     lines = [geo.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
     face = geo.addPlaneSurface([geo.addCurveLoop(lines)])
@@ -159,7 +162,8 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
     whole, alone = (MeshOrder(system) for system in systems)
     u = systems[0].equilibrium.displacement()
     np.testing.assert_array_equal(whole.spread(whole.collect(u)), u)
-    mesh, fields = collect_mesh(whole), collect_fields(whole)
+    mesh = collect_mesh(whole)
+    fields = collect_fields(whole)
     expected = collect_mesh(alone) | collect_fields(alone)
     if comm.rank == 0:
         assert whole.mesh_digest() == alone.mesh_digest()
@@ -201,7 +205,8 @@ def test_guesses_from_quads(degree):
         quarter_annulus(MPI.COMM_SELF, 1.0, 2.0, h, quads=True, order=degree).mesh
         for h in (0.5, 0.2)
     )
-    x, to = coarse.geometry.x[:, :2], fine.geometry.x[:, :2]
+    x = coarse.geometry.x[:, :2]
+    to = fine.geometry.x[:, :2]
     linear = lambda z: np.stack([1 + 2 * z[:, 0] - z[:, 1], z[:, 1]], axis=1)  # noqa: E731
     onto = Interpolation(QUADRILATERAL, x, coarse.geometry.dofmap, to)
     assert onto(linear(x)) == pytest.approx(linear(to), abs=1e-11)

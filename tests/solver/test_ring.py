@@ -19,7 +19,8 @@ LIKE = LawJoint(1.0, DR, 1.0)
 
 def solved(load, alpha=0.0, **options):
     """The last step of a joint; peak pressure within 0.5 % of theory, angle within 0.5 degrees."""
-    m, (eps, peak) = solve(persson_joint(load, **options)).steps[-1], theory(load, alpha)
+    m = solve(persson_joint(load, **options)).steps[-1]
+    (eps, peak) = theory(load, alpha)
     assert m["p0"] / m["P"] == pytest.approx(peak, rel=5e-3)
     assert np.degrees(m["eps"]) == pytest.approx(np.degrees(eps), abs=0.5)
     return m
@@ -37,7 +38,8 @@ def test_the_pressure_profile_is_persson_s():
     """Facet means over the whole contact at E* dR/P = 0.5, within 0.5 % of the peak but for the
     facet at the edge."""
     solution = solve(persson_joint(0.5, 0.02))
-    m, (eps, _) = solution.steps[-1], theory(0.5)
+    m = solution.steps[-1]
+    (eps, _) = theory(0.5)
     for arc in solution.profiles[-1].values():
         inside = np.flatnonzero(arc.angle.max(axis=1) < eps)[:-1]
         exact = persson_pressure(LIKE, np.array(m["P"]), np.array(eps), arc.angle)
@@ -78,10 +80,12 @@ def test_a_thin_bushing_is_pressed_as_lame_s(wall):
     Lame's equations in plane strain, with u = A (r - b^2/r) in the ring and u = -p r/(2 (lambda +
     mu)) in the pin."""
     m = solve(persson_joint(-1e4, joint={"block_size": 1 + wall}))
-    solid, b = m.scene.block, 1 + wall
+    solid = m.scene.block
+    b = 1 + wall
     mu = solid.E / (2 + 2 * solid.nu)
     both = 2 * mu / (1 - 2 * solid.nu)  # 2 (lambda + mu)
-    ring, pin = (b**2 - 1) / (both + 2 * mu * b**2), 1 / both
+    ring = (b**2 - 1) / (both + 2 * mu * b**2)
+    pin = 1 / both
     for arc in m.profiles[-1].values():
         np.testing.assert_allclose(
             arc.facet_force / arc.weight.sum(axis=1), DR / (ring + pin), rtol=5e-3

@@ -33,7 +33,9 @@ YIELDING = J2Material(210000.0, 0.3, "strain", LinearHardening(400.0, 2000.0))
 def steps_of(problem: Problem, loads) -> tuple[System, float]:
     """The system at the last of the ``loads``, none of which may be cut, and the work of its one
     drive."""
-    system, work, before = System(problem), 0.0, np.zeros(2)
+    system = System(problem)
+    work = 0.0
+    before = np.zeros(2)
     for load in loads:
         system.solve([load], StepRules(minimum=1.0))
         now = np.concatenate(system.driven())
@@ -96,11 +98,10 @@ def test_a_pin_under_a_force_finds_its_hole(half):
     supports = [Dirichlet("clamp", "clamp", axis) for axis in (0, 1)] + [
         Dirichlet("axis", "axis", 1)
     ] * half
-    bodies, contact = (
-        [Body("pin", STEEL), Body("lug", STEEL)],
-        Interaction("contact", ("pin", "hole")),
-    )
-    loads, drives = [DeadLoad("pin", (-1.0, 0.0), drive="pull")], [Drive("pull", (0, 4000.0))]
+    bodies = [Body("pin", STEEL), Body("lug", STEEL)]
+    contact = Interaction("contact", ("pin", "hole"))
+    loads = [DeadLoad("pin", (-1.0, 0.0), drive="pull")]
+    drives = [Drive("pull", (0, 4000.0))]
     problem = Problem(
         mesh, bodies, [contact], supports, loads, drives=drives, symmetry=1.0 + half, stabilise=True
     )
@@ -154,14 +155,10 @@ def test_a_mean_motion_of_half_an_edge_is_that_of_the_whole():
         supports = [Dirichlet("clamp", "clamp", axis) for axis in (0, 1)] + [
             Dirichlet("axis", "axis", 1)
         ] * half
-        bodies, contact = (
-            [Body("pin", STEEL), Body("lug", STEEL)],
-            Interaction("contact", ("pin", "hole")),
-        )
-        means, drives = (
-            [Mean("flat", "flat", 0, None if half else (0.1, 0.0), "pull")],
-            [Drive("pull", (0, 0.1))],
-        )
+        bodies = [Body("pin", STEEL), Body("lug", STEEL)]
+        contact = Interaction("contact", ("pin", "hole"))
+        means = [Mean("flat", "flat", 0, None if half else (0.1, 0.0), "pull")]
+        drives = [Drive("pull", (0, 0.1))]
         parts = {"means": means, "drives": drives, "symmetry": 1.0 + half, "stabilise": True}
         found.append(
             steps_of(Problem(mesh, bodies, [contact], supports, **parts), [0.5, 1.0])[

@@ -23,7 +23,10 @@ class Spring:
     bulk = SimpleNamespace(plastic=True)
 
     def __init__(self, cost):
-        self.cost, self.load, self.at, self.solved = cost, 0.0, 0.0, []
+        self.cost = cost
+        self.load = 0.0
+        self.at = 0.0
+        self.solved = []
         self.equilibrium = self
 
     def state(self):
@@ -45,14 +48,17 @@ class Spring:
         )
 
     def restore(self, load, state):
-        self.load, self.at = load, state[0]
+        self.load = load
+        self.at = state[0]
 
     def commit(self):
         pass
 
 
 def follow(targets, cost=lambda load, stride: 3, spring=None, **rules):
-    spring, done, accepted = spring or Spring(cost), [], []
+    spring = spring or Spring(cost)
+    done = []
+    accepted = []
     march(
         LoadPath(spring, lambda load: np.zeros(1), None, None),
         targets,
@@ -178,7 +184,8 @@ def test_rules_that_contradict_themselves_are_refused(rules):
 
 def test_a_length_never_leaves_its_bounds():
     """Whatever the order of successes and failures."""
-    rng, bounds = np.random.default_rng(0), {"minimum": 0.01, "maximum": 0.5}
+    rng = np.random.default_rng(0)
+    bounds = {"minimum": 0.01, "maximum": 0.5}
     hard = lambda load, stride: math.inf if stride > 0.2 and rng.random() < 0.5 else 3  # noqa: E731
     _, accepted, _ = follow(
         [10.0, 20.0, 30.0], hard, initial=0.2, growth=1.7, cutback=0.3, **bounds

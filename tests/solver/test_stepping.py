@@ -27,7 +27,8 @@ def test_a_failed_step_leaves_no_trace():
     points = joint.equilibrium.diagnostics.plastic_points()
     states = [p.state for p in points]
     before = [s.peeq.copy() for s in states]
-    load, u = equilibrium.load, equilibrium.displacement()
+    load = equilibrium.load
+    u = equilibrium.displacement()
     forces = solution.forces()
     joint.solver.newton.max_iterations = 1
     result = joint.solver.solve(1.2 * load, [(equilibrium.state(), False)])
@@ -43,7 +44,8 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported
     before."""
     problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6})
-    joint, accepted = joint_system(problem, MPI.COMM_SELF), []
+    joint = joint_system(problem, MPI.COMM_SELF)
+    accepted = []
     targets = problem.targets
     with pytest.raises(
         StepFailure,

@@ -88,7 +88,8 @@ def test_the_run_says_how_accurate_it_is_and_can_be_solved_again(elastic, tmp_pa
     """run.json has what was asked, what came out, and every mesh, scene.toml the last one and no
     accuracy."""
     report = json.loads((elastic.folder / "run.json").read_text())
-    block, last = report["accuracy"], report["accuracy"]["levels"][-1]
+    block = report["accuracy"]
+    last = report["accuracy"]["levels"][-1]
     assert (report["status"], block["asked"]) == ("done", 1e-3)
     assert report["error_estimates"]["mesh"] == block["mesh_error"] == block["estimated"]
     assert last["dofs"] == report["mesh"]["dofs"]
@@ -129,10 +130,12 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
     """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer
     to that of many."""
-    plane, short = {"plane": "stress"}, {"initial": 1 / 16, "maximum": 1 / 16}
+    plane = {"plane": "stress"}
+    short = {"initial": 1 / 16, "maximum": 1 / 16}
     many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
     known = Case("many", many).solve(tmp_path).steps[-1]["P"]
-    taken, errors = [], []
+    taken = []
+    errors = []
     for asked in (0.1, 0.04):
         scene = open_scene(asked, 2, 0.002, analysis=plane, output={"fields": False})
         found = accurate(scene, tmp_path / f"{asked}").accuracy
@@ -227,7 +230,8 @@ def test_accurate_and_small_contacts_get_small_elements():
     wide, small = (
         MeshFamily(open_scene(1e-3, load={"displacement": d}), 1e-3) for d in (2.0, 0.01)
     )
-    a, b = wide.scene_of(1, 1).joint, small.scene_of(1, 1).joint
+    a = wide.scene_of(1, 1).joint
+    b = small.scene_of(1, 1).joint
     assert b.growth == a.growth
     angle = mesh_family.expected_angle(small.scene)
     assert np.cos(angle) == pytest.approx(1 / 1.01)
@@ -306,7 +310,8 @@ def test_ranks_choose_the_same_meshes(tmp_path, comm):
     """As one rank does, with the same estimates and forces."""
     scene = open_scene(0.03, 4, 0.002)
     folder = Path(comm.bcast(str(tmp_path)))
-    together, alone = accurate(scene, folder / "together", comm), None
+    together = accurate(scene, folder / "together", comm)
+    alone = None
     if comm.rank == 0:
         alone = accurate(scene, folder / "alone")
         alone = [m["P"] for m in alone.steps], alone.accuracy

@@ -131,7 +131,10 @@ def test_overrides_mean_what_set_means(tmp_path):
 
 def test_identical_scenes_are_one_run(tmp_path):
     """However they are written; a scene's name depends on nothing but its content."""
-    text = "list = [{ block.hardening = 0 }, { block.hardening = 0.0 }]\n[grid]\njoint.clearance = [0.005, 5e-3, 0.006]"
+    text = (
+        "list = [{ block.hardening = 0 }, { block.hardening = 0.0 }]\n[grid]\njoint.clearance = "
+        "[0.005, 5e-3, 0.006]"
+    )
     sweep = read_sweep(written(tmp_path, text))
     assert (len(sweep.cases), len(sweep.distinct)) == (6, 2)
     assert [case.number for case in sweep.distinct] == [1, 3]
@@ -199,15 +202,18 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
         (
             "latin_hypercube = { number = 0, sed = 1, ranges = { pin.nu = [0.3, 0.1] } }",
             "latin_hypercube.number = 0: input should be greater than or equal to 1.\n"
-            "latin_hypercube.ranges.pin.nu = [0.3, 0.1]: must have a from that is less than its to.\n"
+            "latin_hypercube.ranges.pin.nu = [0.3, 0.1]: must have a from that is less than its "
+            "to.\n"
             "latin_hypercube.sed = 1: is not a known key.",
         ),
         (
-            '[latin_hypercube]\nnumber = 2\nranges = { "pin.nu" = { from = 0, to = 1, scale = "log" } }',
+            '[latin_hypercube]\nnumber = 2\nranges = { "pin.nu" = { from = 0, to = 1, scale = '
+            '"log" } }',
             'latin_hypercube.ranges.pin.nu: must have a positive from where scale = "log".',
         ),
         (
-            'latin_hypercube = { number = 2, ranges = { pin.E = ["a", 1.0], pin.nu = [0.1, nan] } }',
+            'latin_hypercube = { number = 2, ranges = { pin.E = ["a", 1.0], pin.nu = [0.1, nan] } '
+            "}",
             'latin_hypercube.ranges.pin.E.from = "a": input should be a valid number.\n'
             "latin_hypercube.ranges.pin.nu.to = NaN: input should be a finite number.",
         ),
@@ -284,7 +290,10 @@ def test_scenes_and_sweeps_are_told_apart(tmp_path):
 
 def test_the_parts_of_an_array_are_the_whole(tmp_path):
     """Every case in one part, and the parts take about as long."""
-    text = "[grid]\njoint.relative_element_size = [0.3, 0.1, 0.05]\nload.steps = [1, 2, 3, 4, 5, 6, 7, 8]"
+    text = (
+        "[grid]\njoint.relative_element_size = [0.3, 0.1, 0.05]\nload.steps = [1, 2, 3, 4, 5, 6, "
+        "7, 8]"
+    )
     cases = read_sweep(written(tmp_path, text)).cases
     parts = [part_of(cases, f"{i}/3") for i in (1, 2, 3)]
     assert sorted(case.number for part in parts for case in part) == [case.number for case in cases]

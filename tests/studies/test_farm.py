@@ -82,7 +82,10 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
 
 def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(comm, tmp_path):
     """Each of its meshes is a finished run: only one with an estimate is the case's."""
-    varied = '[grid]\nanalysis.accuracy = [0.05]\njoint.relative_element_size = ["none"]\njoint.growth = ["none"]\n'
+    varied = (
+        '[grid]\nanalysis.accuracy = [0.05]\njoint.relative_element_size = ["none"]\njoint.growth '
+        '= ["none"]\n'
+    )
     folder, cases = cases_of(comm, tmp_path, varied)
     assert solve_case(cases[0], folder).status == "done"
     run = of_case(cases[0], folder)

@@ -12,10 +12,15 @@ LUG = """
 lug.width = [36.0, 40.0]
 load.displacement = [0.05, 0.1]
 [base]
-lug = { radius = 9.9, clearance = 0.1, edge_distance = 20.0, length = 60.0, width = 40.0, element_size = 3.0 }
 pin = { E = 210000.0, nu = 0.3 }
 plate = { E = 210000.0, nu = 0.3 }
 load = { displacement = 0.1, steps = 1 }
+lug.radius = 9.9
+lug.clearance = 0.1
+lug.edge_distance = 20.0
+lug.length = 60.0
+lug.width = 40.0
+lug.element_size = 3.0
 """
 
 

@@ -71,7 +71,8 @@ def test_cases_with_other_columns_share_a_table(tmp_path):
     its heading."""
     text = '[grid]\nblock.yield_stress = ["none", 0.002]\npin.yield_stress = ["none", 0.002]\n'
     assert sweep(written(tmp_path, text), "-o", tmp_path / "out", "-q") == 0
-    rows, ends = table(tmp_path / "out" / "sweep.csv"), table(tmp_path / "out" / "cases.csv")
+    rows = table(tmp_path / "out" / "sweep.csv")
+    ends = table(tmp_path / "out" / "cases.csv")
     for k, (row, end) in enumerate(zip(rows[1::2], ends, strict=True)):
         own = read_history(tmp_path / "out" / "cases" / row["run"] / "history.csv")
         values = {
@@ -118,7 +119,10 @@ def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused):
     out = _again(solved)
     before = {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
     other = written(tmp_path, SOFT.replace("[2, 3]", "[4]"), "other")
-    said = f"{out}: holds another sweep, which has no case in common with {other}; choose another folder with -o, or "
+    said = (
+        f"{out}: holds another sweep, which has no case in common with {other}; choose another "
+        "folder with -o, or "
+    )
     assert refused(["sweep", other, "-o", str(out), "-q"]) == f"{said}remove this one.\n"
     assert {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()} == before
 
@@ -128,8 +132,12 @@ def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     3, and left alone until --retry. The error's traceback is in failure.txt, its sentence in the
     table, and a retry removes it."""
     break_mesh(monkeypatch, "two\nlines", below=0.75)
-    text = f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 0.5\n[[list]]\npin.nu = 0.2\n"
-    file, out = written(tmp_path, text), tmp_path / "out"
+    text = (
+        f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 0.5\n[[list]]\npin.nu = "
+        "0.2\n"
+    )
+    file = written(tmp_path, text)
+    out = tmp_path / "out"
     cases = read_sweep(file).cases
     runs = [case.run for case in cases]
     assert sweep(file, "-o", out) == 3
@@ -160,7 +168,8 @@ def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
 def test_an_array_solves_the_whole(tmp_path, solved):
     """Part by part into one folder, whatever is in a case's way; the last part leaves the whole, as
     does --gather."""
-    file, out = written(tmp_path, SOFT), tmp_path / "out"
+    file = written(tmp_path, SOFT)
+    out = tmp_path / "out"
     out.joinpath("cases").mkdir(parents=True)
     out.joinpath("sweep.toml").touch()
     in_the_way = out / "cases" / read_sweep(file).cases[-1].run
@@ -210,10 +219,8 @@ def test_nothing_is_written_by_a_dry_run_or_bad_input(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
-    file, wrong = (
-        written(tmp_path, SOFT),
-        written(tmp_path, "[grid]\npin.E = [1.0, -1.0]\n", "wrong"),
-    )
+    file = written(tmp_path, SOFT)
+    wrong = written(tmp_path, "[grid]\npin.E = [1.0, -1.0]\n", "wrong")
     before = sorted(tmp_path.rglob("*"))
     code = sweep(*(a.replace("FILE", file).replace("WRONG", wrong) for a in arguments))
     out, err = capsys.readouterr()

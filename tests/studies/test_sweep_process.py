@@ -49,10 +49,13 @@ def until_cases_are_done(process: subprocess.Popen, number: int) -> None:
 def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
     """kill -9 at random moments: what is done stays as it is, and the end is that of the sweep in
     one go."""
-    chance, out, file = random.Random(3), tmp_path / "out", written(tmp_path, TEXT)
+    chance = random.Random(3)
+    out = tmp_path / "out"
+    file = written(tmp_path, TEXT)
     continued = 0
     for cases in (1, 3):
-        finished, before = done(out), times(out)
+        finished = done(out)
+        before = times(out)
         process = started(file, out)
         until_cases_are_done(process, cases)
         time.sleep(chance.uniform(0, 0.15))
@@ -88,7 +91,8 @@ def same_numbers(a: Path, b: Path) -> None:
 def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
     """SIGTERM: running cases keep their accepted steps, the tables tell, and the sweep goes on to
     the same numbers."""
-    out, file = tmp_path / "out", written(tmp_path, TEXT)
+    out = tmp_path / "out"
+    file = written(tmp_path, TEXT)
     process = started(file, out, ranks)
     until_cases_are_done(process, 2)
     process.send_signal(signal.SIGTERM)
@@ -98,11 +102,9 @@ def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
         assert sweep(file, "-o", out, "--gather", "-q") == 0
     else:
         assert " open in " in said
-    status, finished, before = (
-        [row["status"] for row in table(out / "cases.csv")],
-        done(out),
-        times(out),
-    )
+    status = [row["status"] for row in table(out / "cases.csv")]
+    finished = done(out)
+    before = times(out)
     assert set(status) <= {"done", "interrupted", "open"}
     assert 2 <= status.count("done") == len(finished) < 12
     assert sweep(file, "-o", out, "-q") == 0
@@ -135,7 +137,8 @@ def test_the_reader_of_the_progress_may_leave(tmp_path):
 def test_the_job_script_calls_what_exists(tmp_path):
     """Without SLURM it is one part of one; within an array, it is the task's part."""
     root = Path(__file__).parents[2]
-    script, file = root / "docs" / "cluster" / "sweep.sbatch", written(tmp_path, TEXT)
+    script = root / "docs" / "cluster" / "sweep.sbatch"
+    file = written(tmp_path, TEXT)
     command = ["bash", str(script), file, "-o", str(tmp_path / "out")]
     task = {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
     for option, environment, said in (("--dry-run", {}, "12 cases, "), ("-q", task, "")):

@@ -29,7 +29,12 @@ def grid(n, m, corner=(0.0, 0.0), size=(1.0, 1.0)):
 def joined(*grids):
     """One mesh of several, none of whose nodes are merged; sets "0", "1", ... and the facet sets "0
     top", ..."""
-    x, cells, cell_sets, facet_sets, n, m = [], [], {}, {}, 0, 0
+    x = []
+    cells = []
+    cell_sets = {}
+    facet_sets = {}
+    n = 0
+    m = 0
     for k, (nodes, found) in enumerate(grids):
         cell_sets[str(k)] = m + np.arange(len(found))
         for name, row, ends in (
@@ -40,7 +45,8 @@ def joined(*grids):
             facet_sets[f"{k} {name}"] = n + found[at][:, ends]
         x.append(nodes)
         cells.append(n + found)
-        n, m = n + len(nodes), m + len(found)
+        n = n + len(nodes)
+        m = m + len(found)
     return np.concatenate(x), np.concatenate(cells), cell_sets, facet_sets
 
 
@@ -117,7 +123,8 @@ def test_a_sound_mesh_has_nothing_said_of_it(comm):
 )
 def test_each_fault_has_its_sentence(comm, made, bodies, options, said):
     x, cells, cell_sets, facet_sets = made
-    options, both = dict(options), np.arange(len(cells))
+    options = dict(options)
+    both = np.arange(len(cells))
     seam = np.concatenate([facet_sets["0 top"], facet_sets["1 bottom"]])
     facet_sets = facet_sets | {"seam": seam, "middle": np.array([[3, 4], [4, 5]])}
     with pytest.raises(ValueError, match=said):
@@ -144,7 +151,8 @@ def test_bodies_may_lie_in_each_other_as_far_as_is_said():
 def test_a_crack_is_warned_of():
     """Two halves that share one side, and have two nodes each where one was meant."""
     x, cells = grid(2, 2)
-    x, cells = np.concatenate([x, x[[1]]]), cells.copy()
+    x = np.concatenate([x, x[[1]]])
+    cells = cells.copy()
     cells[1, 0] = 9
     (said,) = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(4)}, {}), {"body": "0"})
     assert said.startswith("the body 'body' has 1 pairs of nodes at the same place, as at (0.5, 0)")
@@ -181,7 +189,8 @@ def disc(n, radius, m=2):
     """Quadrilaterals of a ring of straight sides inside the ``radius``, or outside if ``m`` is
     negative."""
     x, cells = grid(n, abs(m))
-    r, angle = radius * (0.5 + 0.5 * x[:, 1] if m > 0 else 2 - x[:, 1]), -np.pi * x[:, 0]
+    r = radius * (0.5 + 0.5 * x[:, 1] if m > 0 else 2 - x[:, 1])
+    angle = -np.pi * x[:, 0]
     return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1), cells
 
 
@@ -357,7 +366,8 @@ def test_cells_that_cannot_be_used(mirrored):
     twice = PlaneMesh.of_sets(QUADRILATERAL, x, np.concatenate([cells, cells[:1]]), {}, {}, {})
     assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5) in 'all'"
     curved = refined(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {}), order=2)
-    apart, bound = curved.cells.copy(), curved.cells.copy()
+    apart = curved.cells.copy()
+    bound = curved.cells.copy()
     apart[1, 5] = apart[1, 6]
     bound[0, 4] = bound[1, 1]
     for wrong in (apart, bound):
@@ -374,7 +384,8 @@ def test_cells_that_cannot_be_used(mirrored):
     )
 
 
-X, Y = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+X = np.array([1.0, 0.0])
+Y = np.array([0.0, 1.0])
 
 
 def along(direction, *points):

@@ -25,7 +25,8 @@ RING = {
 @pytest.fixture
 def made(monkeypatch, tmp_path) -> list[tuple]:
     """A cache of its own for a test; what gmsh made on this rank."""
-    made, make = [], fenicsx._made
+    made = []
+    make = fenicsx._made
     monkeypatch.setattr(mesh_cache, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(fenicsx, "_made", lambda *drawn: made.append(drawn) or make(*drawn))
     return made

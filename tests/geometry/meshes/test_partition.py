@@ -13,7 +13,8 @@ from tests.geometry.shapes.measures import Facets
 def test_parts_have_as_many_cells_each_and_lie_in_order_of_their_angle(n_parts):
     """In whatever order the cells come; also for no cells, and fewer than parts."""
     rng = np.random.default_rng(1)
-    x, cells = rng.uniform(0, 1, (300, 2)), rng.integers(0, 300, (1001, 3))
+    x = rng.uniform(0, 1, (300, 2))
+    cells = rng.integers(0, 300, (1001, 3))
     part = sectors(x, cells, n_parts)
     assert np.ptp(np.bincount(part, minlength=n_parts)) <= 1
     middle = x[cells].mean(axis=1)

@@ -14,7 +14,8 @@ def model():
     gmsh.option.setNumber("General.Terminal", 0)
     geo = gmsh.model.geo
     centre, a, b = (geo.addPoint(*x, 0) for x in ((0, 0), (1, 0), (0, 1)))
-    arc, chord = geo.addCircleArc(a, centre, b), geo.addLine(b, a)
+    arc = geo.addCircleArc(a, centre, b)
+    chord = geo.addLine(b, a)
     face = geo.addPlaneSurface([geo.addCurveLoop([arc, chord])])
     geo.synchronize()
     gmsh.model.addPhysicalGroup(2, [face], 7)

@@ -27,14 +27,14 @@ CIRCLES = [Circle("arc", (0.0, 0.0), 1.0), Circle("hole", (0.0, 0.0), 1.01)]
 def draw(order, quads=False, size=0.5):
     """A disc "pin" with its edge "arc" in a "plate" with a "hole", and the disc's point "east"."""
     model = gmsh.model
-    disc, plate, hole = model.occ.addDisk(0, 0, 0, 1, 1), model.occ.addRectangle(-2, -2, 0, 4, 4), 9
+    disc = model.occ.addDisk(0, 0, 0, 1, 1)
+    plate = model.occ.addRectangle(-2, -2, 0, 4, 4)
+    hole = 9
     model.occ.addDisk(0, 0, 0, 1.01, 1.01, hole)
     model.occ.cut([(2, plate)], [(2, hole)])
     model.occ.synchronize()
-    arc, edges = (
-        model.getBoundary([(2, disc)])[0][1],
-        [abs(line) for _, line in model.getBoundary([(2, plate)])],
-    )
+    arc = model.getBoundary([(2, disc)])[0][1]
+    edges = [abs(line) for _, line in model.getBoundary([(2, plate)])]
     hole = [line for line in edges if np.ptp(model.getBoundingBox(1, line)) < 3]
     for name, faces in {"pin": [disc], "plate": [plate], "all": [disc, plate]}.items():
         model.addPhysicalGroup(2, faces, name=name)
@@ -65,7 +65,9 @@ def module():
 def content(mesh):
     """Kind and order, and of every set the number of its entities and their measure; over all
     ranks."""
-    dolfinx_mesh, comm, found = mesh.mesh, mesh.mesh.comm, {}
+    dolfinx_mesh = mesh.mesh
+    comm = mesh.mesh.comm
+    found = {}
 
     def total(measure):
         return comm.allreduce(
@@ -118,7 +120,8 @@ def test_every_format_gives_the_same_mesh(module, tmp_path, order, quads):
     if order == 3:
         return  # dolfinx writes no tags of cubic lines
     flat = meshtags(expected.mesh, 2, expected.cells.indices, expected.cells.values)
-    flat.name, expected.facets.name = "cell_tags", "facet_tags"
+    flat.name = "cell_tags"
+    expected.facets.name = "facet_tags"
     for encoding in (io.XDMFFile.Encoding.HDF5, io.XDMFFile.Encoding.ASCII):
         with io.XDMFFile(MPI.COMM_WORLD, tmp_path / "disc.xdmf", "w", encoding=encoding) as file:
             file.write_mesh(expected.mesh)
@@ -240,10 +243,8 @@ def test_an_input_deck_of_sets_and_surfaces(comm, deck):
 def test_what_an_input_deck_may_look_like(comm, deck, old, new):
     """Comments, keywords on two lines, names between quotes, data in other files and axisymmetric
     elements lose nothing."""
-    expected, found = (
-        content(read_mesh(deck(), comm))[2],
-        content(read_mesh(deck((old, new)), comm))[2],
-    )
+    expected = content(read_mesh(deck(), comm))[2]
+    found = content(read_mesh(deck((old, new)), comm))[2]
     assert {key: found[key] for key in expected} == like(expected)
 
 
@@ -366,7 +367,8 @@ def test_nodes_within_cubic_cells_follow_the_circles(module, quads):
         gmsh.clear()
         draw(1, quads, size)
         mesh = read_mesh(gmsh, MPI.COMM_SELF, order=3, circles=CIRCLES).mesh
-        f, x = fem.Function(fem.functionspace(mesh, ("Lagrange", 3))), ufl.SpatialCoordinate(mesh)
+        f = fem.Function(fem.functionspace(mesh, ("Lagrange", 3)))
+        x = ufl.SpatialCoordinate(mesh)
         f.interpolate(lambda x: np.sin(3 * x[0] + x[1]))
         dx = ufl.dx(metadata={"quadrature_degree": 8})
         off.append(
@@ -378,7 +380,8 @@ def test_nodes_within_cubic_cells_follow_the_circles(module, quads):
 @pytest.mark.mpi
 def test_a_mesh_is_gathered_as_it_was_read(comm, deck):
     mesh = read_mesh(deck(), comm, refine=2)
-    whole, again = gathered(mesh), gathered(read_mesh(mesh, comm))
+    whole = gathered(mesh)
+    again = gathered(read_mesh(mesh, comm))
     assert (whole is None) == (comm.rank > 0)
     if whole is not None:
         assert len(whole.cells) == 32

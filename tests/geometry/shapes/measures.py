@@ -31,7 +31,8 @@ class Facets(IntEnum):
 def area(joint, body, comm=MPI.COMM_SELF):
     """Area of a body, over all ranks."""
     cells = joint.cells_in(body)
-    degree, n_owned = joint.mesh.geometry.cmap.degree, joint.mesh.topology.index_map(2).size_local
+    degree = joint.mesh.geometry.cmap.degree
+    n_owned = joint.mesh.topology.index_map(2).size_local
     X, w = bulk_quadrature(TRIANGLE, degree)
     basis = cell_basis(joint.mesh, degree, cells[cells < n_owned], X)
     return comm.allreduce(float((basis.measure @ w).sum()))

@@ -12,7 +12,10 @@ from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.geometry.shapes.measures import area, facet_nodes
 
-R, BORE, OUTER, SLEEVE = 10.0, 13.98, 30.0, (10.05, 14.0)
+R = 10.0
+BORE = 13.98
+OUTER = 30.0
+SLEEVE = (10.05, 14.0)
 WALLS = [(10.02, 10.22), (10.22, 10.42)]  # of 0.02 R
 
 
@@ -74,7 +77,8 @@ def test_thin_walls_have_two_layers_of_sound_triangles(sleeves):
 
 
 def test_meshes_do_not_depend_on_units():
-    in_mm, in_m = made(), made(scale=1e-3)
+    in_mm = made()
+    in_m = made(scale=1e-3)
     np.testing.assert_allclose(
         in_m.mesh.geometry.x, 1e-3 * in_mm.mesh.geometry.x, rtol=1e-13, atol=1e-17
     )
@@ -86,7 +90,8 @@ def lame(
     """Radial displacement at inner and outer radius of a ring in plane strain, with the pressure
     within and held outside, or with it outside and free within: u = a r + b/r, sigma_r = 2 G (a/(1
     - 2 nu) - b/r^2)."""
-    G, k = material.E / 2 / (1 + material.nu), 1 - 2 * material.nu
+    G = material.E / 2 / (1 + material.nu)
+    k = 1 - 2 * material.nu
     at = lambda r: [2 * G / k, -2 * G / r**2]  # noqa: E731
     rows, right = (
         ([at(inner), [outer, 1 / outer]], [-pressure, 0])

@@ -12,7 +12,13 @@ from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.geometry.shapes.measures import area, facet_nodes, length
 from tests.solver.parts import ELASTIC
 
-R, DR, WIDTH, EDGE, LENGTH, SIZE, GROWTH = 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4
+R = 10.0
+DR = 0.1
+WIDTH = 40.0
+EDGE = 20.0
+LENGTH = 60.0
+SIZE = 1.5
+GROWTH = 0.4
 HOLE = R + DR
 
 
@@ -49,7 +55,8 @@ def test_areas_are_those_of_the_drawing(width, edge, end, comm):
 def test_every_part_is_there(half, pin, parts):
     """A whole pin has twice the area of a half one, a whole model that of two halves; the driven
     line halves it."""
-    joint, once = made(half=half, pin=pin), made()
+    joint = made(half=half, pin=pin)
+    once = made()
     assert area(joint, "pin") == pytest.approx(parts * area(once, "pin"), rel=1e-9)
     assert area(joint, "lug") == pytest.approx((2 - half) * area(once, "lug"), rel=1e-9)
     np.testing.assert_allclose(facet_nodes(joint, "flat")[..., 0], DR, atol=1e-12)
@@ -82,7 +89,8 @@ def test_a_rigid_pin_is_not_meshed():
 
 def test_meshes_do_not_depend_on_units():
     """In metres as in millimetres, to the last digits."""
-    in_mm, in_m = made(), made(scale=1e-3)
+    in_mm = made()
+    in_m = made(scale=1e-3)
     np.testing.assert_allclose(
         in_m.mesh.geometry.x, 1e-3 * in_mm.mesh.geometry.x, rtol=1e-13, atol=1e-17
     )
@@ -92,13 +100,15 @@ def test_meshes_do_not_depend_on_units():
 @pytest.mark.parametrize(("width", "edge"), [(24.0, 40.0), (60.0, 12.0)])
 def test_a_narrow_ligament_has_three_elements_across(width, edge):
     """However large the elements elsewhere may be."""
-    joint, ligament = made(width, edge, 4.0), min(width / 2, edge) - HOLE
+    joint = made(width, edge, 4.0)
+    ligament = min(width / 2, edge) - HOLE
     x = facet_nodes(joint, "hole")
     assert np.linalg.norm(x[:, 0] - x[:, 1], axis=1).max() <= ligament / 3 * HOLE / R
 
 
 def solved(**options):
-    joint, half = made(**options), options.get("half", True)
+    joint = made(**options)
+    half = options.get("half", True)
     supports = [Dirichlet("clamp", "clamp", axis) for axis in (0, 1)]
     supports += [
         Dirichlet("flat", "flat", 0, 1.0),
@@ -114,7 +124,8 @@ def solved(**options):
 @pytest.mark.parametrize("pin", ["half", "whole"])
 def test_the_whole_lug_is_twice_the_half(pin):
     """Forces balance where contact spreads over the node at which a closed hole begins."""
-    half, whole = solved(pin=pin), solved(pin=pin, half=False)
+    half = solved(pin=pin)
+    whole = solved(pin=pin, half=False)
     assert whole.reaction("flat")[0] == pytest.approx(half.reaction("flat")[0], rel=1e-4)
     for system in (half, whole):
         assert -system.reaction("clamp")[0] == pytest.approx(system.reaction("flat")[0], rel=1e-8)

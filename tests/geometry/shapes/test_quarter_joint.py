@@ -12,8 +12,11 @@ from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from archord.scene.presets.joint_geometry import JointGeometry
 from tests.geometry.shapes.measures import Cells, Facets
 
-R, DR, W = 1.0, 0.005, 10.0
-SIZE, GROWTH = 0.2, 0.4
+R = 1.0
+DR = 0.005
+W = 10.0
+SIZE = 0.2
+GROWTH = 0.4
 
 
 def made(size=SIZE, growth=GROWTH, width=W, ring=False, comm=MPI.COMM_SELF, **options):
@@ -55,17 +58,20 @@ def area(joint, tag, comm=MPI.COMM_SELF):
 def sector(radius, n):
     """Area of a quarter disc whose arc consists of ``n`` parabolas through points of the circle."""
     half = np.pi / 4 / n
-    chord, height = 2 * np.sin(half), 1 - np.cos(half)
+    chord = 2 * np.sin(half)
+    height = 1 - np.cos(half)
     return radius**2 * n * (np.sin(half) * np.cos(half) + 2 / 3 * chord * height)
 
 
 def test_elements_shrink_toward_the_edge_of_the_contact():
     """Edges of both arcs are a quarter as long at the given angle, and elsewhere no longer than
     without it."""
-    angle, fine = 1.1, SIZE / 4
+    angle = 1.1
+    fine = SIZE / 4
     joint = made(edge=(angle, fine))
     for tag, centre in ((Facets.PIN_ARC, -DR), (Facets.HOLE_ARC, 0.0)):
-        x, length = facet_nodes(joint, tag) - [0, centre], edge_lengths(joint, tag)
+        x = facet_nodes(joint, tag) - [0, centre]
+        length = edge_lengths(joint, tag)
         middle = x.mean(axis=1)
         away = np.abs(np.arctan2(middle[:, 0], -middle[:, 1]) - angle)
         assert length[away.argmin()] == pytest.approx(fine, rel=0.35)
@@ -100,7 +106,8 @@ def test_areas_and_edges(size, comm):
         lengths = edge_lengths(joint, tag)
         assert lengths.max(initial=0) <= size * (1 + DR)
         assert lengths.min(initial=1) >= size * (1 - 1 / n) * 0.99
-    pin, block = area(joint, Cells.PIN, comm), area(joint, Cells.BLOCK, comm)
+    pin = area(joint, Cells.PIN, comm)
+    block = area(joint, Cells.BLOCK, comm)
     assert pin == pytest.approx(sector(R, n), rel=1e-12)
     assert block == pytest.approx(W**2 - sector(R + DR, n), rel=1e-12)
 

@@ -30,7 +30,8 @@ def yielding_curve(onset: float = 0.4, nodes: int = 61) -> JointCurve:
         h = 1e-6
         return np.where(x > 0, (f(x + h) - f(np.maximum(x - h, 0.0))) / (2 * h), 0.0)
 
-    one, none = np.ones_like(x), np.zeros_like(x)
+    one = np.ones_like(x)
+    none = np.zeros_like(x)
     table = [values for f in (loading, elastic, ratio) for values in (f(x), slope(f, x))]
     return JointCurve(
         x,

@@ -52,13 +52,15 @@ def test_the_error_of_k_is_that_of_a_straight_line():
     """p0 R/(E* dR) = k delta/dR is a line through the origin: k and its error in closed form."""
     run = curve(0.83, noise=0.05, seed=3)
     found = fit_curve(group([run]), quantity="p0")
-    y, x = run.p0 / 0.005, LOADS
+    y = run.p0 / 0.005
+    x = LOADS
     k = (x @ y) / (x @ x)
     assert found.k.value == pytest.approx(k, rel=1e-8)
     assert found.k.error == pytest.approx(
         np.sqrt(((y - k * x) ** 2).sum() / 19 / (x @ x)), rel=1e-6
     )
-    off, r2 = k * x / y - 1, 1 - ((y - k * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
+    off = k * x / y - 1
+    r2 = 1 - ((y - k * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
     quality = (r2, np.sqrt((off**2).mean()), max(off, key=abs), 20)
     assert found.quality == pytest.approx(quality, rel=1e-9)
 
@@ -73,7 +75,8 @@ def test_units_do_not_matter(c):
     for name, found in a.joint.estimates.items():
         assert b.joint.estimates[name].value == pytest.approx(found.value, rel=1e-7)
         assert b.joint.estimates[name].error == pytest.approx(found.error, rel=1e-5)
-    law, other = a.law(), b.law()
+    law = a.law()
+    other = b.law()
     delta = np.array([0.3, 1.1, 2.0]) * 0.005
     np.testing.assert_allclose(
         other.force(delta * 1e-2) / (2.1e11 * 1e-2), law.force(delta), rtol=1e-6

@@ -23,7 +23,8 @@ def contact_angle(delta):
 def test_plastic_law_is_the_force_of_the_cut_parabola(delta, k, c):
     """P = 2 int_0^l min(p0 (1 - x^2/l^2), c sigY) dx, before and beyond the onset."""
     joint = replace(JOINT, k=k, c=c)
-    p0, plateau = k * JOINT.E_star * delta / JOINT.radius, c * 300.0
+    p0 = k * JOINT.E_star * delta / JOINT.radius
+    plateau = c * 300.0
     edge = np.sqrt(max(0.0, 1 - plateau / p0))
     l = 2 * JOINT.radius * np.sin(contact_angle(delta) / 2)  # noqa: E741
 
@@ -46,8 +47,10 @@ def test_up_to_the_onset_the_plastic_law_is_the_elastic_one(c):
     """To round-off, and at delta0 Winkler's pressure is the plateau; without a yield stress,
     everywhere."""
     joint = replace(JOINT, c=c)
-    lower, deep = np.linspace(0, joint.first_yield, 7), 10 * joint.first_yield
-    plastic, elastic = plastic_winkler(joint, lower), parabola(joint, lower)
+    lower = np.linspace(0, joint.first_yield, 7)
+    deep = 10 * joint.first_yield
+    plastic = plastic_winkler(joint, lower)
+    elastic = parabola(joint, lower)
     np.testing.assert_allclose(plastic.load, elastic.load, rtol=1e-14)
     eq9 = (
         8 / 3 * joint.k * joint.E_star * DEPTHS * np.sqrt(DEPTHS / (2 * (joint.clearance + DEPTHS)))
@@ -70,7 +73,8 @@ def test_plastic_law_joins_the_elastic_one_smoothly():
     """The same force and slope at delta0; above it less and less than elastic."""
     delta0 = JOINT.first_yield
     assert 0.85 * JOINT.E_star * delta0 / JOINT.radius == pytest.approx(JOINT.yield_stress)
-    elastic, plastic = LAWS["paper"], LAWS["paper-plastic"]
+    elastic = LAWS["paper"]
+    plastic = LAWS["paper-plastic"]
     near = delta0 * np.array([1 - 1e-12, 1 + 1e-12])
     assert plastic.force(JOINT, near) == pytest.approx(elastic.force(JOINT, near), rel=1e-8)
     assert plastic.stiffness(JOINT, near) == pytest.approx(elastic.stiffness(JOINT, near), rel=1e-5)
@@ -85,7 +89,8 @@ def test_far_beyond_yield_the_chord_is_under_the_yield_stress():
     soft = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, block_yield=1e-12, k=0.8, c=1.3)
     delta = np.array([0.1, 1.0]) * 1e-3
     u = soft.first_yield / delta
-    state, chord = plastic_winkler(soft, delta), 2 * np.sqrt(delta / (2 * (1e-3 + delta)))
+    state = plastic_winkler(soft, delta)
+    chord = 2 * np.sqrt(delta / (2 * (1e-3 + delta)))
     ratio = state.load / (2 * 1.3e-12 * chord)
     np.testing.assert_allclose(
         ratio, 1 - u / 4, rtol=0, atol=2e-14
@@ -96,7 +101,8 @@ def test_far_beyond_yield_the_chord_is_under_the_yield_stress():
 
 @pytest.mark.parametrize("delta", DEPTHS)
 def test_winkler_law_is_the_force_of_the_foundation(delta):
-    eps, dR = contact_angle(delta), JOINT.clearance
+    eps = contact_angle(delta)
+    dR = JOINT.clearance
 
     def vertical(phi):
         spring = 0.85 * JOINT.E_star / JOINT.radius

@@ -16,7 +16,8 @@ from archord.postprocess.laws.laws import LAWS
 
 JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, length=11.0)
 UNIT = JOINT.E_star * JOINT.clearance
-R1, R2 = 7.0, 7.03
+R1 = 7.0
+R2 = 7.03
 ROWS = json.loads((Path(__file__).parents[2] / "reference" / "persson.json").read_text())["rows"]
 NAMES = [
     "johnson",
@@ -76,7 +77,8 @@ def test_displacement_is_the_printed_form(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_force_is_the_lower_root_of_the_printed_form(name):
     """Found by brentq between zero and the maximum of delta(P), which a search finds."""
-    law, printed = LAWS[name], PRINTED[name]
+    law = LAWS[name]
+    printed = PRINTED[name]
     top = minimize_scalar(
         lambda P: -printed(P), bounds=(1e-9 * UNIT, 20 * UNIT), method="bounded"
     ).x
@@ -105,7 +107,8 @@ def test_force_is_the_lower_root_of_the_printed_form(name):
 )
 def test_load_limit_is_where_the_displacement_turns_back(name, limit):
     """In E* dR, by a search for the largest displacement of the printed form."""
-    law, printed = LAWS[name], PRINTED[name]
+    law = LAWS[name]
+    printed = PRINTED[name]
     found = minimize_scalar(
         lambda x: -printed(x * UNIT), bounds=(0.1, 10), method="bounded", options={"xatol": 1e-9}
     )
@@ -133,7 +136,8 @@ def test_radzimovsky_means_the_width_of_the_contact():
 def test_dubowsky_freudenstein_is_a_strip_on_half_spaces(P):
     """Boussinesq's integral of Hertz's pressure on a strip of length L, at its centre, for a <<
     L."""
-    a, L = float(half_width(P)), JOINT.length
+    a = float(half_width(P))
+    L = JOINT.length
     # along the strip: integral of 1/r = 2 arsinh(L/2x); across it x = a sin(t)
     across = quad(
         lambda t: np.cos(t) ** 2 * 2 * np.arcsinh(L / (2 * a * np.sin(t))),
@@ -152,10 +156,8 @@ def test_hertz_carries_the_load_and_closes_the_gap():
     """The ellipse integrates to P, and its surfaces have the curvature 1/R*: u'' = -2 p0/(E* a)
     (Johnson, eq. 4.42)."""
     P = 0.1 * UNIT
-    p0, a = (
-        float(LAWS["hertz"].at_load(JOINT, P).peak_pressure),
-        7.0 * float(LAWS["hertz"].at_load(JOINT, P).angle),
-    )
+    p0 = float(LAWS["hertz"].at_load(JOINT, P).peak_pressure)
+    a = 7.0 * float(LAWS["hertz"].at_load(JOINT, P).angle)
     assert 2 * a * quad(lambda t: p0 * np.cos(t) ** 2, 0, np.pi / 2)[0] == pytest.approx(
         P, rel=1e-12
     )
@@ -168,7 +170,8 @@ def test_lankarani_nikravesh_is_a_ball_in_a_socket():
     delta = 0.001
     law = LAWS["lankarani-nikravesh"]
     P = float(law.force(JOINT, delta))
-    p0, a = float(law.at_load(JOINT, P).peak_pressure), np.sqrt(7.0 * 7.03 / 0.03 * delta)
+    p0 = float(law.at_load(JOINT, P).peak_pressure)
+    a = np.sqrt(7.0 * 7.03 / 0.03 * delta)
     total = quad(lambda r: 2 * np.pi * r * p0 * np.sqrt(1 - (r / a) ** 2), 0, a)[0]
     assert 11.0 * law.force(JOINT, delta) == pytest.approx(total, rel=1e-9)
     assert np.pi * p0 * a / (2 * JOINT.E_star) == pytest.approx(delta, rel=1e-9)
@@ -217,7 +220,8 @@ def test_persson_satisfies_the_contact_equation(alpha, load):
     # with phi = eps sin(t) the integrands are smooth and periodic, for which the midpoint rule is
     # exact
     t = np.pi * ((np.arange(4000) + 0.5) / 4000 - 0.5)
-    phi, dphi = eps * np.sin(t), eps * np.cos(t) * np.pi / 4000
+    phi = eps * np.sin(t)
+    dphi = eps * np.cos(t) * np.pi / 4000
     p = persson_pressure(joint, P, eps, phi)
     assert (p * np.cos(phi) * dphi).sum() == pytest.approx(P, rel=1e-8)
     n = np.arange(2, 1500)

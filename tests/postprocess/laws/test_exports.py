@@ -56,15 +56,16 @@ int main(void) {
 """
 OCTAVE_CLIENT = """
 addpath('.'); warning('off', 'archord:outside');
-law = law(); about = jsondecode(law.about); assert(law.advance(1, 2) == 2 && law.in_range(law.range));
+law = law(); about = jsondecode(law.about);
+assert(law.advance(1, 2) == 2 && law.in_range(law.range));
 assert(isnan(law.advance(0.1, NaN)) && isnan(law.advance(NaN, 0.1)) && ~law.in_range(NaN));
 file = fopen('in', 'r'); in = fread(file, [2 Inf], 'double'); fclose(file);
 out = zeros(6, columns(in));
 for k = 1:columns(in)
     x = in(1, k); deepest = in(2, k);
     [P, stiffness] = law.force(x, deepest);
-    out(:, k) = [P; stiffness; law.expected_error(x, deepest); law.residual(deepest); law.peak_pressure(x); ...
-        law.contact_angle(x)];
+    out(:, k) = [P; stiffness; law.expected_error(x, deepest); law.residual(deepest); ...
+        law.peak_pressure(x); law.contact_angle(x)];
 end
 file = fopen('out', 'w'); fwrite(file, out, 'double'); fclose(file);
 """
@@ -75,7 +76,8 @@ def curves() -> dict[str, JointCurve]:
     strings dislike."""
     about = {"title": 'a "joint" of */ formulas \\', "units": ["mm", "N/mm"], "largest error": 0.01}
     yielding = replace(yielding_curve(), length=0.05, force=7e3, pressure=210.0, about=about)
-    one, none = np.ones_like(yielding.x), np.zeros_like(yielding.x)
+    one = np.ones_like(yielding.x)
+    none = np.zeros_like(yielding.x)
     elastic = replace(yielding, back=yielding.y, dback=yielding.dy, ratio=one, dratio=none)
     return {
         "yielding": yielding,
@@ -108,7 +110,8 @@ def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
     table says; but for the stiffness next to where the joint opens on its way back, which has a
     logarithm's singularity."""
     delta, deepest = pairs.T
-    state, first = curve.at(delta, deepest), curve.at(delta)
+    state = curve.at(delta, deepest)
+    first = curve.at(delta)
     wanted = (
         state.load,
         state.stiffness,
@@ -234,9 +237,11 @@ def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) ->
 def test_beyond_its_range_a_law_is_a_force_alone(curve: JointCurve) -> None:
     """The force goes on along its tangent; what else is said there is nan, and so is everything of
     nan."""
-    end, step = curve.limit, 1e-6 * curve.limit
+    end = curve.limit
+    step = 1e-6 * curve.limit
     beyond = np.array([1 + 1e-8, 1.2, 100.0]) * end
-    state, edge = curve.at(beyond), curve.at([end])
+    state = curve.at(beyond)
+    edge = curve.at([end])
     np.testing.assert_allclose(state.load, edge.load + edge.stiffness * (beyond - end), rtol=1e-9)
     assert np.isnan(state[1:]).all()
     assert np.isfinite(edge).all()
@@ -296,8 +301,14 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
     for name in ("law.for", "law"):
         with pytest.raises(ValueError, match=r"\.py, \.h, \.mo, \.m or \.json"):
             export_law(curve, tmp_path / name)
-    names = "lug-pin.h 2.py force.m class.py math.py print.py math.h time.h string.h namespace.h restrict.h Bolzen_ä.py"
-    names += " model.mo end.mo Real.mo Modelica.mo sqrt.mo max.m function.m endif.m parfor.m plot.m the_law.m _x.h"
+    names = (
+        "lug-pin.h 2.py force.m class.py math.py print.py math.h time.h string.h namespace.h "
+        "restrict.h Bolzen_ä.py"
+    )
+    names += (
+        " model.mo end.mo Real.mo Modelica.mo sqrt.mo max.m function.m endif.m parfor.m plot.m "
+        "the_law.m _x.h"
+    )
     for name in [*names.split(), f"{'x' * 64}.m", "a b.h"]:
         with pytest.raises(
             ValueError, match=f"^{re.escape(name)}: .* cannot name a law: .*; choose another name"
@@ -372,7 +383,8 @@ def test_every_export_tells_the_unit_of_force_and_the_length(
     exports = [word for file in files.values() for word in ("--export", str(file))]
     scene = str(Path(__file__).parents[3] / "scenes" / "steel_pin.toml")
     assert run(["law", "--scene", scene, *sets, *exports]) == 0
-    law, told = load(files["py"]), json.loads(files["json"].read_text())
+    law = load(files["py"])
+    told = json.loads(files["json"].read_text())
     assert ("mm", unit, pin) == (law.LENGTH_UNIT, law.FORCE_UNIT, law.PIN_LENGTH)
     assert (told["length_unit"], told["force_unit"], told["pin_length"]) == ("mm", unit, pin)
     constants = {

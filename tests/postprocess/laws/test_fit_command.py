@@ -43,9 +43,13 @@ def test_a_law_that_misses_its_runs_is_told(runs, tmp_path, name, capsys):
     """From 5 % rms on, and in the exported law; the table has the same numbers."""
     assert run(["fit", str(runs[name]), "--json", str(tmp_path / "law.json")]) == 0
     data = json.loads((tmp_path / "law.json").read_text())
-    law, row = FittedLaw.model_validate(data["law"]), data["fits"][0]
+    law = FittedLaw.model_validate(data["law"])
+    row = data["fits"][0]
     assert (law.rms, law.largest) == (row["rms"], row["largest"])
-    said = f"archord: warning: the law misses P of its own runs by {law.rms:.1%} rms, {law.largest:+.1%} at worst"
+    said = (
+        f"archord: warning: the law misses P of its own runs by {law.rms:.1%} rms, "
+        f"{law.largest:+.1%} at worst"
+    )
     assert capsys.readouterr().err.startswith(said if law.rms > 0.05 else "")
 
 
@@ -95,18 +99,36 @@ def test_two_meshes_give_a_mesh_error(runs, capsys):
     ("arguments", "said"),
     [
         (["{empty}"], "{empty}: is not a run folder: scene.toml is missing."),
-        (["{elastic}", "--range", "3", "4"], "{elastic}: has no step with contact from 3 to 4 clearances;"),
+        (
+            ["{elastic}", "--range", "3", "4"],
+            "{elastic}: has no step with contact from 3 to 4 clearances;",
+        ),
         (["{elastic}", "{plastic}"], "{plastic}: analysis.plane = 'stress' does not fit"),
-        (["{elastic}", "{elastic}"], "{elastic}: is the same scene on the same mesh as {elastic}; give one of them."),
-        (["{elastic}", "--json", "{empty}/no/x"], "{empty}/no/x: cannot be written: {empty}/no is not a folder."),
+        (
+            ["{elastic}", "{elastic}"],
+            "{elastic}: is the same scene on the same mesh as {elastic}; give one of them.",
+        ),
+        (
+            ["{elastic}", "--json", "{empty}/no/x"],
+            "{empty}/no/x: cannot be written: {empty}/no is not a folder.",
+        ),
         (["{elastic}", "--python", "{empty}"], "{empty}: cannot be written: it is a folder"),
-        (["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"], "{empty}/x.xyz: must end in one of "),
-        (["{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
-        (["{coarse}", "{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
+        (
+            ["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"],
+            "{empty}/x.xyz: must end in one of ",
+        ),
+        (
+            ["{apart}"],
+            "{apart}: the bodies never touch in this run, so there is no law to fit to it.",
+        ),
+        (
+            ["{coarse}", "{apart}"],
+            "{apart}: the bodies never touch in this run, so there is no law to fit to it.",
+        ),
         (["{begun}"], "{begun}: holds no accepted step."),
         (["{broken}"], "{broken}/history.csv: cannot be read as the history of a run."),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_one_sentence(runs, tmp_path, refused, arguments, said):
     folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken", "apart")}
     (tmp_path / "empty").mkdir()

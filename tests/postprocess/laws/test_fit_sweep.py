@@ -73,7 +73,10 @@ def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys
     they do not."""
     assert run(["fit", str(solved)]) == 0
     assert "small blocks" not in read_rows(solved / "fit.csv")[1]
-    listed = "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }, { pin.whole = true }]\n[base]"
+    listed = (
+        "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }, { pin.whole = true "
+        "}]\n[base]"
+    )
     (tmp_path / "blocks.sweep.toml").write_text(listed + SWEEP.partition("[base]")[2])
     assert (
         run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0

@@ -18,9 +18,18 @@ from tests.postprocess.laws.modelica import functions_of
 
 ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
 PLASTIC = FittedLaw(
-    k=0.83 + 1e-16, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, c=1 / 3, sigY=230.7, c_error=0.02,
-    fitted_to=('a "quoted"\nrun """',), rms=0.1326, largest=-0.35,
-)  # fmt: skip
+    k=0.83 + 1e-16,
+    E_star=1.05e5,
+    R=10.0,
+    dR=0.05,
+    k_error=0.001,
+    c=1 / 3,
+    sigY=230.7,
+    c_error=0.02,
+    fitted_to=('a "quoted"\nrun """',),
+    rms=0.1326,
+    largest=-0.35,
+)
 DELTA = np.array([-0.1, 0.0, 1e-9, 0.003, 0.01, 0.02, 0.1, 1.0])
 
 
@@ -35,9 +44,10 @@ def test_json_gives_the_law_back(law):
 
 
 def test_a_file_of_version_0_1_is_read():
-    text = """{"law": {"k": 0.8559703192031349, "E_star": 105000.0, "R": 10.0, "dR": 0.05, "k_error": 0.00815,
-    "c": 0.9390129955486293, "sigY": 230.76923076923077, "c_error": 0.00247, "fitted_range": [0.1, 2.0],
-    "plane": "stress", "length_unit": "mm", "force_unit": "N/mm", "fitted_to": ["runs/steel_stress"]}, "laws": []}"""
+    text = """{"law": {"k": 0.8559703192031349, "E_star": 105000.0, "R": 10.0, "dR": 0.05,
+    "k_error": 0.00815, "c": 0.9390129955486293, "sigY": 230.76923076923077, "c_error": 0.00247,
+    "fitted_range": [0.1, 2.0], "plane": "stress", "length_unit": "mm", "force_unit": "N/mm",
+    "fitted_to": ["runs/steel_stress"]}, "laws": []}"""
     assert FittedLaw.from_json(text).force(0.1) == pytest.approx(4674.72, rel=5e-3)  # P of the run
 
 

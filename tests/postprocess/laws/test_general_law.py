@@ -57,7 +57,8 @@ def joints(
     yields: tuple[str, ...] = ("none", "both", "pin", "block", "pin weaker", "block weaker"),
 ) -> LawJoint:
     """Joints all over the range."""
-    plane, kind = draw(some.sampled_from(("strain", "stress"))), draw(some.sampled_from(yields))
+    plane = draw(some.sampled_from(("strain", "stress")))
+    kind = draw(some.sampled_from(yields))
     ratio = math.exp(draw(some.floats(*map(math.log, RATIOS))))
     if kind in ("none", "block") and draw(some.booleans()):
         ratio = math.inf
@@ -75,7 +76,8 @@ def test_laws_of_nature(pin: LawJoint, deepest: float) -> None:
     law = general_law(pin)
     x = X * pin.clearance
     deepest *= pin.clearance
-    first, back = law.at(x), law.at(x, deepest)
+    first = law.at(x)
+    back = law.at(x, deepest)
     assert law.at([-1.0, 0.0]).load.tolist() == [0.0, 0.0]
     assert (first.stiffness >= 0).all()
     assert (np.diff(first.load) >= 0).all()
@@ -98,7 +100,8 @@ def test_laws_of_nature(pin: LawJoint, deepest: float) -> None:
 def test_a_cycle_loses_energy_and_a_deeper_one_more(pin: LawJoint, deepest: float) -> None:
     """The work lost between first loading and way back is not negative, and grows with the deepest
     displacement, but for what the law states as the error of its way back."""
-    law, lost = general_law(pin), 0.0
+    law = general_law(pin)
+    lost = 0.0
     for depth in (deepest, 1.4 * deepest, 2 * deepest):
         x = np.linspace(0.0, depth * pin.clearance, 4001)
         back = law.at(x, x[-1])
@@ -152,10 +155,8 @@ def test_units_do_not_matter(pin: LawJoint, length: float, stress: float) -> Non
         if (value := getattr(pin, name)) is not None
     }
     x = X * pin.clearance
-    mine, theirs = (
-        general_law(pin).at(x, x[120]),
-        general_law(replace(pin, **scaled)).at(x * length, x[120] * length),
-    )
+    mine = general_law(pin).at(x, x[120])
+    theirs = general_law(replace(pin, **scaled)).at(x * length, x[120] * length)
     np.testing.assert_allclose(
         theirs.load, mine.load * stress * length, rtol=1e-6, atol=1e-12 * stress * length
     )

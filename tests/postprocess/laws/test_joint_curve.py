@@ -17,7 +17,8 @@ X = np.linspace(0.0, 3.0, 500)
 def test_slopes_are_those_of_the_force() -> None:
     """dP/d(delta) is the derivative of P, loading and coming back, but at kinks: where it opens,
     and the deepest."""
-    curve, h = yielding_curve(), 1e-7
+    curve = yielding_curve()
+    h = 1e-7
     for deepest in (0.0, 1.0, 2.5):
         z = float(curve.residual(np.array([deepest]))[0])
         x = X[(np.abs(X - deepest) > 1e-3) & (np.abs(X - z) > 1e-3) & (X > 0)]
@@ -31,7 +32,8 @@ def test_both_branches_meet_at_the_deepest_point_and_the_way_back_is_below() -> 
     curve = yielding_curve()
     first = curve.at(X).load
     for deepest in (0.3, 1.0, 2.5):
-        back, z = curve.at(X, deepest).load, float(curve.residual(np.array([deepest]))[0])
+        back = curve.at(X, deepest).load
+        z = float(curve.residual(np.array([deepest]))[0])
         assert (back <= first).all()
         assert (np.diff(back) >= 0).all()
         assert 0 <= z < deepest
@@ -70,8 +72,10 @@ def test_the_inverse_gives_the_displacement_back() -> None:
 def test_first_touch_is_line_contact() -> None:
     """P at first touch solves pi x/y + ln(y/(1 + y)) = F, and its slope tends to zero with the
     logarithm."""
-    curve, x = yielding_curve(), np.geomspace(1e-9, 0.019, 30)
-    y, a = curve.at(x).load, curve.touch[0]
+    curve = yielding_curve()
+    x = np.geomspace(1e-9, 0.019, 30)
+    y = curve.at(x).load
+    a = curve.touch[0]
     F = np.pi * x / y + np.log(y / (1 + y))
     np.testing.assert_allclose(F, a + curve.touch[1] * x + curve.touch[2] * x * x, rtol=1e-12)
     y, slope = first_touch(curve.touch, np.array([1e-200]))

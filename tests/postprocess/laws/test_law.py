@@ -64,7 +64,8 @@ def test_units_do_not_matter(name):
 @pytest.mark.parametrize("name", WITH_DISPLACEMENT)
 def test_outside_the_range_every_law_says_so(name):
     """nan and a warning; inside no word."""
-    law, inside = LAWS[name], LAWS[name].limit(JOINT) * np.array([0.0, 0.5, 1.0])
+    law = LAWS[name]
+    inside = LAWS[name].limit(JOINT) * np.array([0.0, 0.5, 1.0])
     assert np.isfinite(law.force(JOINT, inside)).all()
     both = law.limit(JOINT) * np.array([-0.1, 0.5, 1.01])
     with pytest.warns(LawRangeWarning, match=re.escape(f"{name}: delta = ")):
@@ -103,7 +104,8 @@ def test_half_space_laws_have_hertz_pressure_in_its_range(name):
     )
 
 
-WIDE, UNLIKE = {"clearance": 0.3}, {"pin_share": 0.25, "plane": "strain", "nu": 0.3}
+WIDE = {"clearance": 0.3}
+UNLIKE = {"pin_share": 0.25, "plane": "strain", "nu": 0.3}
 STRAY = [
     (name, WIDE, "no small clearance")
     for name in ("paper", "paper-plastic", "winkler", "liu", "persson")
@@ -298,7 +300,8 @@ def test_the_room_needs_no_finite_elements():
         "import importlib, pkgutil, sys; import archord.postprocess.laws as room\n"
         "names = [module.name for module in pkgutil.iter_modules(room.__path__)]\n"
         "for name in names: importlib.import_module(f'{room.__name__}.{name}')\n"
-        "print(len(names), {'dolfinx', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'matplotlib'} & {*sys.modules})"
+        "print(len(names), {'dolfinx', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'matplotlib'} & "
+        "{*sys.modules})"
     )
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

@@ -22,7 +22,9 @@ from archord.scene.file import load_scene
 from tests.output.run_files import solved
 
 SCENES = Path(__file__).parents[3] / "scenes"
-ONSET, END = 0.6, 2.0  # of yielding, and of the range, in clearances
+# of yielding, and of the range, in clearances
+ONSET = 0.6
+END = 2.0
 
 
 def elastic(u):
@@ -38,7 +40,8 @@ def opens(x):
 def dissipated(x):
     """int P dz: what is lost as unloading shifts."""
     fine = np.linspace(0.0, END, 20001)
-    z, P = opens(fine), elastic(fine - opens(fine))
+    z = opens(fine)
+    P = elastic(fine - opens(fine))
     return np.interp(x, fine, np.append(0.0, np.cumsum(np.diff(z) * (P[1:] + P[:-1]) / 2)))
 
 
@@ -55,15 +58,23 @@ def synthetic(x, yields=True, keep=None, **changes):
     `elastic`."""
     scene = paper_joint(0.1, 6, 0.002 if yields else None)
     deepest = np.maximum.accumulate(x)
-    P, lost = elastic(x - yields * opens(deepest)), yields * dissipated(deepest)
-    dR, unit = scene.joint.dR, scene.E_star * scene.joint.dR
+    P = elastic(x - yields * opens(deepest))
+    lost = yields * dissipated(deepest)
+    dR = scene.joint.dR
+    unit = scene.E_star * scene.joint.dR
     columns = {"delta": x * dR, "P": P * unit, "p0": np.sqrt(P) * unit, "eps": np.sqrt(P)}
     columns["plastic_dissipation"] = lost * dR * unit
     columns = {name: list(np.asarray(values)[:keep]) for name, values in columns.items()} | changes
     return SimpleNamespace(
-        folder=SCENES, scene=scene, columns=columns, units={"delta": "mm", "P": "N/mm"},
-        has_contact=True, steps=len(columns["P"]), number=lambda step: step, summary={"versions": {}},
-    )  # fmt: skip
+        folder=SCENES,
+        scene=scene,
+        columns=columns,
+        units={"delta": "mm", "P": "N/mm"},
+        has_contact=True,
+        steps=len(columns["P"]),
+        number=lambda step: step,
+        summary={"versions": {}},
+    )
 
 
 CYCLES = path(0.4, 0.0, 1.0, 0.0, 1.5, 0.0, END, 0.0)
@@ -73,8 +84,10 @@ SHIFTED = synthetic(CYCLES)
 def test_it_passes_through_the_steps_of_the_run() -> None:
     """Force, pressure and angle at the steps of first loading; the force at those of the last
     unloading."""
-    curve, run = run_table(SHIFTED), SHIFTED.columns
-    delta, P = np.array(run["delta"]), np.array(run["P"])
+    curve = run_table(SHIFTED)
+    run = SHIFTED.columns
+    delta = np.array(run["delta"])
+    P = np.array(run["P"])
     first = np.append(True, np.diff(np.maximum.accumulate(delta)) > 0)
     state = curve.at(delta[first])
     np.testing.assert_allclose(state.load, P[first], rtol=1e-12)
@@ -96,10 +109,8 @@ def test_it_finds_every_way_back_from_one() -> None:
     assert (curve.residual(np.linspace(0.0, curve.limit, 400)) >= 0).all()
     for most in deepest:
         x = np.linspace(0.0, most, 2001)
-        there, back = (
-            curve.at(x * curve.length).load,
-            curve.at(x * curve.length, most * curve.length).load,
-        )
+        there = curve.at(x * curve.length).load
+        back = curve.at(x * curve.length, most * curve.length).load
         assert (back <= there).all()
         lost = np.sum((there - back)[1:] + (there - back)[:-1]) / 2 * (x[1] / curve.force)
         work = np.sum(there[1:] + there[:-1]) / 2 * (x[1] / curve.force)
@@ -109,7 +120,8 @@ def test_it_finds_every_way_back_from_one() -> None:
 def test_errors_are_measured_where_they_can_be() -> None:
     """9 in 10 forces between steps lie within the cubic's; that of the way back is of the
     unloadings not used."""
-    coarse, x = run_table(synthetic(path(END, 0.0, n=10))), np.linspace(0.0, END, 401)
+    coarse = run_table(synthetic(path(END, 0.0, n=10)))
+    x = np.linspace(0.0, END, 401)
     state = coarse.at(x * coarse.length)
     wrong = np.abs(state.load / coarse.force - elastic(x - opens(x)))
     assert np.mean(wrong <= state.error / coarse.force + 1e-12) > 0.9
@@ -162,8 +174,10 @@ def test_an_unloading_that_ends_early_is_extended() -> None:
 def general(**changes):
     """A run of a general scene whose pin is pushed along -x and touches at 0.13."""
     scene = load_scene(SCENES / "bushing.toml", ["load.displacement=-0.8"])
-    run, q = synthetic(path(0.8), yields=False), path(0.8)
-    run.scene, run.units = scene, {"pull displacement": "mm", "pull force": "N/mm"}
+    run = synthetic(path(0.8), yields=False)
+    q = path(0.8)
+    run.scene = scene
+    run.units = {"pull displacement": "mm", "pull force": "N/mm"}
     steps = np.append(0.0, q)  # the sleeve is pressed in first
     run.columns = {
         "pull displacement": -steps,
@@ -196,17 +210,25 @@ falling[12] = falling[11]
 @pytest.mark.parametrize(
     ("run", "of", "said"),
     [
-        (synthetic(path(END, n=5)), None, "has 5 steps of first loading with contact, and a table needs 6"),
+        (
+            synthetic(path(END, n=5)),
+            None,
+            "has 5 steps of first loading with contact, and a table needs 6",
+        ),
         (synthetic(path(END), P=[0.0] * 20), None, "has 0 steps"),
         (synthetic(path(END)), None, "yields and never unloads"),
         (synthetic(path(0.3, 0.0, END)), None, "yields and never unloads"),
         (synthetic(path(END, 1.8, n=20), keep=21), None, "unloads in 2 steps"),
-        (synthetic(path(END), yields=False, P=falling), None, "does not rise from 0.006 mm (step 12) to 0.0065 mm"),
+        (
+            synthetic(path(END), yields=False, P=falling),
+            None,
+            "does not rise from 0.006 mm (step 12) to 0.0065 mm",
+        ),
         (synthetic(path(END)), "pull", "which has one load"),
         (general(), "press", "--of must name one of its loads: pull."),
         (general(**{"pull force": [-1.0] * 21}), None, "before the load moves"),
     ],
-)  # fmt: skip
+)
 def test_what_makes_no_table_is_refused(run, of, said) -> None:
     with pytest.raises(InputError, match=said.replace("(", r"\(").replace(")", r"\)")):
         run_table(run, of)
@@ -231,7 +253,8 @@ def test_runs_of_steel_that_hardens_become_laws(tmp_path, capsys, refused) -> No
         run.columns = {key: values[1::2] for key, values in run.columns.items()}
         run.steps //= 2
         curve = run_table(run)
-        there, back = curve.at(delta[:12]), curve.at(delta[12:], delta.max())
+        there = curve.at(delta[:12])
+        back = curve.at(delta[12:], delta.max())
         assert (np.abs(there.load - P[:12]) <= there.error + 1e-9 * P.max()).all()
         assert (np.abs(back.load - P[12:]) <= back.error + 1e-9 * P.max()).all()
     file = tmp_path / "law.json"

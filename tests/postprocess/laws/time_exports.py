@@ -56,7 +56,8 @@ def main() -> None:
             numpy = (perf_counter() - start) / len(numbers)
             c = float(done.stdout.split()[0])
             print(
-                f"{branch}: C {1e6 * c:.2f}, Python {1e6 * python:.1f}, numpy (arrays) {1e6 * numpy:.2f} microseconds"
+                f"{branch}: C {1e6 * c:.2f}, Python {1e6 * python:.1f}, numpy (arrays) "
+                f"{1e6 * numpy:.2f} microseconds"
             )
 
 

@@ -20,7 +20,8 @@ from archord.solver.problem import Body, Interaction, Problem, Rigid
 from tests.solver.contact.test_tangent import matrix
 from tests.solver.parts import blocks, commit, contact_force, coordinates, nodes_of, solve, space
 
-E, NU = 1000.0, 0.3
+E = 1000.0
+NU = 0.3
 
 STEEL = Elastic(E, NU, "axisymmetric")
 DEPTH = 0.01
@@ -149,7 +150,8 @@ def far_field(x: np.ndarray, force: float) -> np.ndarray:
     """Displacements ``(n, 2)`` of a half space z < 0 under a force down at its origin
     (Boussinesq)."""
     mu = E / (2 * (1 + NU))
-    r, depth = x[:, 0], -x[:, 1]
+    r = x[:, 0]
+    depth = -x[:, 1]
     R = np.hypot(r, depth)
     factor = force / (4 * np.pi * mu)
     radial = factor * (r * depth / R**3 - (1 - 2 * NU) * r / (R * (R + depth)))

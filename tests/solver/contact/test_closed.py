@@ -29,8 +29,10 @@ def rings(
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
-        centre, whole = geo.addPoint(0, 0, 0), quarters == 4
-        arcs, ends = {}, []
+        centre = geo.addPoint(0, 0, 0)
+        whole = quarters == 4
+        arcs = {}
+        ends = []
         for name, radius in RADII.items():
             angles = np.radians(90.0 * np.arange(quarters + 1))
             if name == "hole" and gap:
@@ -97,7 +99,8 @@ def press(
 
 
 def turned(mesh: TaggedMesh, angle: float) -> TaggedMesh:
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     mesh.mesh.geometry.x[:, :2] = mesh.mesh.geometry.x[:, :2] @ [[c, s], [-s, c]]
     return mesh
 
@@ -115,7 +118,8 @@ def test_a_whole_pin_in_a_whole_hole_is_twice_its_half(quads, kinematics):
     assert hole.curve.before.min() == hole.curve.after.min() == 0
     assert abs(system.contact_force()[0]) < 2e-4 * whole
     pair = system.contact.pair_of(hole)
-    force, x = (hole.weight * pair.pressure).sum(axis=1), hole.point.mean(axis=1)
+    force = (hole.weight * pair.pressure).sum(axis=1)
+    x = hole.point.mean(axis=1)
     left, right = (
         force[np.sign(x[:, 0]) == s][np.argsort(x[np.sign(x[:, 0]) == s, 1])] for s in (-1, 1)
     )
@@ -140,7 +144,8 @@ def test_cells_and_orders_agree(quads):
 def test_forces_do_not_depend_on_where_the_seam_lies(edges):
     """The mesh turned with the load, so that the seam lies in, beside and opposite to the contact;
     nor on rounding, which might choose between two facets where vertices face each other."""
-    forces, seams = [], []
+    forces = []
+    seams = []
     for angle in np.radians([0, 70, 145, 210, 328]):
         system, force = press(turned(rings(MPI.COMM_SELF, 4, edges=edges), angle), angle)
         forces.append(force)

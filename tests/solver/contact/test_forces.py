@@ -67,7 +67,8 @@ def test_the_resultant_is_the_integrated_pressure(integrated, kinematics):
     parts = joint_parts(integrated=integrated, kinematics=kinematics)
     contact = parts.contact
     contact.evaluate(parts.pressed(1.5 * DR, noise=3e-4))
-    total, active = np.zeros(2), 0
+    total = np.zeros(2)
+    active = 0
     for pair in contact.pairs:
         assert pair.pressure.min() == 0
         assert not pair.traction[~pair.projection.found].any()

@@ -35,7 +35,8 @@ PRESSED = [
     Dirichlet("lid", "lid", 1, -1.0),
     Dirichlet("left", "left", 0),
 ]  # free to widen
-LOW, HIGH = ("lower top", "middle bottom"), ("middle top", "upper bottom")
+LOW = ("lower top", "middle bottom")
+HIGH = ("middle top", "upper bottom")
 
 
 def stack(low: dict, high: dict):
@@ -76,12 +77,14 @@ def test_a_stack_of_three_carries_a_uniform_pressure(low, high):
 def test_the_tangent_of_several_interactions_is_the_derivative_of_their_forces():
     """In random directions that move every node."""
     system = stack({}, {"law": "tied"})
-    contact, rng = system.contact, np.random.default_rng(0)
+    contact = system.contact
+    rng = np.random.default_rng(0)
     u = system.equilibrium.displacement() + 1e-3 * DEPTH * rng.normal(
         size=(len(coordinates(system.V)), 2)
     )
     contact_force(contact, u)
-    K, h = matrix(contact, u.size)[:-2, :-2], 1e-6 * DEPTH
+    K = matrix(contact, u.size)[:-2, :-2]
+    h = 1e-6 * DEPTH
     for _ in range(3):
         d = rng.normal(size=u.shape)
         difference = (
@@ -149,12 +152,10 @@ def test_every_rigid_disc_moves_by_itself():
     interfaces = [
         Interface(Interaction(name, ("disc", "hole")), surfaces) for name, surfaces in sides.items()
     ]
-    both, u, depth, h = (
-        Contact(parts.V, interfaces),
-        np.zeros((len(coordinates(parts.V)), 2)),
-        1.5 * DR,
-        1e-6 * DR,
-    )
+    both = Contact(parts.V, interfaces)
+    u = np.zeros((len(coordinates(parts.V)), 2))
+    depth = 1.5 * DR
+    h = 1e-6 * DR
     both.move(np.array([depth]))
     np.testing.assert_array_equal(
         [pin.motion[0], disc.motion[0]], [depth * pin.rate[0], depth * disc.rate[0]]
@@ -163,7 +164,9 @@ def test_every_rigid_disc_moves_by_itself():
     assert all(pair.active.any() for pair in both.pairs)
     along = sum(d.rate @ both.resultant(name) for d, name in ((pin, "pin"), (disc, "disc")))
     assert both.force_on_drives() == pytest.approx(along, rel=1e-14)
-    rows, columns, blocks_ = both.tangent.rows, both.tangent.columns, both.tangent.blocks()
+    rows = both.tangent.rows
+    columns = both.tangent.columns
+    blocks_ = both.tangent.blocks()
     for number, surface in enumerate((pin, disc)):
         for axis, direction in enumerate(np.eye(2)):
             forces = []
@@ -172,6 +175,7 @@ def test_every_rigid_disc_moves_by_itself():
                 forces.append(contact_force(both, u))
                 surface.motion = surface.motion - sign * h * direction
             expected = (forces[0] - forces[1]) / (2 * h)
-            found, here = np.zeros_like(u), (columns == len(u) + number) & (rows < len(u))
+            found = np.zeros_like(u)
+            here = (columns == len(u) + number) & (rows < len(u))
             np.add.at(found, rows[here], blocks_[here, :, axis])
             assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)

@@ -18,7 +18,8 @@ def test_a_corrupted_start_does_not_change_the_forces(seed):
     """Start facets drawn at random lead to the pairs, and the forces, of a search over the whole
     curve."""
     parts = joint_parts(size=0.1)
-    contact, u = parts.contact, parts.pressed(1.5 * DR, noise=1e-4)
+    contact = parts.contact
+    u = parts.pressed(1.5 * DR, noise=1e-4)
     contact.search()
     expected = contact_force(contact, u)
     rng = np.random.default_rng(seed)
@@ -33,7 +34,8 @@ def test_a_corrupted_start_does_not_change_the_forces(seed):
 def test_the_path_to_a_state_does_not_change_its_pairs():
     """Pairs followed from far away, step by step, are those of a search from scratch."""
     parts = joint_parts(size=0.1)
-    contact, u = parts.contact, parts.pressed(1.5 * DR)
+    contact = parts.contact
+    u = parts.pressed(1.5 * DR)
     pin = nodes_of(parts.V, parts.cells, Cells.PIN)
     for slid in np.linspace(0.5, 0, 6):
         v = u.copy()

@@ -29,7 +29,8 @@ def body(_, vertices):
     if not len(vertices):
         return np.zeros(0, dtype=int)
     n = vertices.max() + 1
-    rows, columns = vertices[:, [0, 1]].ravel(), vertices[:, [1, 2]].ravel()
+    rows = vertices[:, [0, 1]].ravel()
+    columns = vertices[:, [1, 2]].ravel()
     _, label = connected_components(
         coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False
     )
@@ -68,7 +69,9 @@ def state(comm, pin, block, kinematics, partitioner=None):
     largest, integral = parts.bulk.peeq()
     norms += [comm.allreduce(largest, op=MPI.MAX), comm.allreduce(integral)]
     tangent = parts.contact.tangent
-    rows, columns, values = tangent.rows, tangent.columns, tangent.blocks()
+    rows = tangent.rows
+    columns = tangent.columns
+    values = tangent.blocks()
     field = np.zeros((parts.V.dofmap.index_map.size_global + 1, 2))  # a rigid pin's is the last
     index_map = parts.V.dofmap.index_map
     start, end = index_map.local_range

@@ -55,9 +55,11 @@ def trace_forms(side):
     C = side.material.elastic_tangent
     units = np.eye(12).reshape(12, 6, 2)
     n = side.outward
-    sigma_n, eps = [], []
+    sigma_n = []
+    eps = []
     for unit in units:
-        u, nodes = unit.copy(), np.tile(np.arange(6, dtype=np.int32), (len(side.cells), 1))
+        u = unit.copy()
+        nodes = np.tile(np.arange(6, dtype=np.int32), (len(side.cells), 1))
         s = side.small_strain.matrix() @ unit.ravel() @ C
         sigma_n.append(
             n[..., 0] ** 2 * s[..., 0]
@@ -65,7 +67,8 @@ def trace_forms(side):
             + 2 * n[..., 0] * n[..., 1] * s[..., 2]
         )
         eps.append(PointStrain(PLANE_STRAIN, basis, nodes)(u))
-    sigma_n, eps = np.stack(sigma_n, axis=1), np.stack(eps, axis=1)
+    sigma_n = np.stack(sigma_n, axis=1)
+    eps = np.stack(eps, axis=1)
     trace = np.einsum("nq,naq,nbq->nab", side.weight, sigma_n, sigma_n)
     return trace, np.einsum("nq,naqi,ij,nbqj->nab", basis.measure * w, eps, C, eps)
 
@@ -100,7 +103,8 @@ def test_gamma_is_sharp(material):
 
 def test_gamma_scales_as_stress_per_length():
     """Ten times the modulus gives ten times gamma, half the cells about twice."""
-    soft, stiff = joint_parts(), joint_parts(pin=replace(ELASTIC, E=10 * ELASTIC.E))
+    soft = joint_parts()
+    stiff = joint_parts(pin=replace(ELASTIC, E=10 * ELASTIC.E))
     np.testing.assert_allclose(stiff.sides[0].gamma, 10 * soft.sides[0].gamma, rtol=1e-12)
     np.testing.assert_allclose(stiff.sides[1].gamma, soft.sides[1].gamma, rtol=1e-12)
     fine = joint_parts(size=0.1)

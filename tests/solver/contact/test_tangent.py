@@ -39,7 +39,9 @@ every_kinematics = pytest.mark.parametrize(
 def matrix(contact, n):
     """The tangent over all nodes and, behind them, the rigid pin."""
     n += 2
-    rows, columns, values = contact.tangent.rows, contact.tangent.columns, contact.tangent.blocks()
+    rows = contact.tangent.rows
+    columns = contact.tangent.columns
+    values = contact.tangent.blocks()
     K = sp.csr_matrix((n, n))
     for i, j in np.ndindex(2, 2):
         K += sp.coo_matrix((values[:, i, j], (2 * rows + i, 2 * columns + j)), shape=(n, n)).tocsr()
@@ -68,16 +70,19 @@ def branch(contact):
 def assert_tangent_is_derivative(parts, u, *, directions=3):
     """Central differences in random directions that move the pin as a whole, a rigid one too, and
     every node by itself; a rigid pin's own force is against the resultant."""
-    contact, rng = parts.contact, np.random.default_rng(7)
+    contact = parts.contact
+    rng = np.random.default_rng(7)
     contact.search()
     contact_force(contact, u)
-    K, at = matrix(contact, u.size), branch(contact)
+    K = matrix(contact, u.size)
+    at = branch(contact)
     active = contact.n_active()
     h = 1e-6 * DR
     for k in range(directions):
         d = rng.normal(size=u.shape) if k else parts.pressed(1.0)
         rigid = len(contact.rigid)
-        e, motion = rng.normal(size=2) * rigid, [disc.motion for disc in contact.rigid]
+        e = rng.normal(size=2) * rigid
+        motion = [disc.motion for disc in contact.rigid]
         sides = []
         for sign in (1, -1):
             for disc, at_start in zip(contact.rigid, motion, strict=True):
@@ -167,12 +172,12 @@ def test_trial_tractions_follow_the_displacements(bodies, kinematics):
     rub shears as well."""
     pin, block = BODIES[bodies]
     parts = joint_parts(pin=pin, block=block, kinematics=kinematics)
-    contact, u = parts.contact, indented(parts)
-    rng, h = np.random.default_rng(3), 1e-6 * DR
-    direction, levels = (
-        rng.normal(size=u.shape),
-        rng.normal(size=max((len(s.rate) for s in contact.rigid), default=1)),
-    )
+    contact = parts.contact
+    u = indented(parts)
+    rng = np.random.default_rng(3)
+    h = 1e-6 * DR
+    direction = rng.normal(size=u.shape)
+    levels = rng.normal(size=max((len(s.rate) for s in contact.rigid), default=1))
     motions = [surface.motion.copy() for surface in contact.rigid]
     contact.evaluate(u)
     at = partners(contact)
@@ -200,7 +205,8 @@ def test_the_points_that_are_expected_to_close_do():
     evaluation finds no other."""
     parts = joint_parts(kinematics="reference")
     contact = parts.contact
-    u, v = parts.pressed(DR), parts.pressed(3 * DR, noise=1e-4)
+    u = parts.pressed(DR)
+    v = parts.pressed(3 * DR, noise=1e-4)
     contact.evaluate(u)
     few = contact.n_active()
     still = np.zeros(1)
@@ -220,7 +226,8 @@ def test_the_points_that_are_expected_to_close_do():
 def test_tangent_of_a_tied_elastic_contact_is_constant():
     """Tied elastic bodies are linear: K u + f0 is the force anywhere."""
     parts = joint_parts(kinematics="tied")
-    u, v = parts.pressed(DR, noise=1e-4, seed=1), parts.pressed(30 * DR, noise=1e-2, seed=2)
+    u = parts.pressed(DR, noise=1e-4, seed=1)
+    v = parts.pressed(30 * DR, noise=1e-2, seed=2)
     at_u = contact_force(parts.contact, u).ravel()
     K = matrix(parts.contact, u.size)[:-2, :-2]
     at_v = contact_force(parts.contact, v).ravel()
@@ -234,7 +241,8 @@ def test_the_pattern_holds_the_tangent(kinematics):
     """No entry of the tangent lies outside the slots announced for the matrix."""
     parts = joint_parts(kinematics=kinematics)
     parts.contact.evaluate(parts.pressed(1.5 * DR, noise=1e-4))
-    rows, columns = parts.contact.tangent.rows, parts.contact.tangent.columns
+    rows = parts.contact.tangent.rows
+    columns = parts.contact.tangent.columns
     n = len(parts.pressed(0.0))
     slots = set((parts.contact.pattern()[0] * n + parts.contact.pattern()[1]).tolist())
     assert set((rows * n + columns).tolist()) <= slots

@@ -74,9 +74,12 @@ class Wear(ContactLaw):
 def test_the_derivatives_are_those_of_the_traction():
     """Of random points, by central differences."""
     draw = np.random.default_rng(0)
-    law, m, h = Wear(0.3), 50, 1e-6
+    law = Wear(0.3)
+    m = 50
+    h = 1e-6
     opening, trial = draw.normal(size=(2, m, 2))
-    gamma, state = np.full((m, 2), 2.0), WearState(draw.uniform(0, 0.2, m))
+    gamma = np.full((m, 2), 2.0)
+    state = WearState(draw.uniform(0, 0.2, m))
 
     def traction(opening, trial):
         return law.respond(opening, trial, gamma, state, 1.0).traction
@@ -179,7 +182,8 @@ def turned(comm: MPI.Comm, k: float, steps: int) -> tuple[list[float], list[floa
         fit=True,
     )
     system = System(problem)
-    pressed, worn = [], []
+    pressed = []
+    worn = []
     for load in np.linspace(1, 4, 3 * steps + 1):
         system.solve([load])
         interface = system.contact.interface("fit")
@@ -193,7 +197,9 @@ def test_a_pin_that_turns_back_and_forth_wears_its_fit_away(comm):
     """The pressure of a fit falls as it wears, by the factor 1 / (1 + k K ds) in each step, where K
     is pressure over interference: to exp(-k K s) in small steps; what is worn is the interference
     that was lost. On any number of ranks."""
-    r, steps, k = 10.0, 2, 5e-3
+    r = 10.0
+    steps = 2
+    k = 5e-3
     pressed, worn = turned(comm, k, steps)
     around = 2 * np.pi * r
     stiffness = pressed[0] / around / 0.01

@@ -68,7 +68,8 @@ def test_nothing_keeps_a_system_that_is_used_no_more():
     """Its responses are most of the memory of a run; sweeps solve thousands of runs in one
     process."""
     _, A = stiffness(8, np.random.default_rng(1))
-    condensed, ksp = Condensed(A, np.array([0, 2]), 2, as_it_is), PETSc.KSP().create(MPI.COMM_SELF)
+    condensed = Condensed(A, np.array([0, 2]), 2, as_it_is)
+    ksp = PETSc.KSP().create(MPI.COMM_SELF)
     condensed.attach(ksp)
     ksp.setUp()
     still = ref(condensed)
@@ -107,7 +108,8 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
 def test_the_ranks_take_the_same_way(comm, pin):
     """Iterations, factorisations and points, on ranks without facets or cells, too."""
     scene = paper_joint(0.1, 3, pin=pin)
-    many, one = solve(scene, comm), solve(scene, MPI.COMM_SELF)
+    many = solve(scene, comm)
+    one = solve(scene, MPI.COMM_SELF)
     assert many.joint.equilibrium.linear.tangent.condensed is not None
     for a, b in zip(many.steps, one.steps, strict=True):
         assert a.iterations == b.iterations

@@ -84,7 +84,9 @@ def test_an_old_factorisation_preconditions_as_well(monkeypatch):
 
 def test_a_scene_gives_the_same_digits_wherever_memory_lies():
     """FGMRES adds up in an order of its own."""
-    scene, last, held = paper_joint(0.1, 2, 0.002, analysis={"friction": 0.3}), [], []
+    scene = paper_joint(0.1, 2, 0.002, analysis={"friction": 0.3})
+    last = []
+    held = []
     for size in (1, 1001, 17, 4099):
         held.append(np.zeros(size))
         last.append(solve(scene).steps[-1])

@@ -32,20 +32,23 @@ def test_complement_and_solution_are_those_of_the_dense_matrix():
     rng = np.random.default_rng(2)
     kernels = schur_kernels()
     for kept in (np.array([3, 7, 11]), np.arange(0, 40, 2), np.array([39])):
-        n, m = 40, len(kept)
+        n = 40
+        m = len(kept)
         others = np.setdiff1d(np.arange(n), kept)
         pattern = (rng.random((n, n)) < 0.2) | np.eye(n, dtype=bool)
         made, arrays = created(pattern, kept)
         for _ in range(2):
             A = np.where(pattern, rng.normal(size=(n, n)), 0.0) + 10 * np.eye(n)
-            values, S = A[pattern], np.zeros((m, m))
+            values = A[pattern]
+            S = np.zeros((m, m))
             assert kernels.schur_factorise(made, pointer(values), pointer(S)) == 0
             inverse = np.linalg.inv(A[np.ix_(others, others)])
             expected = (
                 A[np.ix_(kept, kept)] - A[np.ix_(kept, others)] @ inverse @ A[np.ix_(others, kept)]
             )
             assert pytest.approx(expected, abs=1e-12) == S
-            b, reduced = rng.normal(size=n), np.zeros(m)
+            b = rng.normal(size=n)
+            reduced = np.zeros(m)
             x = np.linalg.solve(A, b)
             assert kernels.schur_condense(made, pointer(b), pointer(reduced)) == 0
             assert S @ x[kept] == pytest.approx(reduced, abs=1e-11)

@@ -139,7 +139,8 @@ def test_corners_are_those_of_the_edge_or_triangle(degree):
     joint, _ = pressed(degree)
     index_map = joint.V.dofmap.index_map
     everywhere = np.zeros((index_map.size_global, 2))
-    n, start = index_map.size_local, index_map.local_range[0]
+    n = index_map.size_local
+    start = index_map.local_range[0]
     x = joint.V.tabulate_dof_coordinates()[:n, :2]
     everywhere[start : start + n] = x
     MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, everywhere)
@@ -167,12 +168,15 @@ def test_corners_of_quads(degree):
     equispaced = {"lagrange_variant": LagrangeVariant.equispaced, "shape": (2,)}
     element = basix.ufl.element("P", "quadrilateral", degree, **equispaced)
     V = fem.functionspace(create_unit_square(MPI.COMM_WORLD, 4, 3, CellType.quadrilateral), element)
-    index_map, here = V.dofmap.index_map, np.zeros((V.dofmap.index_map.size_global, 2))
+    index_map = V.dofmap.index_map
+    here = np.zeros((V.dofmap.index_map.size_global, 2))
     own = slice(*index_map.local_range)
     here[own] = V.tabulate_dof_coordinates()[: index_map.size_local, :2]
     MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, here)
-    x, ends = here[own], here[corners(V)]
-    low, high = ends.min(axis=1), ends.max(axis=1)
+    x = here[own]
+    ends = here[corners(V)]
+    low = ends.min(axis=1)
+    high = ends.max(axis=1)
     share = (x - low) / np.where(high > low + 1e-9, high - low, 1.0)
     assert np.abs(share * degree - np.round(share * degree)).max() < 1e-12
     inside = (share > 1e-9) & (share < 1 - 1e-9)
