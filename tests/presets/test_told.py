@@ -1,17 +1,20 @@
 """What a run tells of numbers that are not what they seem, and does not tell of those that are."""
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import archord
+from archord.measures.parts import part_measures
 from archord.output.run import solve_scene
 from archord.presets.account import account_of
 from archord.presets.words import words_of
 from archord.report.errors import InputError
-from archord.scene.file import parse_scene
+from archord.scene.file import load_scene, parse_scene
 from tests.solver.parts import blocks
 
 BODIES = [archord.Body(name, archord.Elastic(1000.0, 0.3)) for name in ("lower", "upper")]
@@ -27,6 +30,19 @@ def ring(**load):
         "growth": 1.0,
     }
     return parse_scene({"joint": joint, "pin": like, "block": like, "load": {"steps": 1} | load})
+
+
+def test_the_largest_peeq_is_told_with_its_place():
+    """In the columns of their names, of each body that can yield."""
+    scene = load_scene(Path(__file__).parents[2] / "scenes" / "lug.toml")
+    places = {body.name: (0.1 + k, 2.0 + k, 3.0 + k) for k, body in enumerate(scene.body)}
+    state = SimpleNamespace(largest_peeq=places.get)
+    told = {measure.name: measure for measure in part_measures(scene)}
+    yielding = [body.name for body in scene.body if body.plastic]
+    assert yielding
+    for name in yielding:
+        columns = [told[f"{name} {what}"] for what in ("peeq_max", "at x", "at y")]
+        assert tuple(column.value(state) for column in columns) == places[name]
 
 
 def block(**analysis):

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
+from archord.presets.arc import arc_profiles
 from archord.scene.presets.joint import Scene
 from archord.solver.contact.named import LAWS, contact_law
 from archord.solver.path.system import System
@@ -307,3 +308,7 @@ def test_the_joint_of_the_paper_with_friction():
     assert last[1] == pytest.approx(1.32327e-2, rel=1e-3)
     assert joint.friction_dissipation() == pytest.approx(1.27e-6, rel=0.05)
     assert work - joint.energies()[0] == pytest.approx(joint.friction_dissipation(), rel=0.05)
+    # what the pin's arc drags away from the axis, the hole's arc drags back
+    arcs = arc_profiles(scene.joint, joint)
+    pin, hole = (float((arc.weight * arc.shear).sum()) for arc in (arcs["pin"], arcs["hole"]))
+    assert pin == pytest.approx(-hole, rel=0.02)
