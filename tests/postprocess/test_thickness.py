@@ -1,6 +1,8 @@
 """A joint of a given thickness is the joint per unit thickness, its forces that many times as
 large."""
 
+import pytest
+
 import archord
 from archord.benchmarks.case import paper_joint, quantities
 from archord.cli import run as command
@@ -18,10 +20,13 @@ THICK = 8.0
 def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
     """N where they were N/mm; what is dimensionless, the curve and the second axis of the picture
     stay."""
-    scenes = {str(t): paper_joint(0.2, 2, analysis={"thickness": t}) for t in (None, THICK)}
+    scenes = {str(t): paper_joint(0.2, 2, 0.002, analysis={"thickness": t}) for t in (None, THICK)}
     thin, thick = (archord.load(folder) for folder in solved(scenes, tmp_path).values())
     assert (thin.units["P"], thick.units["P"]) == ("N/mm", "N")
     assert abs(thick.columns["P"][-1] / thin.columns["P"][-1] / THICK - 1) < 1e-9
+    assert thin.columns["peeq_integral"][-1] > 0
+    for name in (name for name in thin.columns if "/" in name):
+        assert thick.columns[name] == pytest.approx(thin.columns[name], rel=1e-7), name
     for run in (thin, thick):
         text = run_text(run)
         P = run.columns["P"][-1]
