@@ -154,6 +154,9 @@ def test_means_of_cells_integrate_to_the_whole(run):
     integral = found.columns["peeq_integral"][-1]
     assert fields.peeq.max() > 1e-4
     assert 2 * np.abs(area) @ fields.peeq == pytest.approx(integral, rel=1e-10)
+    # the pressure of a cell is a mean over its edge, near the largest one on the contact axis
+    assert fields.contact_pressure.max() == pytest.approx(found.columns["p0"][-1], rel=0.1)
+    assert fields.contact_state.max() == 1
 
 
 def test_contact_file_integrates_to_the_force(run):
