@@ -17,10 +17,12 @@ SCENES = Path(__file__).parents[1] / "scenes"
 
 for name, (column, value) in EXPECTED.items():
     run = archord.solve(archord.load_scene(SCENES / f"{name}.toml"), Path(sys.argv[1]) / name)
-    found, versions = float(run.columns[column][-1]), run.summary["versions"]
+    found = float(run.columns[column][-1])
+    versions = run.summary["versions"]
     if abs(found / value - 1) > 1e-9:
         sys.exit(f"{name}: {column} is {found}, and {value} elsewhere ({versions})")
     if MPI.COMM_WORLD.rank == 0:
         print(
-            f"{name}: {column} = {found}, with dolfinx {versions['dolfinx']} and PETSc {versions['petsc']}"
+            f"{name}: {column} = {found}, with dolfinx {versions['dolfinx']} and PETSc "
+            f"{versions['petsc']}"
         )

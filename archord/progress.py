@@ -38,9 +38,12 @@ Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value o
 def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
     """What is solved in words, the columns of its steps (of a general scene displacement and force
     of each load), and name and unit of what tells how accurate a mesh is."""
-    kind, plane = "elastic-plastic" if scene.plastic else "elastic", f"plane {scene.analysis.plane}"
+    kind = "elastic-plastic" if scene.plastic else "elastic"
+    plane = f"plane {scene.analysis.plane}"
     if isinstance(scene, Scene):
-        dR, R, E_star = scene.joint.dR, scene.joint.radius, scene.E_star
+        dR = scene.joint.dR
+        R = scene.joint.radius
+        E_star = scene.E_star
         unit = E_star * R * scene.thickness
         last = ("delta/dR", dR) if scene.force_controlled else ("P/(E* R)", unit)
         return (
@@ -87,10 +90,12 @@ class Progress:
     steps of the last one, at the end."""
 
     def __init__(self, scene: AnyScene, silent: bool, verbose: bool = False) -> None:
-        self.silent, self.verbose = silent, verbose and not silent
+        self.silent = silent
+        self.verbose = verbose and not silent
         self.by_mesh = scene.analysis.accuracy is not None
         self.iterations = 0
-        self._done, self._substep = 0, 1
+        self._done = 0
+        self._substep = 1
         self._seconds: list[float] = []
         self._begun = self._spoken = perf_counter()
         self.materials = scene.materials
@@ -112,7 +117,8 @@ class Progress:
         self.title, self.columns, last, self.unit = _shown(scene)
         if self.by_mesh:
             self.print(
-                f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value"
+                f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest "
+                "value"
             )
             self.strengths()
             costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
@@ -132,8 +138,8 @@ class Progress:
             return
         seconds = perf_counter() - self._begun
         said = (
-            f"step {self._done + 1}, attempt {self._substep}, load {load:.6g}, "
-            f"iteration {len(result.residuals) - 1}, residual {result.residuals[-1]:.1e}, "
+            f"step {self._done + 1}, attempt {self._substep}, load {load:.6g}, iteration "
+            f"{len(result.residuals) - 1}, residual {result.residuals[-1]:.1e}, "
             f"{result.active_set_changes[-1]} points changed, {seconds:.0f} s"
         )
         self.move(said)
@@ -185,8 +191,9 @@ class Progress:
             "" if e is None else f"{e:.1e}" for e in (level.mesh_error, level.step_error)
         )
         self.print(
-            f"{level.mesh:5d}  {level.element_size:10.4g}  {level.growth:6.4g}  {level.substeps:8d}  {level.dofs:7d}  "
-            f"{level.last / self.unit:10.7f}  {mesh:>13s}  {steps:>14s}  {level.seconds:7.1f}"
+            f"{level.mesh:5d}  {level.element_size:10.4g}  {level.growth:6.4g}  "
+            f"{level.substeps:8d}  {level.dofs:7d}  {level.last / self.unit:10.7f}  {mesh:>13s}  "
+            f"{steps:>14s}  {level.seconds:7.1f}"
         )
 
     def headings(self) -> None:
@@ -202,7 +209,8 @@ class Progress:
         """Show an accepted output step."""
         cells = (f"{value(m):{form}}" for _, form, value in self.columns)
         self.print("  ".join([f"{m.step:5d}", *cells, f"{m.iterations:10d}  {m.cutbacks:8d}"]))
-        self._done, self._substep = m.step, 1
+        self._done = m.step
+        self._substep = 1
         self._warn_of_long(m)
         self._seconds.append(m.seconds)
 
@@ -213,9 +221,9 @@ class Progress:
         usual = median(self._seconds)
         if m.seconds > _MUCH_LONGER * usual:
             print(
-                f"archord: warning: step {m.step} took {m.seconds:.0f} s, "
-                f"{m.seconds / usual:.0f} times the median of the steps before it: "
-                f"{m.iterations} iterations and {m.cutbacks} cutbacks; smaller steps may be quicker.",
+                f"archord: warning: step {m.step} took {m.seconds:.0f} s, {m.seconds / usual:.0f} "
+                f"times the median of the steps before it: {m.iterations} iterations and "
+                f"{m.cutbacks} cutbacks; smaller steps may be quicker.",
                 file=sys.stderr,
                 flush=True,
             )
@@ -243,7 +251,8 @@ def solve_and_report(
     from archord.output.ranks import agreed
 
     def claimed() -> tuple[AnyScene, bool]:
-        scene, new = load(), not folder.exists()
+        scene = load()
+        new = not folder.exists()
         claim_folder(folder, force)
         return scene, new
 

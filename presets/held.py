@@ -137,9 +137,10 @@ def _stiffened(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
         extents = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
         if extents[1] > _BENT * extents[0]:
             yield (
-                f"the force {load.name!r} moves all of {load.on!r} by one displacement in {load.direction}, and "
-                "that edge is not straight: it keeps its shape as if it were stiff; a pressure, a distributing "
-                "coupling, or the force on the body's cells leaves it free"
+                f"the force {load.name!r} moves all of {load.on!r} by one displacement in "
+                f"{load.direction}, and that edge is not straight: it keeps its shape as if it "
+                "were stiff; a pressure, a distributing coupling, or the force on the body's "
+                "cells leaves it free"
             )
 
 
@@ -155,8 +156,9 @@ def _moved_in_contact(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
         if both.any() and (there & ~touching).any() and (touching & ~there).any():
             x, y = whole.x[whole.edges[both][0, :2]].mean(axis=0)
             yield (
-                f"the set {on!r} of {by!r} has {both.sum()} facets of the surface {surface!r} of {part!r}, as at "
-                f"({x:.6g}, {y:.6g}), which it moves whatever they touch: look whether they belong to both"
+                f"the set {on!r} of {by!r} has {both.sum()} facets of the surface {surface!r} of "
+                f"{part!r}, as at ({x:.6g}, {y:.6g}), which it moves whatever they touch: look "
+                "whether they belong to both"
             )
 
 
@@ -170,9 +172,9 @@ def _shared(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
         if first != second and len(common):
             x, y = whole.x[common[0, :2]].mean(axis=0)
             yield (
-                f"the surfaces {one!r} of the interaction {first!r} and {other!r} of {second!r} have {len(common)} "
-                f"facets in common, the first at ({x:.6g}, {y:.6g}), whose contact would count twice: a facet goes to "
-                "one interaction"
+                f"the surfaces {one!r} of the interaction {first!r} and {other!r} of {second!r} "
+                f"have {len(common)} facets in common, the first at ({x:.6g}, {y:.6g}), whose "
+                "contact would count twice: a facet goes to one interaction"
             )
 
 
@@ -208,7 +210,10 @@ def _loose(
         if others:
             said = ", ".join(map(repr, others))
             where = f" to it, or to a body that it touches: {said}"
-        yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]{where}"
+        yield (
+            f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a "
+            f"[[support]]{where}"
+        )
 
 
 def _held_places(
@@ -257,7 +262,8 @@ def require_facing(system: System) -> list[str]:
                 apart = f"{drawn}: what is carried along them loses its moment about that gap"
             if lowest < -allowed:
                 raise ValueError(
-                    f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other"
+                    f"{said} lies up to {-lowest:g} behind the opposite one: they must face each "
+                    "other"
                 )
             if nearest > allowed and is_tied:
                 raise ValueError(f"{said} is nowhere near the one that it is tied to")
@@ -293,8 +299,9 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
         yield f"{said}, but its overlap is {part.overlap:g}"
     if wanted and deep > wanted / _ALIKE and (deep < wanted * _ALIKE or not part.overlap):
         raise ValueError(
-            f"{said}, and its interference of {wanted:g} would push them together by as much again: for a fit that the "
-            f"mesh shows give overlap = {deep:.3g} alone, for one that it does not show draw them in touch"
+            f"{said}, and its interference of {wanted:g} would push them together by as much "
+            f"again: for a fit that the mesh shows give overlap = {deep:.3g} alone, for one that "
+            "it does not show draw them in touch"
         )
     if wanted and not part.overlap and deep > _ADDS * wanted:
         yield f"{said}, which adds to its interference of {wanted:g}"

@@ -111,8 +111,10 @@ def _require_words(scene: ProblemScene) -> None:
             if part.own is not None:
                 folder = Path(scene.mesh.file or "").parent
                 raise InputError(
-                    f'{section} "{part.name}": has a {what} given from Python, {part.own.text}, which no scene file '
-                    f"can state; go on by archord.solve(problem, {str(folder)!r}, restart=True), with the same problem."
+                    f'{section} "{part.name}": has a {what} given from Python, {part.own.text}, '
+                    "which no scene file "
+                    f"can state; go on by archord.solve(problem, {str(folder)!r}, restart=True), "
+                    "with the same problem."
                 )
 
 
@@ -165,6 +167,6 @@ def require_mirrored(problem: Problem) -> None:
         shared = np.intersect1d(mesh.dofs_in(V, coupling.facets), mesh.dofs_in(V, on))
         if mesh.mesh.comm.allreduce(len(shared)) and free:
             raise ValueError(
-                f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
-                f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"
+                f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, "
+                f"which is held in {axis}: hold its {' and '.join(free)}, too, in a [[support]]"
             )

@@ -43,8 +43,8 @@ def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str,
         if not isinstance(part, (Support, Load)):
             kind = type(part).__name__
             raise InputError(
-                f"archord.solve: a problem with a {kind} has no run folder; state it by Support, Load and Coupling, or "
-                "solve it by System."
+                f"archord.solve: a problem with a {kind} has no run folder; state it by Support, "
+                "Load and Coupling, or solve it by System."
             )
     return {
         "units": dict(zip(("length", "stress"), problem.units, strict=True)),

@@ -36,6 +36,7 @@ def require_core(
     found = mesh.mesh.comm.allreduce(int((apart < radius).sum()))
     if found < _FEWEST:
         raise ValueError(
-            f"{key} = {radius:g} about {tuple(centre)} has {found} integration points of the cells {cells!r}, and "
-            f"must have {_FEWEST}: choose a larger radius, smaller elements there, or a centre within these cells"
+            f"{key} = {radius:g} about {tuple(centre)} has {found} integration points of the cells "
+            f"{cells!r}, and must have {_FEWEST}: choose a larger radius, smaller elements there, "
+            "or a centre within these cells"
         )

@@ -101,7 +101,8 @@ class _Expansion:
             other = given.setdefault((s.facets, s.axis), s.name)
             if other != s.name:
                 raise ValueError(
-                    f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in {'xy'[s.axis]}"
+                    f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in "
+                    f"{'xy'[s.axis]}"
                 )
 
     def _travel(self) -> float:
@@ -126,8 +127,9 @@ class _Expansion:
             farthest = max(load.stages, key=abs)
             if abs(farthest) > most:
                 raise ValueError(
-                    f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh is {size:.4g} "
-                    f"large: a displacement of at most {most:.4g} is solved; look whether both have the same unit"
+                    f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh "
+                    f"is {size:.4g} large: a displacement of at most {most:.4g} is solved; look "
+                    "whether both have the same unit"
                 )
         self._require_near_turns(lowest, highest, most)
 
@@ -158,8 +160,9 @@ class _Expansion:
             moved = max(map(abs, load.stages)) * max(arms, default=0.0)
             if moved > most:
                 raise ValueError(
-                    f"the load {load.name!r} turns {load.on!r} about a point so far away that it moves by {moved:.4g}, "
-                    f"but a displacement of at most {most:.4g} is solved; are they in the same unit?"
+                    f"the load {load.name!r} turns {load.on!r} about a point so far away that it "
+                    f"moves by {moved:.4g}, but a displacement of at most {most:.4g} is solved; "
+                    "are they in the same unit?"
                 )
 
     def _support(self, support: Support) -> None:
@@ -168,7 +171,8 @@ class _Expansion:
             return
         if "rotation" in support.fixed:
             raise ValueError(
-                f"the support {support.name!r} fixes the rotation of {support.on!r}, which is no coupling: "
+                f"the support {support.name!r} fixes the rotation of {support.on!r}, which is no "
+                "coupling: "
                 'a set is held in "x" and "y"'
             )
         for freedom in support.fixed:
@@ -187,7 +191,8 @@ class _Expansion:
             return
         if load.direction == "rotation" and load.on not in self.couplings:
             raise ValueError(
-                f"the load {load.name!r} turns {load.on!r}, which is no coupling: only couplings have a rotation"
+                f"the load {load.name!r} turns {load.on!r}, which is no coupling: only couplings "
+                "have a rotation"
             )
         if spread:
             self._spread(load)

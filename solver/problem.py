@@ -74,7 +74,7 @@ class Problem:
     strain : {"small", "large"}
         Small strain, or large strain by logarithms, of all bodies.
     symmetry : float
-        How many times the part on the mesh makes up the whole. Forces and energies are of the whole.
+        How many times the part on the mesh makes up the whole, of forces and energies, too.
     units : tuple of str
         Names of the units of length and stress.
     degree : int
@@ -185,7 +185,8 @@ class Problem:
             uses = (name in moves) + (name in loads) + means.count(name)
             if uses > 1:
                 raise ValueError(
-                    f"the drive {name!r} must move supports and discs, multiply loads, or have one mean"
+                    f"the drive {name!r} must move supports and discs, multiply loads, or have one "
+                    "mean"
                 )
         for name in known:
             if name and name not in (*moves, *loads, *means):
@@ -299,7 +300,8 @@ class Problem:
             raise ValueError(f"the facet set {facets!r} is of no body: give that body, too")
         if len(found) > 1 or not behind <= tags[found[0].name]:
             raise ValueError(
-                f"the facet set {facets!r} belongs to {len(behind)} cell sets, a surface to one body"
+                f"the facet set {facets!r} belongs to {len(behind)} cell sets, a surface to one "
+                "body"
             )
         return found[0]
 

@@ -103,12 +103,20 @@ class _HardeningTable(Section):
         return self
 
 
-_KEYS: dict[str, Any] = {
-    name: (kind | None, key(f"{law.name}: {meaning}", default=None))
-    for law in LAWS
-    for name, (kind, meaning) in law.parameters.items()
-}
-HardeningLaw = create_model("HardeningLaw", __base__=_HardeningTable, **_KEYS)
+def _keys() -> dict[str, Any]:
+    """The keys of all laws, for pydantic: their types, and what they mean in each law."""
+    types: dict[str, Any] = {}
+    meanings: dict[str, list[str]] = {}
+    for law in LAWS:
+        for name, (kind, meaning) in law.parameters.items():
+            types[name] = kind
+            meanings.setdefault(name, []).append(f"{law.name}: {meaning}")
+    return {
+        name: (types[name] | None, key("; ".join(meanings[name]), default=None)) for name in types
+    }
+
+
+HardeningLaw = create_model("HardeningLaw", __base__=_HardeningTable, **_keys())
 
 
 def _kind(value: Any) -> str:
