@@ -10,7 +10,7 @@ import pytest
 import archord
 
 FOLDER = Path(__file__).parents[2] / "examples"
-SHORT = ["three_stack", "three_bodies", "lug", "own_material", "own_law"]
+SHORT = ["three_stack", "three_bodies", "lug", "own_material", "own_law", "axisymmetric_punch"]
 
 
 @pytest.fixture
@@ -91,6 +91,20 @@ def test_an_own_law_wears_by_archard(run_of):
     volume = run.columns["rub worn volume"]
     assert volume[4:] == pytest.approx(1e-6 * 500 * slid[4:], rel=3e-3, abs=1e-6)
     assert np.diff(volume).min() >= 0
+
+
+@pytest.mark.mpi
+def test_a_ball_on_a_block_has_the_pressure_of_hertz(run_of):
+    """The largest pressure within 1 % of Hertz's contact under the same force (Johnson 1985, eq.
+    4.24), which hardly depends on the depth of the block; the area within 5 %, as seven facets show
+    the half-width."""
+    E, R = 210e3 / (1 - 0.3**2), 40.0
+    columns = run_of("axisymmetric_punch").columns
+    force = -columns["press force"][-1]
+    pressure = (6 * force * E**2 / (np.pi**3 * R**2)) ** (1 / 3)
+    half_width = (3 * force * R / (4 * E)) ** (1 / 3)
+    assert columns["contact largest pressure"][-1] == pytest.approx(pressure, rel=0.01)
+    assert columns["contact contact area"][-1] == pytest.approx(np.pi * half_width**2, rel=0.05)
 
 
 def test_the_force_of_an_eyebar_is_that_of_other_codes(tmp_path):
