@@ -18,6 +18,8 @@ E, nu, yield_stress, depth = 1.0, 0.3, 0.002, 0.02
 mesh = rectangles({"lower": (0, 0, 1, 1), "middle": (0, 1, 1, 1), "upper": (0, 2, 1, 1)}, size=0.3)
 steel = Elastic(E, nu)
 lead = J2Material(E, nu, hardening=LinearHardening(yield_stress))
+sides = [f"{name} {side}" for name in ("lower", "middle", "upper") for side in ("left", "right")]
+walls = [Support(side, fixed="x") for side in sides]
 problem = Problem(
     mesh,
     bodies=[Body("lower", steel), Body("middle", lead), Body("upper", steel)],
@@ -25,15 +27,7 @@ problem = Problem(
         Interaction("low", ("middle bottom", "lower top")),
         Interaction("high", ("upper bottom", "middle top")),
     ],
-    supports=[
-        Support("lower bottom", fixed="y"),
-        Support("lower left", fixed="x"),
-        Support("lower right", fixed="x"),
-        Support("middle left", fixed="x"),
-        Support("middle right", fixed="x"),
-        Support("upper left", fixed="x"),
-        Support("upper right", fixed="x"),
-    ],
+    supports=[Support("lower bottom", fixed="y"), *walls],
     loads=[Load("lid", on="upper top", direction="y", displacement=-depth)],
     steps=1,
 )
