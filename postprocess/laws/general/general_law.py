@@ -38,9 +38,35 @@ _STEEPEST = 0.999
 
 @lru_cache(maxsize=64)
 def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
-    """The law of ``joint`` in its units, forces per unit length along its axis. Raises ValueError
-    for a joint that does not tell plane and nu, or is a ring, and without ``extrapolate`` for one
-    `outside` the range."""
+    """The law of a joint, from the joints that archord has solved.
+
+    Parameters
+    ----------
+    joint : LawJoint
+        The joint, with ``plane`` and ``nu``.
+    extrapolate : bool
+        Give the law even if the joint is `outside` the range.
+
+    Returns
+    -------
+    JointCurve
+        The law in the units of ``joint``, with forces per unit length along its axis.
+
+    Raises
+    ------
+    ValueError
+        For a joint without ``plane`` or ``nu``; and, without ``extrapolate``, for a ring and for a
+        joint outside the range.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.general.general_law import general_law
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
+    >>> law = general_law(joint)
+    >>> print(f"{law.at(0.05).load:.0f}")
+    6341
+    """
     for name in ("plane", "nu"):
         if getattr(joint, name) is None:
             raise ValueError(f"archord: this law needs {name}.")
@@ -83,8 +109,30 @@ def law_of_numbers(numbers: Sequence[float]) -> JointCurve:
 
 
 def outside(joint: LawJoint) -> str:
-    """What of ``joint`` is outside the range of the law, as parameter, value and range; empty if
-    nothing is."""
+    """What puts a joint outside the range of the general law.
+
+    Parameters
+    ----------
+    joint : LawJoint
+        The joint, with ``plane`` and ``nu``.
+
+    Returns
+    -------
+    str
+        The parameter, its value and the range; empty if the joint is inside.
+
+    Raises
+    ------
+    AssertionError
+        For a joint without ``nu``.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.general.general_law import outside
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> outside(LawJoint(radius=10.0, clearance=1.0, E_star=115e3, plane="strain", nu=0.3))
+    'dR/R = 0.1 is outside 0.001 to 0.02'
+    """
     if joint.hardens:
         return (
             "a body hardens, and the law is of perfect plasticity; archord fit RUN --table makes "

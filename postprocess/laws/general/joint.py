@@ -24,20 +24,63 @@ _SOFTEST = 2.5  # of any
 
 @dataclass(frozen=True)
 class LawJoint:
-    """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any
-    consistent units.
+    """A pin in a hole, as the laws know it, in any consistent units.
 
-    ``E_star`` is the contact modulus of the plane, ``pin_share`` the share of the pin in the
-    compliance 1/E* (0: a rigid pin, 1/2: like bodies), ``pin_yield`` and ``block_yield`` the yield
-    stresses (None: elastic), ``k`` Winkler's coefficient and ``c`` the plateau of the pressure over
-    the yield stress (Hu et al., eqs 6 and 10), ``length`` along the axis. ``plane`` is "strain" or
-    "stress", ``nu`` Poisson's ratio of the block, ``pin_nu`` that of the pin (None: the block's, or
-    rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's
-    modulus of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a
-    pin in a wide block, and say so of a ``ring``, where ``block_size`` (None: wide) is small, the
-    pin is ``whole``, not cut at the pressed diameter, or there is ``friction`` or ``large_strain``,
-    which no law knows; and archord's also where contact is of the pairs of points of the undeformed
-    curves (``fixed_pairs``). Raises ValueError for values that make no joint.
+    Laws of P(delta) are for a pin in a wide block. They warn of a joint that is another one.
+
+    Parameters
+    ----------
+    radius : float
+        The radius R1 of the pin.
+    clearance : float
+        The radius of the hole is R2 = R1 + ``clearance``.
+    E_star : float
+        The contact modulus of the plane.
+    pin_yield, block_yield : float
+        The yield stresses; None is an elastic body.
+    k : float
+        Winkler's coefficient (Hu et al., eq. 6).
+    c : float
+        The plateau of the pressure over the yield stress (Hu et al., eq. 10).
+    length : float
+        The length along the axis.
+    pin_share : float
+        The share of the pin in the compliance 1/E*: 0 is a rigid pin, 1/2 are like bodies.
+    plane : {"strain", "stress"}
+        The plane.
+    nu : float
+        Poisson's ratio of the block.
+    pin_nu : float
+        Poisson's ratio of the pin; None is the block's ratio, or a rigid pin.
+    pin_hardening, block_hardening : float
+        d(yield stress)/d(PEEQ) over Young's modulus of the body: 0 is perfect plasticity, None is
+        no straight line.
+    ring : bool
+        Whether the pin is in a ring, not in a block.
+    block_size : float
+        The width of the block; None is a wide one.
+    whole : bool
+        Whether the pin is whole, not cut at the pressed diameter.
+    friction : float
+        The coefficient of friction, which no law knows.
+    large_strain : bool
+        Whether strain is large, which no law knows.
+    fixed_pairs : bool
+        Whether contact is of the pairs of points of the undeformed curves.
+
+    Raises
+    ------
+    ValueError
+        For values that make no joint.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, block_yield=355.0)
+    >>> joint.unit
+    5750.0
+    >>> joint.yielding
+    'block'
     """
 
     radius: float

@@ -53,23 +53,54 @@ class CurveState(NamedTuple):
 
 @dataclass(frozen=True)
 class JointCurve:
-    """The law of one joint: tables ``(n,)`` over nodes. Beyond the last node curves go on along
-    their tangents. Expected errors are the errors of 9 in 10 joints.
+    """The law of one joint: tables ``(n,)`` over nodes.
 
-    - ``x``: the nodes, which begin with 0
-    - ``y``, ``dy``: force and slope on first loading
-    - ``back``, ``dback``: force and slope of the curve that unloading follows
-    - ``ratio``, ``dratio``: its r by the deepest x, and the slope of r
-    - ``toe``: its toe by the deepest x, straight between nodes
-    - ``touch`` ``(3,)``: a, b, c of the logarithmic law; empty ``(0,)`` without one
-    - ``peak``, ``dpeak``: p0/sqrt(y) and its slope, nearly constant at first touch; nan if unknown
-    - ``angle``, ``dangle``: eps/sqrt(y) and its slope; nan if unknown
-    - ``error``: expected error of y on loading, over y, straight between nodes
-    - ``back_error``: the same on the way back, over the largest y
-    - ``length`` (dR), ``force``, ``pressure``: the units of x, y and p0, positive numbers
-    - ``about``: what it is the law of and where it comes from
-    - ``length_unit``, ``force_unit``: names of the units of displacement and force
-    - ``pin_length``: length of the pin that carries the force; 1 for forces per unit length
+    Beyond the last node curves go on along their tangents. Expected errors are the errors that 9 in
+    10 joints keep. The head of this module has the equations.
+
+    Parameters
+    ----------
+    x : array
+        The nodes, which begin with 0.
+    y, dy : array
+        Force and slope on first loading.
+    back, dback : array
+        Force and slope of the curve that unloading follows.
+    ratio, dratio : array
+        The ratio r of this curve by the deepest x, and the slope of r.
+    toe : array
+        The toe of this curve by the deepest x, straight between nodes.
+    touch : array (3,)
+        a, b, c of the logarithmic law; empty ``(0,)`` without one.
+    peak, dpeak : array
+        p0/sqrt(y) and its slope, nearly constant at first touch; nan if unknown.
+    angle, dangle : array
+        eps/sqrt(y) and its slope; nan if unknown.
+    error : array
+        The expected error of y on loading, over y, straight between nodes.
+    back_error : array
+        The same on the way back, over the largest y.
+    length, force, pressure : float
+        The units of x (dR), y and p0, positive numbers.
+    about : dict
+        What it is the law of, and where it comes from.
+    length_unit, force_unit : str
+        Names of the units of displacement and force.
+    pin_length : float
+        The length of the pin that carries the force; 1 for forces per unit length.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.general.general_law import general_law
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
+    >>> law = general_law(joint)
+    >>> law.at([0.02, 0.05]).load.round()
+    array([1967., 6341.])
+    >>> print(f"{law.displacement(6340.5):.4f}")
+    0.0500
+    >>> law.yields
+    False
     """
 
     x: Array
