@@ -46,14 +46,48 @@ class LawState(NamedTuple):
 
 @dataclass(frozen=True)
 class Law:
-    """A law ``P(delta)`` of a pin joint, or one that gives pressure and angle of a load only.
+    """A law ``P(delta)`` of a pin joint, or one that gives only pressure and angle of a load.
 
-    Displacements are positive in compression and measured from first touch, forces are per unit
-    length of the joint, angles are semi-angles in radians. Methods take arrays of any shape and
-    return arrays of that shape. Points outside the range give nan, or with ``extrapolate`` the
-    formula, which is nan where it has ended itself, and a `LawRangeWarning`. Of a small block or a
-    whole pin laws with displacements warn. All raise ValueError if the law needs a parameter that
-    the joint lacks, or gives displacements and the joint is a ring.
+    Displacements are positive in compression and measured from first touch. Forces are per unit
+    length of the joint. Angles are semi-angles in radians. Methods take arrays of any shape and
+    return arrays of the same shape. Points outside the range give a `LawRangeWarning`, and nan.
+    With ``extrapolate`` they give the formula instead of nan, as far as the formula reaches. For a
+    small block or a whole pin laws with displacements warn. All methods raise ValueError if the law
+    needs a parameter that the joint lacks, or if it gives displacements and the joint is a ring.
+
+    `archord.postprocess.laws.laws.find_law` gives a law by its name.
+
+    Parameters
+    ----------
+    name, title, formula, range, source, remarks : str
+        The law in words.
+    state : callable
+        The `LawState` of a joint at displacements, or at loads of a law without displacements.
+    limit : callable
+        The largest displacement of the range for a joint, or the largest load.
+    unfit : callable
+        Why the law does not hold for a joint at all; empty if it does.
+    needs : tuple of str
+        Parameters of the joint that the law needs.
+    gives : tuple of str
+        The quantities that it gives.
+    coefficients : tuple of str
+        The fitted ones among k and c.
+    plastic : bool
+        Whether it knows yielding, without hardening.
+    solved : bool
+        Whether it is made from joints that archord has solved.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> from archord.postprocess.laws.laws import find_law
+    >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3)
+    >>> law = find_law("paper")
+    >>> law.force(joint, [0.025, 0.05]).round(1)
+    array([2660.4, 6516.7])
+    >>> print(f"{law.displacement(joint, 6516.7):.4f}")
+    0.0500
     """
 
     name: str

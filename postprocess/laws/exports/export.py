@@ -190,12 +190,36 @@ _LONGEST = 63  # characters of a name in Matlab, and those that C99 tells apart
 
 
 def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
-    """The text of the file ``target`` with the law of one joint, in the language that its suffix
-    names: .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), .json. Its stem becomes the name of
-    the law, but in JSON.
+    """The text of a file with the law of one joint, for another program.
 
-    Raises ValueError on another suffix, a stem that is no name, and tables that have gaps or a way
-    back that does not rise.
+    Parameters
+    ----------
+    law : JointCurve or FittedLaw
+        The law.
+    target : Path
+        The file, which is not written. Its suffix names the language: .py, .h (C99), .mo
+        (Modelica), .m (Matlab, Octave) or .json. Its stem becomes the name of the law, but in JSON.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        For another suffix, a stem that is no name, and tables that have gaps or a way back that
+        does not rise.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from archord.postprocess.laws.exports.export import export_law
+    >>> from archord.postprocess.laws.general.general_law import general_law
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
+    >>> text = export_law(general_law(joint), Path("pin_law.h"))
+    >>> "static const double pin_law_NODES[]" in text
+    True
     """
     if target.suffix not in (*_FORMS, ".json"):
         raise ValueError(
