@@ -70,8 +70,22 @@ class Scaled(Hardening):
 
 @dataclass(frozen=True)
 class LinearHardening(Hardening):
-    """``yield_stress + modulus PEEQ``, in units of Young's modulus; perfect plasticity without
-    ``modulus``."""
+    """A yield stress that grows linearly, ``yield_stress + modulus PEEQ``.
+
+    Parameters
+    ----------
+    yield_stress : float
+        The yield stress at first yield, in the unit of Young's modulus.
+    modulus : float
+        The slope over PEEQ. Without it plasticity is perfect.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import LinearHardening
+    >>> LinearHardening(355.0, modulus=1000.0).stress(np.array([0.0, 0.1])).tolist()
+    [355.0, 455.0]
+    """
 
     yield_stress: float
     modulus: float = 0.0
@@ -100,11 +114,27 @@ class LinearHardening(Hardening):
 
 @dataclass(frozen=True)
 class TabularHardening(Hardening):
-    """Straight lines between points ``(peeq, yield_stress)``, the first at PEEQ 0; constant beyond
-    the last.
+    """A yield stress by straight lines between points, constant beyond the last one.
 
-    A yield plateau (Lueders) is two points of equal stress. Raises ValueError for points that are
-    no such law.
+    A yield plateau (Lueders) is two points of equal stress.
+
+    Parameters
+    ----------
+    points : tuple of (float, float)
+        PEEQ and yield stress of each point, the first at PEEQ 0.
+
+    Raises
+    ------
+    ValueError
+        If PEEQ does not begin at 0 and increase, or if stresses decrease or are not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import TabularHardening
+    >>> law = TabularHardening(((0.0, 355.0), (0.02, 355.0), (0.1, 450.0)))
+    >>> law.stress(np.array([0.01, 0.06, 0.5])).tolist()
+    [355.0, 402.5, 450.0]
     """
 
     points: tuple[tuple[float, float], ...]
@@ -162,8 +192,27 @@ class TabularHardening(Hardening):
 
 @dataclass(frozen=True)
 class VoceHardening(Hardening):
-    """From ``yield_stress`` to ``saturation``: ``saturation - (saturation - yield_stress) exp(-rate
-    PEEQ)`` (Voce, 1948)."""
+    """A yield stress that saturates (Voce, 1948).
+
+    It is ``saturation - (saturation - yield_stress) exp(-rate PEEQ)``.
+
+    Parameters
+    ----------
+    yield_stress : float
+        The yield stress at first yield, in the unit of Young's modulus.
+    saturation : float
+        The yield stress at large PEEQ.
+    rate : float
+        How fast it gets there, per PEEQ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import VoceHardening
+    >>> law = VoceHardening(yield_stress=300.0, saturation=500.0, rate=20.0)
+    >>> law.stress(np.array([0.0, 0.05, 1.0])).round(1).tolist()
+    [300.0, 426.4, 500.0]
+    """
 
     yield_stress: float
     saturation: float
@@ -185,7 +234,25 @@ class VoceHardening(Hardening):
 
 @dataclass(frozen=True)
 class SwiftHardening(Hardening):
-    """``strength (offset + PEEQ)^exponent`` (Swift, 1952), the exponent between 0 and 1."""
+    """A yield stress by a power of PEEQ, ``strength (offset + PEEQ)^exponent`` (Swift, 1952).
+
+    Parameters
+    ----------
+    strength : float
+        The factor, in the unit of Young's modulus.
+    offset : float
+        What is added to PEEQ, a positive number: the yield stress would begin at 0 without it.
+    exponent : float
+        The exponent, between 0 and 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import SwiftHardening
+    >>> law = SwiftHardening(strength=700.0, offset=0.01, exponent=0.2)
+    >>> law.stress(np.array([0.0, 0.1])).round(1).tolist()
+    [278.7, 450.2]
+    """
 
     strength: float
     offset: float
