@@ -38,7 +38,27 @@ def principal_stresses(stress: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Elastic(Material):
-    """Linear elastic solid; ``E`` sets the unit of stress."""
+    """Isotropic linear elastic solid.
+
+    Parameters
+    ----------
+    E : float
+        Young's modulus. It sets the unit of stress.
+    nu : float
+        Poisson's ratio.
+    plane : {"strain", "stress", "axisymmetric"}
+        How displacement becomes strain. The default becomes the problem's kinematics; another
+        value must agree with them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Elastic
+    >>> steel = Elastic(E=210e3, nu=0.3)
+    >>> stress, tangent, _ = steel.update(np.array([[1e-3, 0.0, 0.0]]), None)
+    >>> stress.round(1).tolist()
+    [[282.7, 121.2, 121.2, 0.0]]
+    """
 
     E: float
     nu: float

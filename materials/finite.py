@@ -46,11 +46,37 @@ class LargeState(PlasticState):
 
 @dataclass(frozen=True)
 class LargeStrain(Material):
-    """The material ``inner`` of small strain at large strain, by logarithmic strains (Miehe, Apel
-    and Lambrecht 2002).
+    """A material of small strain at large strain, by logarithmic strains.
 
-    It gets displacement gradients and gives nominal stresses, in the unit of ``inner``, whose
-    states and moduli it has. All bodies of a problem that yield must be at large strain if one is.
+    The method is by Miehe, Apel and Lambrecht (2002). The material gets displacement gradients and
+    gives nominal stresses, in the unit of ``inner``, whose states and moduli it has. If one body of
+    a problem is at large strain, all bodies that yield must be.
+
+    Parameters
+    ----------
+    inner : Material
+        The material of small strain, such as `Elastic` or `J2Material`.
+
+    Attributes
+    ----------
+    finite : bool
+        True: it gets displacement gradients, in a plane ``[xx, yy, xy, yx]``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Elastic, LargeStrain
+    >>> steel = LargeStrain(Elastic(210e3, 0.3))
+    >>> stress, _, _ = steel.update(np.array([[0.1, 0.0, 0.0, 0.0]]), None)
+    >>> stress.round(-1).tolist()
+    [[24490.0, 11550.0, 0.0, 0.0]]
+
+    A rotation is no strain:
+
+    >>> c, s = np.cos(0.5), np.sin(0.5)
+    >>> stress, _, _ = steel.update(np.array([[c - 1, c - 1, -s, s]]), None)
+    >>> bool(abs(stress).max() < 1e-6)
+    True
     """
 
     finite: ClassVar[bool] = True

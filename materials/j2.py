@@ -17,7 +17,34 @@ NEVER_YIELDS = LinearHardening(np.inf)
 
 @dataclass(frozen=True)
 class J2Material(Elastic):
-    """Elastic-plastic solid: `Elastic` below the von Mises stress that its ``hardening`` gives."""
+    """Elastic-plastic solid of von Mises with isotropic hardening.
+
+    It is `Elastic` below the von Mises stress that its ``hardening`` gives.
+
+    Parameters
+    ----------
+    E : float
+        Young's modulus. It sets the unit of stress.
+    nu : float
+        Poisson's ratio.
+    plane : {"strain", "stress", "axisymmetric"}
+        How displacement becomes strain. The default becomes the problem's kinematics; another
+        value must agree with them.
+    hardening : LinearHardening, TabularHardening, VoceHardening or SwiftHardening
+        The yield stress over PEEQ. Without it the solid never yields.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import J2Material, LinearHardening
+    >>> steel = J2Material(210e3, 0.3, hardening=LinearHardening(355.0, modulus=1000.0))
+    >>> start = steel.state(1)
+    >>> stress, _, state = steel.update(np.array([[0.0, 0.0, 0.01]]), start)
+    >>> stress.round(1).tolist(), steel.peeq(state).round(5).tolist()
+    ([[0.0, 0.0, 0.0, 207.4]], [0.00429])
+    >>> steel.flows(start, state).tolist()
+    [True]
+    """
 
     yields = True
 

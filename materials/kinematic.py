@@ -45,10 +45,44 @@ class KinematicState(PlasticState):
 
 @dataclass(frozen=True)
 class KinematicMaterial(J2Material):
-    """Elastic-plastic solid with isotropic ``hardening`` and ``back_stresses`` ``(C, gamma)``,
-    moduli and rates of recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With
-    recovery its tangent is not symmetric. Raises ValueError unless C is positive and gamma is not
-    negative."""
+    """Elastic-plastic solid of von Mises with isotropic and kinematic hardening.
+
+    With recovery (``gamma > 0``) its tangent is not symmetric.
+
+    Parameters
+    ----------
+    E : float
+        Young's modulus. It sets the unit of stress.
+    nu : float
+        Poisson's ratio.
+    plane : {"strain", "stress", "axisymmetric"}
+        How displacement becomes strain. The default becomes the problem's kinematics; another
+        value must agree with them.
+    hardening : LinearHardening, TabularHardening, VoceHardening or SwiftHardening
+        The yield stress over PEEQ: the size of the elastic range.
+    back_stresses : tuple of (float, float)
+        A modulus C and a rate of recovery gamma for each back stress (Armstrong and Frederick).
+        ``gamma = 0`` is Prager's linear kinematic hardening.
+
+    Raises
+    ------
+    ValueError
+        For a C that is not positive, or a negative gamma.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import KinematicMaterial, LinearHardening
+    >>> steel = KinematicMaterial(
+    ...     210e3, 0.3, hardening=LinearHardening(300.0), back_stresses=((60e3, 400.0),)
+    ... )
+    >>> state = steel.state(1)
+    >>> for shear in (0.01, 0.0):
+    ...     stress, _, state = steel.update(np.array([[0.0, 0.0, shear]]), state)
+    ...     print(stress[0, 3].round())
+    227.0
+    -193.0
+    """
 
     back_stresses: tuple[tuple[float, float], ...] = ()
 

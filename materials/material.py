@@ -23,12 +23,45 @@ State = Any
 
 
 class Material(Protocol):
-    """A constitutive law in the plane; every method is a pure function. What it does not define is
-    that of a material without history, to inherit.
+    """What a material of your own is made from: a constitutive law in the plane.
 
-    One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; one that is
-    ``finite`` gets displacement gradients for strains (see finite.py). A body that neither holds
-    for is assembled once, from the elastic tangent alone.
+    Every method is a pure function. A material must define `elastic_tangent`, `update` and
+    `energy`. It inherits the rest, which fits a material without history.
+
+    A body whose material neither ``yields`` nor is ``finite`` is assembled once, from the elastic
+    tangent alone.
+
+    Attributes
+    ----------
+    yields : bool
+        Whether the material can leave its `elastic_tangent`, by yielding or otherwise.
+    finite : bool
+        Whether it gets displacement gradients for strains (see `LargeStrain`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Body, Material
+    >>> class Sponge(Material):
+    ...     E = 10.0
+    ...
+    ...     @property
+    ...     def elastic_tangent(self):
+    ...         return self.E * np.diag([1.0, 1.0, 0.5])
+    ...
+    ...     def update(self, strain, state):
+    ...         stress = np.zeros((len(strain), 4))
+    ...         stress[:, [0, 1, 3]] = strain @ self.elastic_tangent
+    ...         return stress, np.tile(self.elastic_tangent, (len(strain), 1, 1)), state
+    ...
+    ...     def energy(self, stress):
+    ...         return (stress**2 @ [0.5, 0.5, 0.5, 1.0]) / self.E
+    >>> sponge = Sponge()
+    >>> stress, _, state = sponge.update(np.array([[0.1, 0.0, 0.2]]), sponge.state(1))
+    >>> stress.tolist(), sponge.energy(stress).round(3).tolist()
+    ([[1.0, 0.0, 0.0, 1.0]], [0.15])
+    >>> Body("pad", sponge).name
+    'pad'
     """
 
     yields: ClassVar[bool] = False
