@@ -21,19 +21,36 @@ class FrictionState:
 
 @dataclass(frozen=True)
 class Coulomb(ContactLaw):
-    """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward
-    Euler).
+    """Coulomb's friction: shear within the cone ``|q| <= friction p``.
 
-    A point that sticks has its trial shear, and the slip of the step is added to its elastic slip:
-    what sticks for many steps does not creep. Where that leaves the cone the shear comes back to it
-    at the same pressure, and the elastic slip becomes what gives this shear: a return map with
-    gamma for its stiffness. It is zero at points that do not touch.
+    The law is by Chouly, Mlika and Renard (2018), in time by backward Euler. A point that sticks
+    has its trial shear, and the slip of the step is added to its elastic slip: what sticks for many
+    steps does not creep. Where that leaves the cone the shear comes back to it at the same
+    pressure, and the elastic slip becomes what gives this shear: a return map with gamma for its
+    stiffness. The elastic slip is zero at points that do not touch.
 
-    If ``held``, points that touched stick, whatever their shear, and others slide without friction:
-    an elastic predictor. With ``secant`` the derivative by the trial shear is shear over trial
-    shear at points that slide, and the shear does not follow the pressure there. Newton's method
-    then is the fixed-point iteration of Kacanov (1959): slower, but bodies that only friction keeps
-    from turning keep a stiffness.
+    Parameters
+    ----------
+    friction : float
+        The coefficient of friction.
+    held : bool
+        Points that touched stick, whatever their shear, and others slide without friction: an
+        elastic predictor.
+    secant : bool
+        At points that slide, the derivative by the trial shear is shear over trial shear, and the
+        shear does not follow the pressure. Newton's method then is the fixed-point iteration of
+        Kacanov (1959). It is slower, but bodies that only friction keeps from turning keep a
+        stiffness.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Coulomb
+    >>> law = Coulomb(friction=0.1)
+    >>> trial = np.array([[100.0, 5.0], [100.0, -25.0], [-1.0, 0.0]])
+    >>> answer = law.respond(np.zeros((3, 2)), trial, np.full((3, 2), 1e5), law.state(3), 1.0)
+    >>> answer.traction.tolist()
+    [[100.0, 5.0], [100.0, -10.0], [0.0, 0.0]]
     """
 
     friction: float

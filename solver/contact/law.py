@@ -26,7 +26,34 @@ SLIDE_BACK = 3  # against the tangent of the frame
 
 
 class Response(NamedTuple):
-    """What a law answers at ``m`` points."""
+    """What a contact law answers at ``m`` points.
+
+    Parameters
+    ----------
+    traction : array (m, d)
+        Pressure, positive in compression, and shear.
+    by_trial : array (m, d, d)
+        Derivative of the traction by the trial traction.
+    by_opening : array (m, d, d) or None
+        Derivative of the traction by the opening, None if it has none.
+    branch : array of int (m,)
+        0 (open), 1 (sticks), 2 or 3 (slides along or against the tangent), or a number of the law's
+        own.
+    state : dataclass or None
+        The new history.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Coulomb
+    >>> law = Coulomb(friction=0.1)
+    >>> trial = np.array([[100.0, 5.0], [100.0, -25.0], [-1.0, 0.0]])
+    >>> answer = law.respond(np.zeros((3, 2)), trial, np.full((3, 2), 1e5), law.state(3), 1.0)
+    >>> answer.branch.tolist()
+    [1, 3, 0]
+    >>> answer.by_trial.shape
+    (3, 2, 2)
+    """
 
     traction: Array  # (m, d)
     by_trial: Array  # (m, d, d) derivative of the traction by the trial traction
@@ -36,26 +63,63 @@ class Response(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """What a law tells of its points besides the traction."""
+    """What a contact law tells of its points besides the traction.
+
+    Parameters
+    ----------
+    density : array (m,)
+        The quantity per area of the surface.
+    unit : str
+        The unit of its integral over the surface.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Quantity
+    >>> worn = Quantity(np.array([0.0, 1e-3]), unit="mm2")
+    >>> worn.unit
+    'mm2'
+    """
 
     density: Array  # (m,) per area of the surface
     unit: str = ""  # unit of the integral over the surface
 
 
 class ContactLaw(Protocol):
-    """A law by its `respond`, a pure function. What a law does not define is inherited: a law
-    without history and without friction.
+    """What a contact law of your own is made from: a law by its `respond`, a pure function.
 
-    Points of a law that ``slides`` move along the opposite surface. Otherwise they keep the
-    partners of the undeformed surfaces, and their undeformed gaps count as zero.
+    A law inherits what it does not define, which fits a law without history and without friction.
 
-    A law that ``counts_slip`` gets the slip since the last accepted state, of the points that are
-    partners now. In contact both sides agree on this slip, whatever the angle at which they met.
-    A law that ``has_friction`` carries shear: it counts slip, and the shear is reported. The slip
-    and the trial shear of other laws that slide mean nothing.
+    Attributes
+    ----------
+    slides : bool
+        Whether points move along the opposite surface. Otherwise they keep the partners of the
+        undeformed surfaces, and their undeformed gaps count as zero.
+    counts_slip : bool
+        Whether the law gets the slip since the last accepted state, of the points that are partners
+        now. In contact both sides agree on this slip, whatever the angle at which they met.
+    has_friction : bool
+        Whether the law carries shear: it counts slip, and the shear is reported. The slip and the
+        trial shear of other laws that slide mean nothing.
+    unilateral : bool
+        Whether points can be open. Strategies that look ahead at which points close are for such
+        laws alone.
 
-    A law that is ``unilateral`` has open points: strategies that look ahead at which points close
-    are for such laws alone.
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import ContactLaw, Response
+    >>> class Frictionless(ContactLaw):
+    ...     unilateral = True
+    ...
+    ...     def respond(self, opening, trial, gamma, state, dt):
+    ...         touches = (trial[:, 0] > 0).astype(int)
+    ...         by_trial = touches[:, None, None] * np.diag([1.0, 0.0])
+    ...         traction = np.maximum(trial[:, :1], 0.0) * [1.0, 0.0]
+    ...         return Response(traction, by_trial, None, touches, state)
+    >>> trial = np.array([[100.0, 5.0], [-1.0, 0.0]])
+    >>> Frictionless().respond(np.zeros((2, 2)), trial, np.ones((2, 2)), None, 1.0).branch.tolist()
+    [1, 0]
     """
 
     slides: ClassVar[bool] = True
