@@ -293,8 +293,30 @@ def circle_through(x: Array) -> tuple[Array, float] | None:
 
 
 class RigidCircle:
-    """A rigid disc of the given ``centre`` ``(2,)`` and ``radius``, as an opposite curve of one
-    facet with one node, which moves it."""
+    """A rigid disc that bodies touch.
+
+    It is an opposite curve of one facet with one node, which moves it.
+
+    Parameters
+    ----------
+    centre : sequence of float
+        The centre (x, y).
+    radius : float
+        The radius.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from archord import Interaction, RigidCircle
+    >>> roller = RigidCircle((0.0, 10.0), radius=10.0)
+    >>> rub = Interaction("rub", (roller, "block top"), friction=0.1)
+
+    The closest point to one at (0, -2), which faces up:
+
+    >>> x, up, still = np.array([[0.0, -2.0]]), np.array([[0.0, 1.0]]), np.zeros((1, 2))
+    >>> roller.closest_point(x, up, still).point.tolist()
+    [[0.0, 0.0]]
+    """
 
     n_facets = 1
 

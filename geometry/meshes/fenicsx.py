@@ -53,14 +53,55 @@ def gmsh_to_mesh(
     partitioner=None,
     key: tuple = (),
 ) -> TaggedMesh:
-    """Mesh what ``build(gmsh)`` describes, in triangles or ``quads`` of the given ``order``, and
-    distribute it over ``comm``.
+    """Mesh what a function draws in gmsh, and distribute it over the ranks.
 
-    The cells are cut in four ``refinements`` times before they get nodes of higher order. All nodes
-    of ``circles`` are put on them; other second-order edges are straight. An error on rank 0 is
-    raised on every rank. The sets have the names of gmsh's physical groups. ``partitioner``
-    replaces `sectors`. A mesh whose ``key`` says all that enters it is kept (`kept_mesh`). What has
-    a mesh already is taken by `read_mesh`.
+    The sets have the names of gmsh's physical groups. An error on rank 0 is raised on every rank.
+    What has a mesh already is taken by `Mesh`.
+
+    Parameters
+    ----------
+    comm : MPI.Comm
+        The communicator.
+    build : callable
+        ``build(gmsh)`` draws the model. It is called on rank 0.
+    circles : sequence of Circle
+        Circles (set of facets, centre, radius) on which all nodes of these sets are put. Other
+        second-order edges are straight.
+    order : int
+        The order of the cells.
+    refinements : int
+        How many times the cells are cut in four, before they get nodes of higher order.
+    quads : bool
+        Quadrilaterals instead of triangles.
+    partitioner : callable
+        Replaces the cut in `sectors`, as in dolfinx.
+    key : tuple
+        All that enters the mesh. If it is given, the mesh is kept and found again by it.
+
+    Returns
+    -------
+    TaggedMesh
+        The mesh and its sets by name.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Where gmsh is not installed.
+    RuntimeError
+        For what gmsh cannot mesh, with its message.
+
+    Examples
+    --------
+    >>> from mpi4py import MPI
+    >>> from archord import gmsh_to_mesh
+    >>> def draw(gmsh):
+    ...     disc = gmsh.model.occ.addDisk(0.0, 0.0, 0.0, 1.0, 1.0)
+    ...     gmsh.model.occ.synchronize()
+    ...     gmsh.model.addPhysicalGroup(2, [disc], name="pin")
+    ...     gmsh.model.addPhysicalGroup(1, [1], name="rim")
+    >>> mesh = gmsh_to_mesh(MPI.COMM_WORLD, draw)
+    >>> list(mesh.cell_sets), list(mesh.facet_sets)
+    (['pin'], ['rim'])
     """
     made: PlaneMesh | None = None
     failure: Exception | None = None

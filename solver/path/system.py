@@ -41,11 +41,50 @@ def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:
 
 
 class System(Totals):
-    """``problem`` ready to be solved.
+    """A problem made ready to be solved, without a run folder. Collective.
 
-    ``sides`` holds the surfaces of bodies in contact by the name of their facet set; ``n_dofs``
-    counts prescribed displacements, too. Collective; raises ValueError for contradictions,
-    `ProjectionError` for surfaces that miss.
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    timer : Timer
+        Where times are counted, by default a new one.
+
+    Attributes
+    ----------
+    sides : dict of Surface
+        The surfaces of bodies in contact by the name of their facet set.
+    n_dofs : int
+        Degrees of freedom, with the prescribed ones.
+    n_cells : int
+        Cells of the mesh, on all ranks.
+    drive_names : list of str
+        Names of the drives, as of `driven`.
+
+    Raises
+    ------
+    ValueError
+        For contradictions in the problem, or with its mesh.
+    ProjectionError
+        For surfaces that miss each other.
+
+    Examples
+    --------
+    >>> from archord import Body, Elastic, Load, Problem, Support, System, rectangles
+    >>> system = System(
+    ...     Problem(
+    ...         rectangles({"block": (0.0, 0.0, 2.0, 1.0)}, size=0.5),
+    ...         bodies=[Body("block", Elastic(210e3, 0.3))],
+    ...         supports=[Support("block bottom")],
+    ...         loads=[Load("pull", on="block top", direction="y", displacement=0.01)],
+    ...         steps=1,
+    ...     )
+    ... )
+    >>> system.solve([1.0])
+    >>> round(system.drive_displacement("pull"), 6)
+    0.01
+    >>> system.drive_force("pull") > 0
+    True
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
