@@ -30,11 +30,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-import archord
+from archord.geometry.curve import RigidCircle
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.materials.elasticity import Elastic
+from archord.materials.hardening import LinearHardening
+from archord.materials.j2 import J2Material
+from archord.output.folder import MESH
+from archord.output.run import solve_scene
+from archord.postprocess.run import Run
+from archord.presets.words import words_of
 from archord.report.table import Table
+from archord.solver.problem import Body, Interaction, Load, Problem, Support
 
 E = 1.0
 NU = 0.3
@@ -64,21 +73,21 @@ class Case:
     """A problem, and what its last step is compared with."""
 
     name: str
-    problem: Callable[[], archord.Problem]
-    compare: Callable[[archord.Run], Iterator[Compared]]
+    problem: Callable[[], Problem]
+    compare: Callable[[Run], Iterator[Compared]]
 
 
-def _problem(mesh: TaggedMesh, material: Any, **parts: Any) -> archord.Problem:
-    body = archord.Body("body", material)
-    return archord.Problem(mesh, [body], kinematics="axisymmetric", **parts)
+def _problem(mesh: TaggedMesh, material: Any, **parts: Any) -> Problem:
+    body = Body("body", material)
+    return Problem(mesh, [body], kinematics="axisymmetric", **parts)
 
 
-def _elastic() -> archord.Elastic:
-    return archord.Elastic(E, NU)
+def _elastic() -> Elastic:
+    return Elastic(E, NU)
 
 
-def _perfect() -> archord.J2Material:
-    return archord.J2Material(E, NU, hardening=archord.LinearHardening(SIGY))
+def _perfect() -> J2Material:
+    return J2Material(E, NU, hardening=LinearHardening(SIGY))
 
 
 # The thick sphere, whose half above the equator is meshed
@@ -98,17 +107,17 @@ def sphere_mesh(size: float = 0.08) -> TaggedMesh:
     return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
-def _sphere(material: Any, pressure: float, steps: int) -> archord.Problem:
+def _sphere(material: Any, pressure: float, steps: int) -> Problem:
     return _problem(
         sphere_mesh(),
         material,
-        supports=[archord.Support("equator", fixed="y"), archord.Support("axis", fixed="x")],
-        loads=[archord.Load("oil", on="bore", pressure=pressure)],
+        supports=[Support("equator", fixed="y"), Support("axis", fixed="x")],
+        loads=[Load("oil", on="bore", pressure=pressure)],
         steps=steps,
     )
 
 
-def _radial(run: archord.Run, radius: float) -> float:
+def _radial(run: Run, radius: float) -> float:
     """Mean radial displacement of the nodes at a distance from the origin."""
     fields = run.fields()
     distance = np.linalg.norm(fields.coordinates, axis=1)
@@ -117,7 +126,7 @@ def _radial(run: archord.Run, radius: float) -> float:
     return float((fields.displacement[at] * direction).sum(axis=1).mean())
 
 
-def _elastic_sphere(run: archord.Run) -> Iterator[Compared]:
+def _elastic_sphere(run: Run) -> Iterator[Compared]:
     a3 = INNER**3
     b3 = OUTER**3
     hoop = PRESSURE * (a3 + b3 / 2) / (b3 - a3)
@@ -131,7 +140,7 @@ def plastic_pressure() -> float:
     return 2 * SIGY * (math.log(c / INNER) + (1 - c**3 / OUTER**3) / 3)
 
 
-def _plastic_sphere(run: archord.Run) -> Iterator[Compared]:
+def _plastic_sphere(run: Run) -> Iterator[Compared]:
     exact = (1 - NU) * SIGY * PLASTIC_RADIUS**3 / (E * OUTER**2)
     yield Compared("u(b)", exact, "Hill", _radial(run, OUTER))
 
@@ -151,12 +160,12 @@ def cylinder_mesh(size: float = 0.05) -> TaggedMesh:
     return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
-def _cylinder(material: Any, load: archord.Load, steps: int) -> archord.Problem:
-    held = [archord.Support("ends", fixed="y")]
+def _cylinder(material: Any, load: Load, steps: int) -> Problem:
+    held = [Support("ends", fixed="y")]
     return _problem(cylinder_mesh(), material, supports=held, loads=[load], steps=steps)
 
 
-def _elastic_cylinder(run: archord.Run) -> Iterator[Compared]:
+def _elastic_cylinder(run: Run) -> Iterator[Compared]:
     a2 = INNER**2
     b2 = OUTER**2
     exact = PRESSURE * INNER * (1 + NU) / E * ((1 - 2 * NU) * a2 + b2) / (b2 - a2)
@@ -165,7 +174,7 @@ def _elastic_cylinder(run: archord.Run) -> Iterator[Compared]:
     yield Compared("u(a)", exact, "Lame", float(fields.displacement[at, 0].mean()))
 
 
-def _plastic_cylinder(run: archord.Run) -> Iterator[Compared]:
+def _plastic_cylinder(run: Run) -> Iterator[Compared]:
     exact = 2 / math.sqrt(3) * SIGY * math.log(OUTER / INNER)
     force = run.columns["push force"][-1]
     ours = force / (2 * math.pi * INNER * _HEIGHT)
@@ -191,16 +200,14 @@ def _draw_half_space(sketch: Sketch, fine: float) -> None:
     sketch.face("body", surface=surface, far=far, axis=axis)
 
 
-def _ball(
-    mesh: TaggedMesh, material: Any, radius: float, depth: float, steps: int
-) -> archord.Problem:
-    ball = archord.RigidCircle(np.array([0.0, radius]), radius)
+def _ball(mesh: TaggedMesh, material: Any, radius: float, depth: float, steps: int) -> Problem:
+    ball = RigidCircle(np.array([0.0, radius]), radius)
     return _problem(
         mesh,
         material,
-        interactions=[archord.Interaction("contact", (ball, "surface"))],
-        supports=[archord.Support("far", fixed="xy"), archord.Support("axis", fixed="x")],
-        loads=[archord.Load("ball", on="contact", direction="y", displacement=-depth)],
+        interactions=[Interaction("contact", (ball, "surface"))],
+        supports=[Support("far", fixed="xy"), Support("axis", fixed="x")],
+        loads=[Load("ball", on="contact", direction="y", displacement=-depth)],
         steps=steps,
     )
 
@@ -232,23 +239,23 @@ def balls_mesh() -> TaggedMesh:
     return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
-def _balls() -> archord.Problem:
-    return archord.Problem(
+def _balls() -> Problem:
+    return Problem(
         balls_mesh(),
-        [archord.Body("ball", _elastic()), archord.Body("body", _elastic())],
-        [archord.Interaction("contact", ("ball surface", "surface"))],
+        [Body("ball", _elastic()), Body("body", _elastic())],
+        [Interaction("contact", ("ball surface", "surface"))],
         [
-            archord.Support("far", fixed="xy"),
-            archord.Support("axis", fixed="x"),
-            archord.Support("ball axis", fixed="x"),
+            Support("far", fixed="xy"),
+            Support("axis", fixed="x"),
+            Support("ball axis", fixed="x"),
         ],
-        [archord.Load("ball", on="ball top", direction="y", displacement=-1 / BALL)],
+        [Load("ball", on="ball top", direction="y", displacement=-1 / BALL)],
         steps=4,
         kinematics="axisymmetric",
     )
 
 
-def _hertz(run: archord.Run, modulus: float) -> Iterator[Compared]:
+def _hertz(run: Run, modulus: float) -> Iterator[Compared]:
     """P from the depth, a and p0 from the force, by the contact ``modulus`` E*."""
     force = abs(run.columns["ball force"][-1])
     depth = abs(run.columns["ball displacement"][-1])
@@ -261,7 +268,7 @@ def _hertz(run: archord.Run, modulus: float) -> Iterator[Compared]:
     yield Compared("p0", pressure, "Hertz", run.columns["contact largest pressure"][-1])
 
 
-def _indentation(run: archord.Run) -> Iterator[Compared]:
+def _indentation(run: Run) -> Iterator[Compared]:
     force = abs(run.columns["ball force"][-1])
     yield Compared("P", FINE_FORCE, "finer mesh", force)
 
@@ -289,7 +296,7 @@ def fit_mesh(n: int = 10) -> TaggedMesh:
             for side, lines in sides.items():
                 gmsh.model.addPhysicalGroup(1, lines, name=f"{name} {side}")
 
-    return archord.gmsh_to_mesh(MPI.COMM_SELF, draw, quads=True)
+    return gmsh_to_mesh(MPI.COMM_SELF, draw, quads=True)
 
 
 def _column(
@@ -318,33 +325,33 @@ def _column(
     return {"faces": faces, "middle": levels[:1], "inside": inside, "outside": outside}
 
 
-def _fit() -> archord.Problem:
-    steel = archord.Elastic(STEEL, NU)
+def _fit() -> Problem:
+    steel = Elastic(STEEL, NU)
     surfaces = ("shaft outside", "ring inside")
     supports = [
-        archord.Support("axis", on="shaft inside", fixed="x"),
-        archord.Support("shaft middle", fixed="y"),
-        archord.Support("ring middle", fixed="y"),
+        Support("axis", on="shaft inside", fixed="x"),
+        Support("shaft middle", fixed="y"),
+        Support("ring middle", fixed="y"),
     ]
-    return archord.Problem(
+    return Problem(
         fit_mesh(),
-        [archord.Body("shaft", steel), archord.Body("ring", steel)],
-        [archord.Interaction("fit", surfaces, interference=FIT)],
+        [Body("shaft", steel), Body("ring", steel)],
+        [Interaction("fit", surfaces, interference=FIT)],
         supports,
-        [archord.Load("nothing", on="ring outside", pressure=0.0)],
+        [Load("nothing", on="ring outside", pressure=0.0)],
         steps=1,
         kinematics="axisymmetric",
     )
 
 
-def _displacement(run: archord.Run, place: tuple[float, float]) -> Any:
+def _displacement(run: Run, place: tuple[float, float]) -> Any:
     """Displacement ``(2,)`` of the node at a place."""
     fields = run.fields()
     nearest = np.linalg.norm(fields.coordinates - place, axis=1).argmin()
     return fields.displacement[nearest]
 
 
-def _fitted(run: archord.Run) -> Iterator[Compared]:
+def _fitted(run: Run) -> Iterator[Compared]:
     for what, place, axis, reference in (
         ("u_r outside, middle", (2.0, 0.0), 0, 5.23789e-4),
         ("u_r outside, end", (2.0, RING_LENGTH), 0, 5.24625e-4),
@@ -383,33 +390,39 @@ def punch_mesh() -> TaggedMesh:
     return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
-def _punch() -> archord.Problem:
+def _punch() -> Problem:
     supports = [
-        archord.Support("base", fixed="xy"),
-        archord.Support("axis", fixed="x"),
-        archord.Support("punch axis", fixed="x"),
+        Support("base", fixed="xy"),
+        Support("axis", fixed="x"),
+        Support("punch axis", fixed="x"),
     ]
-    aluminium = archord.Elastic(70e3, NU)
-    return archord.Problem(
+    aluminium = Elastic(70e3, NU)
+    return Problem(
         punch_mesh(),
         [
-            archord.Body("punch", archord.Elastic(STEEL, NU)),
-            archord.Body("foundation", aluminium),
+            Body("punch", Elastic(STEEL, NU)),
+            Body("foundation", aluminium),
         ],
-        [archord.Interaction("contact", ("punch base", "top"))],
+        [Interaction("contact", ("punch base", "top"))],
         supports,
-        [archord.Load("press", on="punch top", pressure=100.0)],
+        [Load("press", on="punch top", pressure=100.0)],
         steps=2,
         kinematics="axisymmetric",
     )
 
 
-def _punched(run: archord.Run) -> Iterator[Compared]:
+def _punched(run: Run) -> Iterator[Compared]:
     for what, place, axis, reference in (
         ("u_z of the punch's top", (0.0, 100.0), 1, -0.182072),
         ("u_r of the foundation's top", (60.0, 0.0), 0, -0.0101585),
     ):
         yield Compared(what, reference, "CalculiX", float(_displacement(run, place)[axis]))
+
+
+def _solved(problem: Problem, folder: Path) -> Run:
+    """The run of a ``problem`` in an empty ``folder``."""
+    solve_scene(words_of(problem, str(folder / MESH)), folder, problem=problem)
+    return Run(folder)
 
 
 CASES = (
@@ -421,14 +434,14 @@ CASES = (
     ),
     Case(
         "thick cylinder, elastic",
-        lambda: _cylinder(_elastic(), archord.Load("oil", on="bore", pressure=PRESSURE), 1),
+        lambda: _cylinder(_elastic(), Load("oil", on="bore", pressure=PRESSURE), 1),
         _elastic_cylinder,
     ),
     Case(
         "thick cylinder, plastic",
         lambda: _cylinder(
             _perfect(),
-            archord.Load("push", on="bore", direction="x", displacement=20 * SIGY),
+            Load("push", on="bore", direction="x", displacement=20 * SIGY),
             20,
         ),
         _plastic_cylinder,
@@ -453,7 +466,7 @@ def rows(case: Case) -> Iterator[tuple[str, ...]]:
     """Solve a ``case``; its rows of the table."""
     start = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        run = archord.solve(case.problem(), Path(folder) / "run")
+        run = _solved(case.problem(), Path(folder))
         seconds = perf_counter() - start
         nodes = len(run.fields().coordinates)
         found = list(case.compare(run))

@@ -71,7 +71,9 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     )
 
     core = core_density((0.0, 0.0), scene.load.core_radius * g.radius)
-    part = "none" if rigid else "whole" if scene.pin.whole else "half"
+    part = "whole" if scene.pin.whole else "half"
+    if rigid:
+        part = "none"
 
     def guess(load: float) -> Guess:
         """The pin moved by the load, or by about what a force would press it, from where it touches
