@@ -31,9 +31,34 @@ def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Record]
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:
-    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E*
-    R)"]``, ... A last row that does not end in a line break (a copy cut short) is ignored. Raises
-    `OSError`, and `ValueError` for what is no table of numbers."""
+    """Read the columns of a history.csv.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file. A last row that does not end in a line break is ignored: it is of a copy cut
+        short.
+
+    Returns
+    -------
+    dict of str to list of float
+        The columns by their names without units: "P", "P/(E* R)" and so on.
+
+    Raises
+    ------
+    OSError
+        For a file that cannot be read.
+    ValueError
+        For a file that is no table of numbers.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from archord.output.history import read_history
+    >>> _ = Path("history.csv").write_text("step,P [N/mm]\\n1,120.5\\n2,260.0\\n")
+    >>> read_history("history.csv")["P"]
+    [120.5, 260.0]
+    """
     text = Path(path).read_bytes().decode()
     heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
     names = [h.split(" [")[0] for h in heading]

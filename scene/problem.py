@@ -45,8 +45,55 @@ class MeshScene(Checked):
 
 
 class ProblemScene(Checked):
-    """Bodies on a mesh, what they touch, what holds them and what loads them; made as `Scene`.
-    Raises `InputError`."""
+    """Bodies on a mesh, what they touch, what holds them and what loads them.
+
+    Sections are given as tables or as their classes, as in `Scene`. docs/scene.md has the keys of
+    each section.
+
+    Parameters
+    ----------
+    units : dict
+        Names of the units.
+    mesh : dict
+        The mesh.
+    body : list of dict
+        The deformable bodies.
+    interaction : list of dict
+        Contact and ties.
+    coupling : list of dict
+        Reference points.
+    support : list of dict
+        What is held.
+    load : list of dict
+        What moves or presses.
+    path : dict
+        Stages and steps of the loads.
+    analysis : dict
+        Model and solver.
+    stepping : dict
+        The control of the steps between outputs.
+    output : dict
+        What is written.
+    format : int
+        The version of the scene format, by default the newest.
+
+    Raises
+    ------
+    InputError
+        One sentence for each fault.
+
+    Examples
+    --------
+    >>> import archord
+    >>> scene = archord.ProblemScene(
+    ...     mesh={"file": "lug.msh"},
+    ...     body=[{"name": "lug", "E": 210e3, "nu": 0.3}],
+    ...     support=[{"name": "clamp", "on": "left", "fixed": ["x", "y"]}],
+    ...     load=[{"name": "pull", "on": "right", "direction": "x", "displacement": [0.3, 0.0]}],
+    ... )
+    >>> scene.n_stages
+    2
+    """
 
     format: Literal[2] = key("version of the scene format", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")

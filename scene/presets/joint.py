@@ -36,9 +36,46 @@ _STIFFEST_STUCK = (
 class Scene(Checked):
     """A pin joint and how to load it.
 
-    ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections: tables or
-    their classes, whose numbers and lists may be numpy's; None means absent. Raises `InputError`, a
-    sentence for each fault.
+    Sections are given as tables or as their classes. Numbers and lists may be numpy's; None means
+    absent. docs/scene.md has the keys of each section.
+
+    Parameters
+    ----------
+    units : dict
+        Names of the units.
+    joint : dict
+        Geometry and mesh.
+    pin, block : dict
+        The materials.
+    analysis : dict
+        Model and solver.
+    load : dict
+        The loading.
+    stepping : dict
+        The control of the steps between outputs.
+    output : dict
+        What is written.
+    format : int
+        The version of the scene format, by default the newest.
+
+    Raises
+    ------
+    InputError
+        One sentence for each fault.
+
+    Examples
+    --------
+    >>> import archord
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> joint = {"radius": 10.0, "clearance": 0.05}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load={"displacement": 2.0})
+    >>> print(f"{scene.E_star:.0f}")
+    115385
+    >>> try:
+    ...     archord.Scene(joint=joint, pin=steel, block={"E": -1.0, "nu": 0.3}, load={"force": 1e3})
+    ... except archord.InputError as error:
+    ...     print(error)
+    scene: block.E = -1.0 must be greater than 0.
     """
 
     format: Literal[1] = key(
