@@ -51,16 +51,56 @@ class _Report(BaseModel):
 
 
 class Run:
-    """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again
-    to see more.
+    """The run in a folder, as it was when this was made.
 
-    ``status`` says how it ended: "done", "stopped" (``message`` says why) or "interrupted";
-    "running", if it has not or was killed. ``steps`` is the number of accepted steps, which are
-    counted from 1; ``columns`` are those of history.csv by name, as plain lists, and ``units``
-    their units; ``summary`` is run.json, ``warnings`` are the warnings in it. ``view`` tells what
-    kind of problem was solved: its path, its forces, its surfaces.
+    A run that still goes on is loaded again to see more. Steps are counted from 1.
 
-    Raises `InputError` if it is no run folder, or its scene, report or history cannot be read.
+    Parameters
+    ----------
+    folder : str or Path
+        The run folder.
+
+    Attributes
+    ----------
+    folder : Path
+        The run folder.
+    status : str
+        How the run ended: "done", "stopped" or "interrupted"; "running" if it has not, or was
+        killed.
+    message : str
+        Why it stopped.
+    steps : int
+        The number of accepted steps.
+    columns : dict
+        The columns of history.csv by name, as plain lists.
+    units : dict
+        Their units by name.
+    summary : dict
+        What run.json holds.
+    warnings : list of str
+        The warnings in it.
+    scene : Scene or ProblemScene
+        The scene that was solved.
+    view : object
+        What kind of problem it was: its path, its forces, its surfaces.
+
+    Raises
+    ------
+    InputError
+        For a folder that is no run folder, and for a scene, report or history that cannot be read.
+
+    Examples
+    --------
+    >>> import archord
+    >>> joint = {"radius": 10.0, "clearance": 0.1, "relative_element_size": 0.2}
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> load = {"displacement": 0.5, "steps": 1}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load=load)
+    >>> run = archord.solve(scene, "runs/doctest", force=True)
+    >>> run.status, run.steps
+    ('done', 1)
+    >>> print(f"{run.columns['P'][-1]:.0f} {run.units['P']}")
+    5260 N/mm
     """
 
     def __init__(self, folder: str | Path) -> None:

@@ -19,11 +19,43 @@ _FIRST = ["case", "run", "status"]  # columns before the varied keys
 
 
 class Sweep:
-    """The sweep in ``folder``. ``cases`` is cases.csv as it was when this was made, a row for each
-    case with the values of its last step; ``keys`` are the varied keys.
+    """The sweep in a folder, as it was when this was made.
 
-    Cases are numbered from 1; cases whose scenes are the same share a run. Raises `InputError` if
-    the folder is not that of a sweep or its table of cases cannot be read.
+    Cases are numbered from 1. Cases whose scenes are the same share a run.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder of the sweep.
+
+    Attributes
+    ----------
+    folder : Path
+        The folder of the sweep.
+    cases : DataFrame
+        What cases.csv holds: a row for each case, with the values of its last step.
+    keys : list of str
+        The varied keys.
+
+    Raises
+    ------
+    InputError
+        For a folder that is not a sweep's, and for a table of cases that cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import archord
+    >>> folder = Path("runs/doctest_sweep")
+    >>> folder.mkdir(parents=True, exist_ok=True)
+    >>> _ = (folder / "sweep.toml").write_text("")
+    >>> table = "case,run,status,joint.clearance [mm],message\\n1,a,done,0.05,\\n2,b,done,0.1,\\n"
+    >>> _ = (folder / "cases.csv").write_text(table)
+    >>> sweep = archord.Sweep(folder)
+    >>> sweep.keys, sweep.states
+    (['joint.clearance'], '2 done')
+    >>> sweep.label(2)
+    'clearance = 0.1 mm'
     """
 
     def __init__(self, folder: str | Path) -> None:

@@ -48,13 +48,45 @@ def draw_run(
     field: str = "",
     edges: Sequence[str] = (),
 ) -> Path:
-    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``;
-    returns the file.
+    """Draw the field, the contact pressure and the forces of a run.
 
-    The ``field``, by default PEEQ or von Mises stress, is drawn at the first of ``steps``, by
-    default the last step, or of an unloaded run the step with the largest load. Named ``edges`` of
-    the mesh take the place of the contact pressure: along them the ``field``, or the hoop stress,
-    is drawn at all ``steps``. Raises `InputError`.
+    Parameters
+    ----------
+    run : Run
+        The run. Its field is drawn if the run wrote fields.
+    target : str or Path
+        The picture, .png, .svg or .pdf.
+    steps : sequence of int
+        The steps of the pressure; the field is drawn at the first of them. By default it is drawn
+        at the last step, or of an unloaded run at the step with the largest load.
+    field : str
+        The field, by default PEEQ or von Mises stress.
+    edges : sequence of str
+        Edges of the mesh that take the place of the contact pressure: along them the ``field``, or
+        the hoop stress, is drawn at all ``steps``.
+
+    Returns
+    -------
+    Path
+        The picture.
+
+    Raises
+    ------
+    InputError
+        For a step, a field or an edge that the run does not have, and for a file that cannot be
+        written.
+
+    Examples
+    --------
+    >>> import archord
+    >>> joint = {"radius": 10.0, "clearance": 0.1, "relative_element_size": 0.2}
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> load = {"displacement": 0.5, "steps": 1}
+    >>> output = {"fields": False}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load=load, output=output)
+    >>> run = archord.solve(scene, "runs/doctest", force=True)
+    >>> archord.draw_run(run, "joint.svg").name
+    'joint.svg'
     """
     draws = panels_of(run, steps=steps, field=field, edges=edges)
     figure = new_figure(5.0 * len(draws), 4.4)
