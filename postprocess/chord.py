@@ -107,11 +107,39 @@ def chord_projection(
 def read_chord_pressure(
     folder: str | Path, step: int | None = None, side: str | None = None
 ) -> ChordPressure:
-    """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step``
-    of a run (the last).
+    """Read the contact pressure of a run of a joint, projected onto the chord.
 
-    ``R`` is the side's own radius and ``eps`` the step's in history.csv. Raises `InputError` where
-    there is no such run, step or side, no contact angle, or one beyond pi/2 (a ring).
+    Parameters
+    ----------
+    folder : str or Path
+        The run folder.
+    step : int
+        The step, from 1; by default the last one.
+    side : {"pin", "hole"}
+        The side; by default the hole if both are there.
+
+    Returns
+    -------
+    ChordPressure
+        Its ``R`` is the side's own radius, and its ``eps`` the semi-angle in history.csv.
+
+    Raises
+    ------
+    InputError
+        Where there is no such run, step or side, no contact angle, or one beyond pi/2 (a ring).
+
+    Examples
+    --------
+    >>> import archord
+    >>> from archord.postprocess.chord import read_chord_pressure
+    >>> joint = {"radius": 10.0, "clearance": 0.1, "relative_element_size": 0.2}
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> load = {"displacement": 0.5, "steps": 1}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load=load)
+    >>> run = archord.solve(scene, "runs/doctest", force=True)
+    >>> chord = read_chord_pressure(run.folder)
+    >>> print(f"{chord.length:.1f}")
+    6.9
     """
     run = Run(folder)
     number = run.number(step)

@@ -37,15 +37,55 @@ def _known(kind: str, name: str, doc: str) -> property:
 
 @dataclass(frozen=True)
 class Fields:
-    """Bodies (of the paper's joint the half x >= 0) at one step: ``n`` nodes and ``m`` curved cells
-    of second order.
+    """The bodies of a run at one step: ``n`` nodes and ``m`` curved cells of second order.
 
-    ``cells`` has VTK's order: corners, then the nodes between the first two, the next two, ..., and
-    the last and the first, and the node in the middle of four corners. Stress is positive in
-    tension, contact pressure in compression. All in the
-    scene's units. ``cell`` and ``nodal`` have all fields by name, a user's own, too. An attribute
-    is None where the run has no such field: PEEQ and plastic strain where no body can yield, and
-    what is recovered at nodes where `output.fields` is "cells".
+    Of the paper's joint this is the half x >= 0. All is in the scene's units. Stress is positive in
+    tension, contact pressure in compression. `archord.Run.fields` reads it.
+
+    A named field, as ``von_mises``, is None where the run has no such field. PEEQ and plastic
+    strain are missing where no body can yield. Fields of the nodes are missing where
+    ``output.fields`` is "cells".
+
+    Attributes
+    ----------
+    step : int
+        The step, from 1.
+    delta : float
+        The displacement of a joint, or the load factor.
+    coordinates : array (n, 2)
+        The undeformed nodes.
+    cells : array (m, 6), or (m, 9) of quadrilaterals
+        The nodes of each cell in VTK's order: the corners, then the nodes between the first two,
+        the next two, ..., the last and the first, and the node in the middle of four corners.
+    body : array (m,)
+        The tag of the cell's body.
+    displacement : array (n, 2)
+        The displacement of the nodes.
+    cell : dict
+        Means of cells by name, also a user's own: scalars ``(m,)``, tensors ``(m, 4)``.
+    nodal : dict
+        What is recovered at the nodes by name: scalars ``(n,)``, tensors ``(n, 4)``.
+    components : tuple of str
+        The components of tensors.
+    bodies : dict
+        The tags of bodies by name.
+    edges : dict
+        The nodes ``(k, 3)`` along named sets of facets.
+
+    Examples
+    --------
+    >>> import archord
+    >>> joint = {"radius": 10.0, "clearance": 0.1, "relative_element_size": 0.2}
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> load = {"displacement": 0.5, "steps": 1}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load=load)
+    >>> fields = archord.solve(scene, "runs/doctest", force=True).fields()
+    >>> list(fields.bodies)
+    ['pin', 'block']
+    >>> fields.von_mises.shape == (len(fields.cells),)
+    True
+    >>> fields.stress is None
+    True
     """
 
     step: int

@@ -38,9 +38,52 @@ _SAMPLES = 201  # on a line
 
 @dataclass(frozen=True)
 class Probe:
-    """A ``quantity`` at ``n`` points of the edge or line ``place`` at a ``step``, in the scene's
-    units; ``force`` is the largest of those that drive the run then, per unit thickness, and the
-    load ``by`` exerts it."""
+    """A quantity at ``n`` points of an edge or a line at a step, in the scene's units.
+
+    `archord.Run.probe` makes it.
+
+    Attributes
+    ----------
+    place : str
+        The name of the edge, or "line".
+    quantity, unit : str
+        The quantity and its unit.
+    step : int
+        The step, from 1.
+    force : float
+        The largest force that drives the run at the step, per unit thickness.
+    by : str
+        The load that exerts it.
+    x : array (n, 2)
+        The undeformed points.
+    s : array (n,)
+        How far along its piece of the edge a point is, with the body on the left; on arcs the
+        radius times the angle.
+    values : array (n,)
+        The values.
+    length : str
+        The unit of ``x`` and ``s``.
+    angle : array (n,)
+        On arcs the degrees about their centre, counterclockwise from the x axis; else None.
+    axes : tuple of str
+        The names of the coordinates.
+    per : str
+        What the force is of.
+
+    Examples
+    --------
+    >>> import archord
+    >>> joint = {"radius": 10.0, "clearance": 0.1, "relative_element_size": 0.2}
+    >>> steel = {"E": 210e3, "nu": 0.3}
+    >>> load = {"displacement": 0.5, "steps": 1}
+    >>> scene = archord.Scene(joint=joint, pin=steel, block=steel, load=load)
+    >>> run = archord.solve(scene, "runs/doctest", force=True)
+    >>> probe = run.probe("hole", "pressure")
+    >>> probe.unit
+    'MPa'
+    >>> print(f"{probe.values[probe.largest]:.0f}")
+    528
+    """
 
     place: str
     quantity: str
