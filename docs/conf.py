@@ -10,7 +10,7 @@ from pathlib import Path
 import archord
 
 project, author, version = "archord", "the authors of archord", archord.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["cluster", "figures"]
 html_theme, html_title, html_show_copyright = "furo", f"archord {version}", False
 html_static_path, html_css_files = ["_static"], ["code.css"]

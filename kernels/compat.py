@@ -28,9 +28,7 @@ _REASONS = vars(PETSc.SNES.ConvergedReason)
 RESIDUAL_NOT_FINITE = _REASONS.get(
     "DIVERGED_FNORM_NAN", _REASONS.get("DIVERGED_FUNCTION_NANORINF")
 )  # until PETSc 3.24
-_KINDS = hasattr(
-    Geometry, "dofmaps"
-)  # of cells; dolfinx from 0.11 on may have several in a mesh
+_KINDS = hasattr(Geometry, "dofmaps")  # of cells; dolfinx from 0.11 on may have several in a mesh
 
 # of Debian (gmsh needs it), of conda on Linux and macOS, and beside PyPI's dolfinx
 _FOLDERS = ("", f"{sys.prefix}/lib/", f"{Path(dolfinx.__file__).parents[1]}/dolfinx_solver/lib/")
