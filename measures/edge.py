@@ -42,7 +42,7 @@ class EdgeProfile:
 
     @property
     def width(self) -> Array:
-        """Length ``(n,)`` of each facet."""
+        """Measure ``(n,)`` of each facet: a length in a plane, an area around an axis."""
         return self.weight.sum(axis=1)
 
     @property
@@ -57,7 +57,7 @@ class EdgeProfile:
 
     @property
     def contact_length(self) -> float:
-        """Length of the surface under pressure."""
+        """Measure of the surface under pressure: a length in a plane, an area around an axis."""
         return float((self.in_contact * self.width).sum())
 
 
@@ -91,12 +91,17 @@ class SurfaceProfile(EdgeProfile):
     def n_arcs(self) -> int:
         """Number of separate stretches under pressure."""
         closed = self.in_contact > 0
-        apart = (
-            np.linalg.norm(self.X[1:, 0] - self.X[:-1, -1], axis=1) > self.width.max()
-        )  # between pieces
-        begins = np.append(closed[:1], closed[1:] & (~closed[:-1] | apart)).sum()
-        whole = np.linalg.norm(self.X[0, 0] - self.X[-1, -1]) < self.width.max()
-        return int(max(begins - (whole and closed[0] and closed[-1]), 0)) or int(closed.any())
+        first = self.X[:, 0]
+        last = self.X[:, -1]
+        # gaps between the points of neighbours are a seventh of the longest chord
+        longest = np.linalg.norm(last - first, axis=1).max()
+        apart = np.linalg.norm(first[1:] - last[:-1], axis=1) > longest
+        begins = closed[1:] & (~closed[:-1] | apart)
+        arcs = int(closed[0]) + int(begins.sum())
+        is_ring = np.linalg.norm(first[0] - last[-1]) < longest
+        if arcs > 1 and is_ring and closed[0] and closed[-1]:
+            return arcs - 1
+        return arcs
 
 
 def per_step(system: System) -> tuple[str, ...]:

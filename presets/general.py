@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.measures.account import Account, Driven, Values, sizes
-from archord.measures.doubts import contrast_doubts
+from archord.measures.doubts import contrast_doubts, stiff_quadrilaterals
 from archord.measures.edge import per_step, surface_profiles
 from archord.measures.energies import ENERGIES
 from archord.measures.measure import Accepted, Column, column
@@ -57,6 +57,7 @@ def general_account(
     frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
     warnings += friction_doubts(frictions)
     warnings += contrast_doubts(problem.bodies)
+    warnings += stiff_quadrilaterals(system)
     return _account(scene, system, warnings, file)
 
 

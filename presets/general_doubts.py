@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from archord.measures.doubts import (
     LARGE,
@@ -54,7 +53,8 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
                 continue
             yield from _facet_doubts(state, m, name, f"{part.name} largest pressure")
             if fixed_partners:
-                yield from _slip_doubts(name, profile)
+                longest = system.sides[name].facet_lengths().max()
+                yield from _slip_doubts(name, profile.largest_slip, longest)
 
     def strains(state: Accepted, m: Record) -> Iterator[str]:
         peeq = [value for name, value in m.values.items() if name.endswith(" peeq_max")]
@@ -87,10 +87,10 @@ def _facet_doubts(state: Accepted, m: Record, surface: str, pressure: str) -> li
     return few_facets(touching, _FEWEST_FACETS, f"of {surface!r} ", "smaller elements")
 
 
-def _slip_doubts(surface: str, profile: Any) -> Iterator[str]:
-    """A warning where a ``surface`` slides by more than a facet and keeps its partners."""
-    slip = profile.largest_slip
-    if slip > profile.width.max():
+def _slip_doubts(surface: str, slip: float, longest: float) -> Iterator[str]:
+    """A warning where a ``surface`` slides by more than its ``longest`` facet and keeps its
+    partners."""
+    if slip > longest:
         text = (
             f"{surface!r} slides by {slip:.3g}, more than a facet, but keeps the partners that it "
             'had at first; analysis.kinematics = "current" is for that'

@@ -137,6 +137,25 @@ def test_a_checkpoint_of_version_0_1_goes_on(tmp_path):
     same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
 
 
+def test_a_halted_run_of_version_0_2_at_large_strain_goes_on(tmp_path):
+    """Its state has no work of the change of volume, on which nothing but the dissipation
+    depends."""
+    problem = scene(0.2, 3, **PLASTIC, analysis={"strain": "large"})
+    run(problem, tmp_path / "whole", copies={2: tmp_path / "halted"})
+    old = checkpoint.read(tmp_path / "halted" / CHECKPOINT)
+    new = [name for name in old.arrays if name.endswith("/volume_work")]
+    assert new
+    for name in new:
+        del old.arrays[name]
+    checkpoint.write(tmp_path / "halted" / CHECKPOINT, old)
+    go_on(problem, tmp_path / "halted")
+    whole, halted = (read_history(tmp_path / name / "history.csv") for name in ("whole", "halted"))
+    assert halted["P"] == pytest.approx(whole["P"], rel=1e-12)
+    name = next(name for name in whole if name.startswith("plastic_dissipation"))
+    assert halted[name] != whole[name]
+    assert halted[name] == pytest.approx(whole[name], rel=2e-3)
+
+
 def test_a_run_may_be_halted_after_every_step(tmp_path):
     """Restarted as often as it has steps; run.json notes each."""
     problem = CASES["plastic"][0]

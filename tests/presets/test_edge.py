@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,3 +46,11 @@ def test_arcs_of_pieces_that_lie_apart_are_counted_apart(chords, pressed, arcs):
     """Stretches under pressure end where the surface does; on a ring the last and the first facet
     meet."""
     assert profile(chords, list(map(bool, pressed))).n_arcs == arcs
+
+
+@pytest.mark.parametrize("radius", [0.01, 100.0])
+def test_arcs_are_told_apart_by_lengths_not_by_the_areas_of_rings(radius):
+    """The weights of a body of revolution hold 2 pi r, which gaps must not be compared with."""
+    plane = profile(TWO_PIECES, [True] * 4)
+    ring = replace(plane, weight=2 * np.pi * radius * plane.weight)
+    assert ring.n_arcs == plane.n_arcs == 2

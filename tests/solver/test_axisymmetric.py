@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.materials.hardening import LinearHardening
+from archord.materials.j2 import J2Material
 from archord.materials.kinematics import AXISYMMETRIC
+from archord.measures.doubts import stiff_quadrilaterals
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
 from archord.solver.problem import Body, DeadLoad, Dirichlet, Drive, Mean, Problem
@@ -110,3 +114,51 @@ def test_rings_have_no_rotation():
     assert bars().reaction_moment("feet", (0.0, 0.0)) == 0
     with pytest.raises(ValueError, match="rotation"):
         bars(means=[Mean("lid", "lid", 2, drive="lid")], drives=[Drive("lid", control="force")])
+
+
+INNER, OUTER, YIELD_STRESS = 1.0, 2.0, 0.001
+LIMIT = 2 * YIELD_STRESS / np.sqrt(3) * np.log(OUTER / INNER)  # Hill (1950)
+
+
+def thick_cylinder(n: int, *, quads: bool, degree: int) -> System:
+    """A slice of a perfectly plastic tube, ``n`` square cells across its wall, whose inner wall
+    moves outward until it yields throughout, and twice as far."""
+
+    def build(gmsh) -> None:
+        face = gmsh.model.occ.addRectangle(INNER, 0, 0, OUTER - INNER, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [face], name="tube")
+        sides = gmsh.model.getBoundary([(2, face)], oriented=False)
+        for (_, side), name in zip(sides, ("bottom", "outside", "top", "wall"), strict=True):
+            gmsh.model.addPhysicalGroup(1, [side], name=name)
+            gmsh.model.mesh.setTransfiniteCurve(side, n + 1)
+        gmsh.model.mesh.setTransfiniteSurface(face)
+
+    mesh = gmsh_to_mesh(MPI.COMM_SELF, build, quads=quads)
+    tube = Body("tube", J2Material(1.0, 0.499, "axisymmetric", LinearHardening(YIELD_STRESS)))
+    held = [Dirichlet("bottom", "bottom", 1), Dirichlet("top", "top", 1)]
+    supports = [Dirichlet("wall", "wall", 0, 1.0), *held]
+    problem = Problem(mesh, [tube], supports=supports, degree=degree, kinematics=AXISYMMETRIC)
+    system = System(problem)
+    plastic = 2 * np.sqrt(3) * YIELD_STRESS * OUTER**2 / 2 / INNER  # wall's motion at full flow
+    system.solve(plastic * np.array([0.5, 1.1, 2.0]))
+    return system
+
+
+@pytest.mark.parametrize(
+    ("quads", "degree", "least", "most"),
+    [(False, 2, 0.0, 1e-3), (True, 3, 0.0, 1e-3), (True, 2, 0.02, 0.09)],
+    ids=["triangles", "cubic quads", "quads"],
+)
+def test_a_plastic_tube_carries_hills_pressure_or_a_warning_says_how_much_more(
+    quads, degree, least, most
+):
+    """Two dofs along the radius do not keep the volume at three points: second-order
+    quadrilaterals are too stiff, as the warning says."""
+    system = thick_cylinder(4, quads=quads, degree=degree)
+    pressure = system.reaction("wall")[0] / (2 * np.pi * INNER)
+    assert least <= pressure / LIMIT - 1 < most
+    warned = stiff_quadrilaterals(system)
+    assert bool(warned) == (quads and degree == 2)
+    if warned:
+        assert "2 % to 9 % too much with four cells across a wall" in warned[0]
