@@ -19,6 +19,7 @@ from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
+from archord.solver.contact.coulomb import Coulomb
 from archord.solver.contact.interaction import Interaction
 from archord.solver.expansion import disc_of
 from archord.solver.parts import Body, Load, Support
@@ -159,6 +160,8 @@ def _law(law: Any) -> dict[str, Any]:
     """The keys of an interaction's section for a contact law."""
     if isinstance(law, str):
         return {"law": law}
+    if law == Coulomb(getattr(law, "friction", 0.0)):
+        return {"law": "coulomb", "friction": law.friction}
     units = {name: quantity.unit for name, quantity in law.quantities(law.state(1)).items()}
     return {"own": _own(law) | {"friction": bool(law.has_friction), "quantities": units}}
 

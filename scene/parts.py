@@ -111,10 +111,13 @@ class InteractionSection(Section):
     rigid: DiscSection | None = key(
         "rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0}
     )
-    law: Literal["frictionless", "tied"] = key(
-        "contact without friction, or tied surfaces", default="frictionless"
+    law: Literal["frictionless", "coulomb", "tied"] = key(
+        "contact without friction, with Coulomb's friction, or tied surfaces",
+        default="frictionless",
     )
-    friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
+    friction: float = key(
+        "Coulomb's coefficient of friction, also without law = coulomb", default=0.0, ge=0, le=1e6
+    )
     own: OwnLaw | None = Field(
         None, description="of a run from Python: its own contact law, in words"
     )
@@ -163,6 +166,8 @@ class InteractionSection(Section):
             f"must be one of the surfaces {self.surfaces}",
         )
         require(not (self.friction and self.law == "tied"), "friction", "is not for tied surfaces")
+        rubs = self.law != "coulomb" or self.friction > 0
+        require(rubs, "friction", 'must be positive where law = "coulomb"')
         fits = self.interference or self.overlap
         require(not (fits and self.law == "tied"), "interference", "is not for tied surfaces")
         return self

@@ -154,3 +154,30 @@ def test_an_extended_path_goes_on(run, tmp_path):
     found = archord.solve(longer, folder, restart=True)
     assert (found.status, found.steps) == ("done", 7)
     assert found.columns["slide displacement"][-1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "law", [{"law": "coulomb", "friction": 0.2}, {"law": archord.Coulomb(0.2)}]
+)
+def test_friction_is_said_by_name_by_an_object_and_by_its_coefficient(tmp_path, law):
+    """The same run; a scene can state it, as its words say."""
+    blocks = archord.rectangles({"low": (0, 0, 2, 1), "high": (0.5, 1, 1, 1)}, size=0.5)
+
+    def forces(name, **given):
+        steel = archord.Elastic(210e3, 0.3)
+        contact = archord.Interaction("contact", ("high bottom", "low top"), **given)
+        press = archord.Load("press", on="high top", direction="y", displacement=-1e-3)
+        problem = archord.Problem(
+            blocks,
+            [archord.Body("low", steel), archord.Body("high", steel)],
+            [contact],
+            [archord.Support("low bottom"), archord.Support("high top", fixed="x")],
+            [press],
+            steps=2,
+        )
+        return archord.solve(problem, tmp_path / name, force=True)
+
+    run = forces("named", **law)
+    same = forces("by coefficient", friction=0.2)
+    assert run.columns["press force"] == pytest.approx(same.columns["press force"], rel=1e-12)
+    assert run.scene.interaction[0].friction == 0.2

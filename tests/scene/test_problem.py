@@ -196,6 +196,7 @@ def test_an_interference_has_a_stage_of_its_own():
         ("mesh.file", None, "mesh.file is missing"),
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
+        ("interaction.0.law", "coulomb", "interaction .*friction must be positive where law"),
         ("analysis", {"plane": "space"}, "analysis.plane = .* must be 'strain', 'stress' or 'axi"),
         (
             "analysis",
