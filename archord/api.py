@@ -124,7 +124,8 @@ def solve(
     own_fields : dict
         More fields of the cells by name, functions of the state at a body's integration points,
         ``lambda at: at.stress[..., 0]``, which return an array ``(n, q)``: the run has the mean of
-        each cell. `PointFields` in archord/solver/body_points.py says what ``at`` has.
+        each cell. `PointFields` in archord/solver/body_points.py says what ``at`` has. A restart
+        takes them again.
     progress : bool
         Report steps as ``archord solve`` does.
     comm : MPI.Comm
@@ -160,6 +161,8 @@ def solve(
     comm = MPI.COMM_WORLD if comm is None else comm
     if force and restart:
         raise InputError("archord.solve: force and restart do not go together; give one of them.")
+    if own_fields and not fields:
+        raise InputError("archord.solve: own_fields need fields, which False leaves out.")
     given = _problem_of(problem)
     if given is None:
         checked: Callable[[], AnyScene] = partial(_scene_of, problem)

@@ -12,6 +12,7 @@ from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from archord.presets.views import plane_words
 from archord.ranks import on_terminal
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
@@ -39,7 +40,7 @@ def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
     """What is solved in words, the columns of its steps (of a general scene displacement and force
     of each load), and name and unit of what tells how accurate a mesh is."""
     kind = "elastic-plastic" if scene.plastic else "elastic"
-    plane = f"plane {scene.analysis.plane}"
+    plane = plane_words(scene)
     if isinstance(scene, Scene):
         dR = scene.joint.dR
         R = scene.joint.radius

@@ -40,7 +40,8 @@ def general_account(
         problem = given.on(comm) if given else general_problem(scene, comm)
     warnings = scene.doubts
     with as_input_error(name):
-        expanded(problem)  # what contradicts itself is refused before its mesh is looked at
+        # what contradicts itself is refused before its mesh is looked at
+        conditions = expanded(problem)
         if scene.mesh.shape is None:
             # with scipy, which solves of presets do without
             from archord.presets.held import check
@@ -48,7 +49,7 @@ def general_account(
             with timer("mesh"):
                 warnings += check(problem)
         require_mirrored(problem)
-        system = System(problem, timer=timer)
+        system = System(conditions, timer=timer)
         warnings += system.warnings
         if scene.mesh.shape is None or any(part.interference for part in scene.interaction):
             from archord.presets.held import require_facing
@@ -87,9 +88,7 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
 def _last_columns(scene: ProblemScene, system: System) -> list[Column]:
     """The energies of the whole, and what a step cost."""
     energies = ENERGIES if system.contact.has_friction else ENERGIES[:2]
-    kinematics = system.problem.kinematics
-    thickness = scene.analysis.thickness if kinematics.is_plane else 1.0
-    unit = scene.units.energy_of(thickness)
+    unit = scene.units.energy_of(scene.analysis.depth)
     of_whole = [column(name, unit) for name in (*energies, "work")]
     cost = [column("iterations"), column("cutbacks"), column("seconds", "s")]
     return [*of_whole, column("force_balance"), *cost]

@@ -38,10 +38,10 @@ def part_columns(scene: Parts) -> Iterator[Column]:
     units = scene.units
     length = units.length
     ring = scene.analysis.plane == "axisymmetric"
-    whole = ring or scene.analysis.thickness is not None
-    force = units.force_of(1.0 if whole else None)
-    moment = units.energy_of(1.0 if whole else None)
-    volume = f"{length}{3 if whole else 2}"  # displaced; per unit thickness an area
+    depth = scene.analysis.depth
+    force = units.force_of(depth)
+    moment = units.energy_of(depth)
+    volume = f"{length}{3 if depth else 2}"  # displaced; per unit thickness an area
     axes = "rz" if ring else "xy"
     for load in scene.load:
         moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)

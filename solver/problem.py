@@ -159,7 +159,10 @@ class Problem:
         if self.strain not in ("small", "large"):
             said = f'must be "small" or "large", not {self.strain!r}'
             raise InputError(f"archord.Problem: strain {said}.")
-        object.__setattr__(self, "kinematics", _kinematics(self.kinematics, self.thickness))
+        kinematics = _kinematics(self.kinematics, self.thickness)
+        object.__setattr__(self, "kinematics", kinematics)
+        if kinematics.is_plane and kinematics.thickness != 1:
+            object.__setattr__(self, "thickness", kinematics.thickness)
         bodies = [replace(body, material=self._live(body)) for body in self.bodies]
         object.__setattr__(self, "bodies", bodies)
         for kind in _DIFFERENT:
@@ -216,7 +219,10 @@ class Problem:
             except ValueError as error:
                 said = f'body "{body.name}".material = "{body.material}" {error}'
                 raise InputError(f"archord.Problem: {said}.") from None
-        material = material.under(self.kinematics)
+        try:
+            material = material.under(self.kinematics)
+        except ValueError as error:
+            raise InputError(f'archord.Problem: body "{body.name}": {error}.') from None
         if self.strain == "small" or material.finite:
             return material
         from archord.materials.finite import LargeStrain
@@ -298,6 +304,9 @@ class Problem:
         found = [body for body in self.bodies if behind & tags[body.name]]
         if not found:
             raise ValueError(f"the facet set {facets!r} is of no body: give that body, too")
+        if len(found) > 1 and len(behind) == 1:
+            names = " and ".join(repr(body.name) for body in found)
+            raise ValueError(f"the facet set {facets!r} is of {names}, which share their cells")
         if len(found) > 1 or not behind <= tags[found[0].name]:
             raise ValueError(
                 f"the facet set {facets!r} belongs to {len(behind)} cell sets, a surface to one "
@@ -317,11 +326,17 @@ def _require_parts(kind: str, given: Any, classes: tuple[type, ...]) -> None:
 
 
 def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
-    """The kinematics of this name, with the ``thickness``. Raises `InputError`, and ValueError for
-    a thickness of rings."""
-    if isinstance(given, Kinematics):
-        return given.with_thickness(given.thickness if thickness is None else thickness)
-    if given not in _PLANES:
-        known = ", ".join(f'"{name}"' for name in _PLANES)
-        raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
-    return kinematics(given.removeprefix("plane "), thickness or 1.0)
+    """The kinematics of this name, with the ``thickness``. Raises `InputError`."""
+    if not isinstance(given, Kinematics):
+        if given not in _PLANES:
+            known = ", ".join(f'"{name}"' for name in _PLANES)
+            raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
+        given = kinematics(given.removeprefix("plane "))
+    if thickness is None:
+        return given
+    if not thickness > 0:
+        raise InputError(f"archord.Problem: thickness must be positive, not {thickness!r}.")
+    try:
+        return given.with_thickness(thickness)
+    except ValueError as error:
+        raise InputError(f"archord.Problem: thickness = {thickness:g}: {error}.") from None

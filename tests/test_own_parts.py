@@ -12,6 +12,8 @@ from mpi4py import MPI
 
 import archord
 from archord import cli
+from archord.materials.kinematics import Kinematics
+from archord.postprocess.laws.run_steps import read_steps
 from archord.progress import Progress
 
 Worn = make_dataclass("Worn", ["depth"])
@@ -181,3 +183,77 @@ def test_friction_is_said_by_name_by_an_object_and_by_its_coefficient(tmp_path, 
     same = forces("by coefficient", friction=0.2)
     assert run.columns["press force"] == pytest.approx(same.columns["press force"], rel=1e-12)
     assert run.scene.interaction[0].friction == 0.2
+
+
+def slab(**given) -> archord.Problem:
+    """A square that is pressed by 0.001."""
+    mesh = archord.rectangles({"slab": (0, 0, 1, 1)}, size=0.5)
+    press = archord.Load("press", on="slab top", direction="y", displacement=-1e-3)
+    parts = {
+        "bodies": [archord.Body("slab", archord.Elastic(210e3, 0.3))],
+        "supports": [
+            archord.Support("slab bottom", fixed="y"),
+            archord.Support("slab left", fixed="x"),
+        ],
+        "loads": [press],
+        "steps": 1,
+    }
+    return archord.Problem(mesh, **parts | given)
+
+
+def test_a_thickness_is_the_same_of_a_problem_and_of_its_kinematics(tmp_path):
+    """Forces are of the thickness then, and so is their unit."""
+    by_kinematics = archord.solve(slab(kinematics=Kinematics("strain", 5.0)), tmp_path / "a")
+    by_itself = archord.solve(slab(thickness=5.0), tmp_path / "b")
+    assert by_kinematics.columns["press force"] == pytest.approx(by_itself.columns["press force"])
+    assert by_kinematics.units["press force"] == by_itself.units["press force"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"thickness": 0.0}, "thickness must be positive, not 0.0"),
+        ({"thickness": 2.0, "kinematics": "axisymmetric"}, "thickness = 2: only a plane has"),
+        ({"bodies": [archord.Body("slab", archord.Elastic(1.0, 0.3, "stress"))]}, 'body "slab": a'),
+    ],
+)
+def test_what_does_not_fit_the_kinematics_is_a_sentence(given, said):
+    with pytest.raises(archord.InputError, match=f"^archord.Problem: {said}"):
+        slab(**given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"kinematics": "curent"}, 'kinematics = "curent" must be "current" or "reference"'),
+        ({"gamma_factor": 0.0}, "gamma_factor = 0.0 must be positive"),
+    ],
+)
+def test_an_interaction_refuses_what_it_would_not_heed(given, said):
+    with pytest.raises(archord.InputError, match=said):
+        archord.Interaction("contact", ("bolt", "hole"), **given)
+
+
+def test_own_fields_without_fields_are_refused(tmp_path):
+    own = {"twice": lambda at: 2 * at.stress[..., 0]}
+    with pytest.raises(archord.InputError, match="own_fields need fields"):
+        archord.solve(slab(), tmp_path / "run", fields=False, own_fields=own)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_ring_has_no_law_per_length_of_a_pin(tmp_path):
+    """Its forces are of the whole ring: a table would be multiplied by a length."""
+    mesh = archord.rectangles({"low": (0, 0, 1, 1), "high": (0, 1, 1, 1)}, size=0.5)
+    steel = archord.Elastic(210e3, 0.3)
+    problem = archord.Problem(
+        mesh,
+        [archord.Body("low", steel), archord.Body("high", steel)],
+        [archord.Interaction("contact", ("high bottom", "low top"))],
+        [archord.Support("low bottom")],
+        [archord.Load("press", on="high top", direction="y", displacement=-1e-3)],
+        steps=2,
+        kinematics="axisymmetric",
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    with pytest.raises(archord.InputError, match="forces are of the whole ring"):
+        read_steps(run)

@@ -134,6 +134,11 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
     run.number(None)
     if not run.has_contact:
         raise InputError(f"{run.folder}: has no contact, and a table is of a joint's.")
+    if run.scene.analysis.plane == "axisymmetric":
+        raise InputError(
+            f"{run.folder}: is of a body of revolution, whose forces are of the whole ring; a "
+            "table has forces per length of a pin. history.csv has force over displacement."
+        )
     begin = 0  # steps before the load moves
     length = force = pressure = 1.0
     if _is_of_joint(run):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -102,9 +103,9 @@ class Preset(Checked):
     )
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
+    @abstractmethod
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
-        raise NotImplementedError
 
     def require_whole(self, name: str, gap: float) -> None:
         """Raise `Fault` of the key ``name`` where half a pin would have to be pressed in."""

@@ -114,6 +114,14 @@ class ProblemAnalysis(Modelling):
         require(is_plane or self.symmetry <= 2, "symmetry", said)
         return self
 
+    @property
+    def depth(self) -> float | None:
+        """The thickness that forces are of, None per unit thickness.
+
+        Forces around an axis are of the whole ring, which has no other thickness.
+        """
+        return 1.0 if self.plane == "axisymmetric" else self.thickness
+
 
 class Stepping(Section):
     """Control of the steps between outputs; lengths are in output steps."""

@@ -118,6 +118,9 @@ class Interaction:
         is_law = ContactLaw in type(self.law).__mro__
         said = f"must be a contact law, or one of {', '.join(map(repr, NAMES))}"
         require_of(self, named or is_law, "law", said)
+        said = 'must be "current" or "reference"'
+        require_of(self, self.kinematics in ("current", "reference"), "kinematics", said)
+        require_of(self, self.gamma_factor > 0, "gamma_factor", "must be positive")
         require_of(self, self.interference >= 0, "interference", "must not be negative")
         require_of(self, self.overlap >= 0, "overlap", "must not be negative")
 
