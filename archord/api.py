@@ -1,5 +1,5 @@
-"""archord from Python: load results, load scenes, solve problems and scenes. The names are those of
-the package: ``archord.load``."""
+"""archord from Python: load results, load scenes, solve problems and scenes. The names are names
+of the package: ``archord.load``."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def laws() -> int:
 @click.option(
     "--radius", type=float, help="radius of the pin; this and the next change the joint of a scene"
 )
-@click.option("--clearance", type=float, help="radius of the hole less that of the pin")
+@click.option("--clearance", type=float, help="radius of the hole less radius of the pin")
 @click.option("--E-star", "E_star", type=float, help="contact modulus E*; not beside a scene")
 @click.option("--yield-stress", type=float, help="yield stress")
 @click.option(

@@ -32,8 +32,8 @@ class Expected:
     """``quantity`` (a key of `quantities`) at the last step must be ``value`` within the relative
     ``tolerance``.
 
-    ``value`` is a number or, times ``factor``, that of another case by name. ``source`` says where
-    it comes from.
+    ``value`` is a number or, times ``factor``, the value of another case by name. ``source`` says
+    where it comes from.
     """
 
     quantity: str
@@ -74,7 +74,7 @@ class Case:
         return report.get("status") == "done" and scene == resolved(self.scene)
 
     def attempt(self, parent: Path, **hooks: Any) -> Outcome:
-        """Solve into the folder below ``parent``, on this rank alone; ``hooks`` are those of
+        """Solve into the folder below ``parent``, on this rank alone; ``hooks`` are hooks of
         `solve_scene`.
 
         Raises KeyboardInterrupt if a signal interrupted the run, and `InputError` if the folder

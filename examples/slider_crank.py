@@ -252,7 +252,7 @@ def draw(runs, target):
 
 
 def laws():
-    """The laws by name: those of the literature, and archord's own of the joint without a yield
+    """The laws by name: laws of the literature, and archord's own of the joint without a yield
     stress and with it."""
     curves = {
         name: table(LAWS[name])

@@ -92,8 +92,8 @@ def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
     points the strains of three deformations would vanish. Distorted second-order ones have 9
     conditions: somewhat stiff where they are large, but convergent.
 
-    Around an axis quadrilaterals of degree 2 have two dofs along the radius for three points, of
-    which each has a condition of its own by the hoop strain. A perfectly plastic thick cylinder
+    Around an axis quadrilaterals of degree 2 have two dofs along the radius for three points.
+    Each point has a condition of its own by the hoop strain. A perfectly plastic thick cylinder
     (b/a = 2) that is driven on carries 2.4 % to 8.6 % more than Hill's pressure with 4 square cells
     across its wall, 0.16 % to 0.57 % with 8, 0.01 % to 0.04 % with 16. Degree 3 carries 0.04 % more
     at most with 4 cells, triangles 0.05 % with 2. On square cells rules of 7 or 8 points change

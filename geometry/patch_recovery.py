@@ -4,10 +4,10 @@ around.
 Zienkiewicz and Zhu (1992, Int. J. Numer. Meth. Engng 33, 1331): around every vertex a polynomial of
 the degree of the displacements is fitted by least squares to the values at the integration points
 of the cells that meet there. A vertex inside a body has the value of its own polynomial, one on the
-boundary the mean of those of its neighbours inside, as its own would extrapolate from one side.
+boundary the mean of the neighbours' values inside, as its own would extrapolate from one side.
 Where it has no such neighbour (corners, walls of one cell), its polynomial is fitted to two layers
-of cells, of which near ones count more. Nodes on edges have the mean of both ends, nodes within
-quadrilaterals that of the corners.
+of cells; near ones count more. Nodes on edges have the mean of both ends, nodes within
+quadrilaterals the mean of the corners.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 
-# squared distance over that of the farthest point, within which points of wide patches count alike
+# squared distance over the farthest point's, within which points of wide patches count alike
 _CORE = 0.05
 _SINGULAR = 1e-13  # of patches with fewer points than coefficients, which get the smallest ones
 

@@ -4,7 +4,7 @@ All that depends on the number of dimensions asks this object: the blocks of the
 of the bulk, the materials, the contact, the loads, and the names of components in files.
 
 Axisymmetric problems have the coordinates x = r >= 0 and y = z, the axis being x = 0. Their forces
-and energies are those of the whole ring.
+and energies are of the whole ring.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@ points of it, with their history.
 
 Arrays are those of ``n`` points: strains ``(n, 3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering
 shear), stresses ``(n, 4)`` are ``[s_xx, s_yy, s_zz, s_xy]``, tension positive. A state is None (no
-history) or a dataclass of arrays whose first axis is that of the points, which is how checkpoints
+history) or a dataclass of arrays whose first axis are the points, which is how checkpoints
 store it.
 """
 
@@ -23,7 +23,7 @@ State = Any
 
 
 class Material(Protocol):
-    """What a material of your own is made from: a constitutive law in the plane.
+    """What a material of your own is made from: a constitutive law.
 
     Every method is a pure function. A material must define `elastic_tangent`, `update` and
     `energy`. It inherits the rest, which fits a material without history.

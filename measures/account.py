@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from archord.solver.path.system import System
 
 Values = Mapping[str, float]
-Driven = tuple[Array, Array]  # displacements and forces (d,) whose work is that of the loads
+Driven = tuple[Array, Array]  # displacements and forces (d,) that do the loads' work
 
 
 @dataclass

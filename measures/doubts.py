@@ -17,7 +17,7 @@ Check = Callable[[Accepted, Record], Iterable[str]]  # what to warn of after a s
 
 LARGE_STRAIN = 0.05
 LARGE = 'analysis.strain = "large" is for that'
-_PLASTIC = 0.5  # PEEQ over the strain from which the strain is that of yielding
+_PLASTIC = 0.5  # PEEQ over the strain, from which on bodies strain by yielding
 _OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
 _LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
 _FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %

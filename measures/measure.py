@@ -37,8 +37,8 @@ class Measure:
 
 
 class Accepted:
-    """The last accepted state of a ``system``, of which measures are taken; what several of them
-    need is computed once. Collective.
+    """The last accepted state of a ``system``. Measures are taken of it; what several of them need
+    is computed once. Collective.
 
     ``profiles`` is the contact along the surfaces by their names, ``before`` the records of the
     steps before, ``residual`` what Newton's method left of the residual over the reaction.

@@ -16,7 +16,7 @@ class Record:
     """One accepted output step of the whole problem, in its units.
 
     ``at`` is the load that the files of fields and contact name. ``values`` are the numbers of
-    its measures by their names, which are those of columns of history.csv. ``contact_area`` is the
+    its measures by their names, the names of columns of history.csv. ``contact_area`` is the
     length of the surfaces in contact, the mean of both sides of each interaction.
     """
 

@@ -31,7 +31,7 @@ _ALLOWED = "it may have letters, digits, spaces and any of _ . ( ) -"
 
 @dataclass(frozen=True)
 class CellField:
-    """A field of which a run writes the mean of each cell.
+    """A field: a run writes its mean in each cell.
 
     - ``name``: in files, in Python and for ``--field``
     - ``label``, ``unit``: in pictures; the unit may be "{stress}" or "{length}", the scene's, and

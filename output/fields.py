@@ -141,7 +141,7 @@ class FieldWriter:
         return found
 
     def _write_xdmf(self, of_nodes: list[str], of_cells: list[str]) -> None:
-        """Describe the fields of nodes and cells of all steps, those of an earlier process
+        """Describe the fields of nodes and cells of all steps, steps of an earlier process
         included."""
         for there in self._file.names[len(self._grids) :]:
             nodal = [name for name in of_nodes if name in there]

@@ -15,7 +15,7 @@ def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
     """Why the run in ``folder`` with the run.json ``report`` is no finished run of ``scene``, in
     words; nothing where its files agree. Of large files only the size is read."""
     if not _is_of(folder, scene):
-        return "scene.toml is that of another scene"
+        return "scene.toml is of another scene"
     faults = faults_of(folder, report.get("files", {}), quick=True)
     if faults:
         return "; ".join(f"{name} {fault}" for name, fault in faults.items())

@@ -107,7 +107,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     n = checkpoint.step
     reached, wanted = np.array(before.travelled[:n]), np.array(scene.travelled[:n])
     if len(wanted) < n or (np.abs(wanted - reached).max(0) > _SAME * np.abs(reached).max(0)).any():
-        said = f"{scene.loading} and its steps must begin as those of the run"
+        said = f"{scene.loading} and its steps must begin as the steps of the run"
         raise InputError(
             f"{path}: its {n} steps are not the first ones of the scene's path; {said}."
         )

@@ -81,8 +81,8 @@ def solve_scene(
     """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`).
     Collective.
 
-    A ``problem`` from Python, of which the scene tells, is solved in the place of the scene.
-    ``own_fields`` are written beside those of `CELL_FIELDS`.
+    A ``problem`` from Python is solved in the place of the scene, which tells about it.
+    ``own_fields`` are written beside the fields of `CELL_FIELDS`.
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``,
     ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank, and
     ``on_iteration(load, result)`` what the present solve did so far. ``timer`` has the seconds
@@ -279,7 +279,7 @@ class _Output:
         self._contact.write(load, _arrays(profiles, account.per_step))
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
-        """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank
+        """Note how the run ended, with ``warnings`` beside the steps' own; returns all on rank
         0. Collective."""
         ending["peak_memory"] = self.system.comm.gather(peak_memory())
         found = self._on_root(lambda: self._report.finish(warnings, **ending))

@@ -40,7 +40,7 @@ _INSIDE_SOLVE = (
 class Report:
     """run.json of an ``account``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
-    ``steps`` are those of the run, also of the run that it goes on from, with the run.json
+    ``steps`` are the steps of the run, also of the run that it goes on from, with the run.json
     ``before``; whoever appends one to them calls `add`.
     """
 

@@ -74,8 +74,8 @@ def chord_projection(
     """Project ``pressure`` at the rising angles ``phi`` [rad] from the contact axis onto the chord
     of ``eps`` (eq. 15).
 
-    Arrays of one shape; ``weight`` is each point's share of arc length, by default that of the
-    trapezoidal rule. The resultant is that of the arc, whatever ``eps`` is: points beyond it stay
+    Arrays of one shape; ``weight`` is each point's share of arc length, by default the
+    trapezoidal rule's. The resultant is the arc's, whatever ``eps`` is: points beyond it stay
     as long as they carry pressure. Raises ValueError for arrays that are no such arc, and for
     pressure beyond pi/2.
     """

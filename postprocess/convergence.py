@@ -167,6 +167,6 @@ def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST)
 
 
 def step_error(coarse: Curve, fine: Curve) -> float:
-    """Relative error of ``fine``, whose steps are half as long as those of ``coarse``: their
+    """Relative error of ``fine``, whose steps are half as long as the steps of ``coarse``: their
     difference, as backward Euler is of first order."""
     return difference(coarse, fine, float(np.abs(fine).max()))

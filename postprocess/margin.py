@@ -1,6 +1,6 @@
 """Margins of safety of lugs: what a run found beside the usual sections of a hand calculation.
 
-Margins are ``MS = allowable / applied - 1``. Forces are those of the whole lug, as in history.csv:
+Margins are ``MS = allowable / applied - 1``. Forces are of the whole lug, as in history.csv:
 per unit thickness where the scene has none. The applied force is ``load`` for the yield margins and
 ``load * factor`` for the ultimate ones.
 
@@ -15,7 +15,7 @@ the tensile strength for ``f``:
 By finite elements the allowable is the largest force that the run had reached when the PEEQ of the
 lug passed a limit.
 
-Each plate of a clevis is such a lug. Its forces are those of the whole clevis there: ``t`` is the
+Each plate of a clevis is such a lug. Its forces are of the whole clevis there: ``t`` is the
 thickness of the inner plate, and of both outer plates together.
 """
 
@@ -130,7 +130,7 @@ def margins(
     factor : float
         what the load is multiplied by for the ultimate margins, 1.5 if it is a limit load
     proof, tensile : float, optional
-        strengths of the hand formulas; those of the run's hardening curve if absent
+        strengths of the hand formulas; the run's hardening curve's if absent
     yield_peeq, ultimate_peeq : float
         largest PEEQ of the lug at the yield load and at the ultimate load; the latter is the end of
         the hardening curve if absent
@@ -263,7 +263,7 @@ def _strengths(
         return {kind: (value, "given") for kind, value in said.items() if value is not None}
     if plate.back_stresses and (proof is None or tensile is None):
         raise InputError(
-            f"{run.folder}: the lug has back stresses, of which no tension test is known here; "
+            f"{run.folder}: the lug has back stresses, and no tension test of it is known here; "
             "give --proof and --tensile."
         )
     found = {"yield": (proof_strength(plate), "at 0.2 % plastic strain of the run's curve")}

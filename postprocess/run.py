@@ -138,7 +138,7 @@ class Run:
         `InputError` without an accepted step, and of a run that is not of a joint."""
         if "P" not in self.columns:
             raise InputError(
-                f"{self.folder}: is the run of a general scene; this is for those of a [joint]."
+                f"{self.folder}: is the run of a general scene; this is for runs of a [joint]."
             )
         self.number(None)
         columns = {name: np.array(self.columns[name]) for name in CURVES}

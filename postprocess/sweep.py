@@ -140,7 +140,7 @@ class Sweep:
 
     @cached_property
     def _found(self) -> tuple[dict[int, Run], dict[int, str]]:
-        """Runs that can be read, and why those of other cases that are done cannot."""
+        """Runs that can be read, and why runs of other cases that are done cannot."""
         found, faults = {}, {}
         first = self.cases.drop_duplicates("run")
         for case, status in zip(first["case"], first["status"], strict=True):

@@ -18,8 +18,9 @@ def account_of(
     timer: Timer | None = None,
     given: Problem | None = None,
 ) -> Account:
-    """The problem of ``scene``, or the one that was ``given`` from Python, of which the scene
-    tells, ready to be solved, and its account. Collective over ``comm``; raises `InputError`."""
+    """The problem of ``scene``, ready to be solved, and its account; or the problem that was
+    ``given`` from Python, which the scene tells about. Collective over ``comm``; raises
+    `InputError`."""
     timer = timer or Timer()
     if isinstance(scene, Scene):
         return joint_account(scene, comm, timer)

@@ -31,9 +31,11 @@ from archord.solver.problem import Problem
 def general_account(
     scene: ProblemScene, comm: MPI.Comm, timer: Timer, given: Problem | None = None
 ) -> Account:
-    """The problem of ``scene``, or the one that was ``given`` from Python, of which the scene
-    tells, ready to be solved, and its account, whose measures are those of its parts. Collective
-    over ``comm``; raises `InputError`."""
+    """The problem of ``scene``, ready to be solved, and its account; or the problem that was
+    ``given`` from Python, which the scene tells about. Its parts tell the measures.
+
+    Collective over ``comm``; raises `InputError`.
+    """
     name = given.mesh_name if given else mesh_name(scene)
     file = given.mesh_file if given else scene.mesh.file
     with timer("mesh"), as_input_error(name):

@@ -116,7 +116,7 @@ def _half_loaded(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
     """What is said of facets inside a body along which a load is to be spread."""
     for name in sorted(_spread(problem)):
         for said in facets_within(whole, name):
-            yield f"{said}, where nothing can load them: give it those of the boundary alone"
+            yield f"{said}, where nothing can load them: give it the facets of the boundary alone"
 
 
 def _half_held(problem: Problem, whole: PlaneMesh) -> Iterator[str]:

@@ -32,7 +32,7 @@ from archord.solver.problem import (
     Rigid,
 )
 
-_RATIO = 3.0  # element size over that of the next finer mesh
+_RATIO = 3.0  # element size over the size of the next finer mesh
 _COARSEST = 0.2  # element size over R
 _STEEPEST = 1.0  # growth of the element size
 _COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess

@@ -59,7 +59,8 @@ def joint_account(
 
 
 class JointMeasures:
-    """The measures that the joint of ``scene`` derives from those of its parts in ``system``."""
+    """The measures that the joint of ``scene`` derives from the measures of its parts in
+    ``system``."""
 
     def __init__(self, scene: Scene, system: System) -> None:
         self.scene = scene
@@ -123,7 +124,7 @@ class JointMeasures:
         return moved - max(self.scene.joint.dR, 0.0) if self.scene.joint.is_ring else moved
 
     def driven(self) -> Driven:
-        """Displacement and force whose work is that of the load: delta and P. Collective."""
+        """Displacement and force that do the load's work: delta and P. Collective."""
         return np.array(self.delta()), np.array(self.system.drive_force(""))
 
     def forces(self) -> dict[str, float]:

@@ -78,7 +78,7 @@ def _body(body: Body) -> dict[str, Any]:
 
 
 def material_words(material: Any) -> dict[str, Any]:
-    """The keys of a body's section for ``material``: those of a scene, or a description of a class
+    """The keys of a body's section for ``material``: a scene's, or a description of a class
     of one's own, with E and nu of its elastic moduli."""
     kind = type(material)
     if kind is LargeStrain:

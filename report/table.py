@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 
 class Table:
-    """Rows of cells under ``headings``; ``str()`` is the table in aligned columns, `markdown` that
-    of a document.
+    """Rows of cells under ``headings``; ``str()`` is the table in aligned columns, `markdown` the
+    table of a document.
 
     The first ``left`` columns hold text, the others numbers, which are aligned on the right. Cells
     may be anything that has a `str`.

@@ -42,7 +42,7 @@ class MeshSection(Section):
     )
     scale: Positive = key("factor on the coordinates, 1000 for a file in metres", default=1.0)
     order: Literal[1, 2, 3] | None = key(
-        "order of the geometry, that of the file if absent; 2 for circles", other=2
+        "order of the geometry, the file's if absent; 2 for circles", other=2
     )
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
     circle: list[CircleSection] = Field(
@@ -72,7 +72,8 @@ class OwnSection(Section):
 
 
 class OwnMaterial(OwnSection):
-    """A material of a class of one's own; E and nu of the body are those of its elastic moduli."""
+    """A material of a class of one's own; E and nu of the body are taken from its elastic
+    moduli."""
 
     plastic: bool = key("whether it can leave its elastic moduli", default=False)
 
@@ -88,7 +89,7 @@ class BodySection(Solid):
     """A deformable body: a set of cells, of one material."""
 
     name: PartName = key("name of the body", example="pin")
-    cells: Name | None = key("its set of cells, that of its name if absent", other="plate")
+    cells: Name | None = key("its set of cells, the set of its name if absent", other="plate")
     own: OwnMaterial | None = Field(
         None, description="of a run from Python: its own material, in words"
     )

@@ -37,7 +37,7 @@ class Drives:
     """The drives of ``problem`` in the displacement space ``V``, which move the rigid surfaces of
     ``contact``, too. Collective; raises ValueError.
 
-    Arrays of ``l`` drives, of which the problem's come first and the anchors follow, in the order
+    Arrays of ``l`` drives: the problem's come first and the anchors follow, in the order
     in which they come to be:
 
     names : names of the problem's drives

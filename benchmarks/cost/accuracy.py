@@ -46,8 +46,8 @@ CASES = (
 def run(
     folder: Path, cases: Sequence[Case], said: Callable[[str], None], asked: Sequence[float] = ()
 ) -> tuple[list[dict[str, object]], list[str]]:
-    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or those of their material,
-    references first.
+    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or the accuracies of their
+    material, references first.
 
     Returns the entries of each accuracy by heading, with the true error of the curve, over its
     largest value, and a sentence for every estimate or error that is larger than what was asked.

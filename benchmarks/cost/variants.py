@@ -1,7 +1,7 @@
 """Scenes and sweeps with one thing switched, by turns: ``archord benchmark variants``.
 
 Each run is a process of its own, timed from outside; nothing else should run. The sets of
-variants.toml are in groups: "joint" (one scene in variants, each of which should load only what it
+variants.toml are in groups: "joint" (one scene in variants: each should load only what it
 uses), "sweep" (on one rank and on two) and "strategies" (without each linear strategy;
 docs/development/linear_strategies.md says what was decided by it).
 """
@@ -171,8 +171,8 @@ def run(
 
 
 def ratio(one: Timing, other: Timing, what: str) -> float:
-    """``what`` ("seconds" or "cpu") of the runs of ``one`` over those of ``other``: the median of
-    the pairs."""
+    """``what`` ("seconds" or "cpu") of the runs of ``one`` over the runs of ``other``: the median
+    of the pairs."""
     return median(
         getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=False)
     )

@@ -110,7 +110,7 @@ def envelope(pairs: Iterable[tuple[float, float]]) -> Pairs:
 
 def seconds_at(error: float, kept: Pairs) -> float | None:
     """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there.
-    Errors above that of the cheapest point cost what it costs."""
+    Errors above the cheapest point's cost what that point costs."""
     if not kept or error < kept[-1][1]:
         return None
     seconds, errors = np.log(np.maximum(kept, 1e-300)).T

@@ -110,7 +110,7 @@ def kind_of(part: Part) -> str:
 
 
 def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
-    """P of a law at ``delta`` (those of the run) over the unit E* dR of the run's joint; nan beyond
+    """P of a law at ``delta`` (the run's) over the unit E* dR of the run's joint; nan beyond
     the law's limit."""
     law = find_law(name)
     joint = LawJoint.from_scene(run.scene)

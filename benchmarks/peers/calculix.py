@@ -190,7 +190,7 @@ def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
 def compare(scene: Path, overrides: Sequence[str], folder: Path) -> Table:
     """archord and CalculiX on ``scene`` with ``overrides``, in ``folder``: forces, the largest von
     Mises stress at a node of every body, the difference of its stresses (root of the mean square
-    over nodes, over that of archord's), and seconds. Raises `InputError` and `Failure`."""
+    over nodes, over the largest of archord's), and seconds. Raises `InputError` and `Failure`."""
     overrides = ["output.fields=nodes", *overrides]
     changes = [word for override in overrides for word in ("--set", override)]
     command = solving(str(scene.resolve()), "run", *changes)

@@ -55,8 +55,8 @@ class Check:
 class Result:
     """How a case went. ``status`` is "done", "stopped" (exit code 3) or "failed" (an error).
 
-    ``quantities`` are those of the last step. ``forces`` checks the balance of forces over P,
-    ``energy`` that of energies over the work; None where nothing was solved.
+    ``quantities`` are of the last step. ``forces`` checks the balance of forces over P,
+    ``energy`` the balance of energies over the work; None where nothing was solved.
     """
 
     status: str = ""

@@ -256,7 +256,7 @@ def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     around the origin, numbered from below, of as many cells each.
 
     Points in contact face each other along rays from there, so most pairs stay on one rank; and the
-    cut is the same in every run, unlike that of a graph partitioner whose input arrives in any
+    cut is the same in every run, unlike the cut of a graph partitioner, whose input arrives in any
     order.
     """
     middle_x, middle_y = x[cells].mean(axis=1).T

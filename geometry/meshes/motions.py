@@ -41,7 +41,7 @@ def free_motions(
         rows.append(row)
     matrix = np.concatenate(rows)
     free = np.zeros((len(bodies), len(motions)), dtype=bool)
-    # rotations first, of which translations can be a part, then translations alone
+    # rotations first, which translations can be a part of, then translations alone
     translations = np.array([motion != "rotation" for motion in motions])
     for kept in (np.ones_like(translations), translations):
         reduced = np.linalg.qr(matrix[:, :, kept].reshape(len(matrix), -1), mode="r")

@@ -222,7 +222,7 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
                 of_type[int(number)].append(nodes)
         if _INCOMPLETE in of_type:
             raise ValueError(
-                "triangles of 9 nodes are not read; those of third order have 10, one of them "
+                "triangles of 9 nodes are not read; triangles of third order have 10, one of them "
                 "inside"
             )
         nodes = np.zeros((0, dim + 1), dtype=np.uint64)

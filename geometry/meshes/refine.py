@@ -141,7 +141,7 @@ def _raised(mesh: PlaneMesh, order: int) -> PlaneMesh:
 
 
 def _cut(mesh: PlaneMesh) -> PlaneMesh:
-    """Each cell of order p cut in four, whose nodes are those of a cell of order 2 p."""
+    """Each cell of order p cut in four, whose nodes are the nodes of a cell of order 2 p."""
     p = mesh.order
     made = _raised(mesh, 2 * p)
     parts = quarters(mesh.kind, lagrange_element(mesh.kind, p).points)

@@ -36,7 +36,8 @@ def clevis(
     `mesh_joint`.
 
     The plates ``inner`` and ``outer`` have a ``width``, ``edge_distance``, ``length`` and ``end``.
-    Sets are those of a lug with "inner " or "outer " in front, and "axis". Lengths share one unit.
+    Sets are named as in a lug, with "inner " or "outer " in front, and "axis". Lengths share one
+    unit.
     """
     hole = (radius + clearance) / radius
     plates = {}

@@ -27,10 +27,10 @@ _CUT_ABOVE = (
 class Sketch:
     """A joint as gmsh is to draw it: every body has each point, line and arc once.
 
-    ``faces`` are those of every body, ``lines`` those of every set; sets have the numbers 1, 2, ...
-    in the order of their names, and may be empty. Shapes add the element ``sizes`` of bodies
-    (expressions in x and y), how many equal edges a line has at least (``parts``), and the corners
-    of faces that are cut into a ``grid``.
+    ``faces`` are the faces of every body, ``lines`` the lines of every set; sets have the numbers
+    1, 2, ... in the order of their names, and may be empty. Shapes add the element ``sizes`` of
+    bodies (expressions in x and y), how many equal edges a line has at least (``parts``), and the
+    corners of faces that are cut into a ``grid``.
     """
 
     def __init__(self, bodies: Sequence[str], sets: Sequence[str]) -> None:
@@ -91,8 +91,8 @@ def mesh_joint(
     partitioner=None,
 ) -> TaggedMesh:
     """Mesh a ``sketch``, times ``radius``, with all nodes of arcs on their circles; the centre of
-    each pin becomes a point set: that of "pin" the set "centre", that of "inner pin" the set "inner
-    centre".
+    each pin becomes a point set: the centre of "pin" the set "centre", the centre of "inner pin"
+    the set "inner centre".
 
     The mesh is made with larger elements, which are then cut in four as often as ``refinements``
     says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual
@@ -150,5 +150,6 @@ def around(x: float) -> str:
 
 def refinements(cells: float) -> int:
     """How often a mesh that is to have about so many ``cells`` is made by cutting triangles in
-    four: gmsh's time grows faster than the number of triangles, that of the cutting does not."""
+    four: gmsh's time grows faster than the number of triangles, the time of the cutting does
+    not."""
     return sum(cells > limit for limit in _CUT_ABOVE)

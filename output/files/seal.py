@@ -2,7 +2,7 @@
 later change.
 
 A run that goes on, or was killed, has no seals: its steps count as far as run.json has them. So
-have runs of versions 0.1 and 0.2, of which the table of steps is compared with the steps of
+have runs of versions 0.1 and 0.2: their table of steps is compared with the steps of
 run.json. The last line of run.json is the SHA-256 of the lines before it.
 """
 

@@ -32,7 +32,7 @@ class StepFile:
     ``apart`` puts the arrays into files of their own, NAME/0000.h5 for the fixed ones. The file
     appears with the next step, the first one or that ``after`` some steps that are there, as this
     version or version 0.1 wrote them. Raises `OSError`, and `InputError` if a file that should go
-    on is missing, damaged or does not hold these steps. ``loads`` and ``names`` are those of all
+    on is missing, damaged or does not hold these steps. ``loads`` and ``names`` are of all
     steps and their arrays.
     """
 

@@ -200,7 +200,7 @@ class _Writer:
         model = f"thickness {number(self.thick)}, forces"
         if not self.problem.kinematics.is_plane:
             model = "axisymmetric, printed forces"
-        lines = ["*HEADING", f"archord: {heading}; {model} times {whole} are those of the whole"]
+        lines = ["*HEADING", f"archord: {heading}; {model} times {whole} are of the whole"]
         lines.append("*NODE, NSET=ALL_NODES")
         x = self._drawn()
         for i in range(len(x)):

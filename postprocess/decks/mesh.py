@@ -57,7 +57,7 @@ class DeckMesh:
     surfaces: dict[str, DeckSurface]
 
     def forces(self, of_dofs: Array) -> Array:
-        """Nodal forces ``(n, 2)`` that do the work of those of the dofs."""
+        """Nodal forces ``(n, 2)`` that do the work of the forces on the dofs."""
         out = np.zeros((max(len(of_dofs), self.dofs.max() + 1), 2))
         out[: len(of_dofs)] = of_dofs
         np.add.at(out, self.middles[:, :8], _OF_MIDDLE[:, None] * out[self.middles[:, 8:]])

@@ -361,7 +361,7 @@ def _difference(run: RunCurve, first: RunCurve) -> str:
             f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"
         )
     if not np.allclose(_elasticity(own), _elasticity(wanted), rtol=1e-6, atol=1e-9):
-        return f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}"
+        return f"the Poisson's ratios or the ratio of the moduli differ from {first.name}"
     if own.large_strain != wanted.large_strain:
         return f"analysis.strain = {analysis.strain!r} {other}"
     if own.fixed_pairs != wanted.fixed_pairs:
@@ -373,7 +373,7 @@ def _difference(run: RunCurve, first: RunCurve) -> str:
         return ""
     size, first_size = (f"{each.scene.joint.W / each.R:.4g} R" for each in (run, first))
     return (
-        f"joint.block_size is {size} and that of {first.name} {first_size}, by which their P "
+        f"joint.block_size is {size} and in {first.name} {first_size}, by which their P "
         f"differs by about {softer:.1%}"
     )
 

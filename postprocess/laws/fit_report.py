@@ -18,7 +18,7 @@ _COLUMNS = ("run", "of", "value", "s.e.", "mesh", "95 % interval", "R2", "rms", 
 
 
 def parameters(calibration: Calibration) -> list[dict[str, Any]]:
-    """One row per fitted parameter, in numbers: value, errors (None where that of the mesh is
+    """One row per fitted parameter, in numbers: value, errors (None where the mesh's is
     unknown), interval, quality of the fit."""
     rows: list[dict[str, Any]] = []
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
@@ -87,7 +87,7 @@ def notes(calibration: Calibration) -> list[str]:
         said.append("c: too few steps past yield in the range; elastic law.")
     if scenes[0].run.scene.pin.whole:
         said.append(
-            "pin.whole: k and c are those of a whole pin; archord law and the paper have them of "
+            "pin.whole: k and c are of a whole pin; archord law and the paper have them of "
             "half a pin."
         )
     law = calibration.law()

@@ -21,7 +21,7 @@ class FittedLaw(BaseModel):
     """Plastic-Winkler law of one joint (Hu et al., eqs. 9 to 12 with the threshold ``c sigY``);
     elastic without ``c`` and ``sigY``.
 
-    Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is that of
+    Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is the range of
     ``delta/dR``; outside it the law extrapolates, beyond its end with a `LawRangeWarning`. ``rms``
     and ``largest`` are of ``law/run - 1`` of P in that range (None: unknown). Lengths, stresses and
     forces per unit thickness in the named units. Raises ValueError for values that no joint has.

@@ -41,7 +41,7 @@ _EARLY = 0.1  # share of its end from which on it is
 _BISECTIONS = 60  # of ln(ratio)
 _LARGEST = 7.0  # ln(ratio)
 _SOFTER = 0.9  # slope of the way back where it opens over that up to the first step, at most
-_LEAST = 1e-3  # slope at an end over that of the last two nodes
+_LEAST = 1e-3  # slope at an end over the slope of the last two nodes
 
 
 class _Cubic(NamedTuple):
@@ -67,9 +67,9 @@ class _WayBack(NamedTuple):
 
 
 def run_table(run: Run, of: str | None = None) -> JointCurve:
-    """The law of ``run``, in the units of `RunSteps`; of a general scene that of its load ``of``.
-    Expected errors are those of the cubic through every second step, of unloadings that were not
-    used, and of mesh and steps, as far as the run knows; ``about`` tells them.
+    """The law of ``run``, in the units of `RunSteps`; of a general scene the law of its load
+    ``of``. Expected errors are errors of the cubic through every second step, of unloadings that
+    were not used, and of mesh and steps, as far as the run knows; ``about`` tells them.
 
     Raises `InputError` without contact, with fewer than 6 steps of first loading, where the force
     does not rise on it, and if the run yields and does not unload.
@@ -205,7 +205,7 @@ def _errors_back(
         sizes = _sizes(np.concatenate([*others.values()]))
         said = f"{sizes} of the force it begins at, in {len(others)} others"
     if not len(back.steps):
-        return None, said or "that of first loading"
+        return None, said or "the error of first loading"
     own = steps.x[back.steps[0]]
     errors[own] = _left_out(back.curve.x, back.curve.f) / back.curve.f[-1]
     known = sorted(errors)

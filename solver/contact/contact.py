@@ -4,7 +4,7 @@ of a problem.
 At a point ``x`` of a side, with closest point ``y`` on the opposite surface, ``n`` the opposite's
 outward normal there and ``g = (x - y) . n`` the gap, the trial pressure is ``t . n - gamma g`` with
 ``t = sigma(u) N`` the traction of the own body. The law makes a traction ``f`` of it, ``[t . n -
-gamma g]_+ n`` without friction, of which law.py has the shear, and the virtual work of the contact
+gamma g]_+ n`` without friction (law.py has the shear), and the virtual work of the contact
 forces is ``sum over sides of share * integral of f . (v(x) - v(y))``. Linearised are ``n`` and
 ``y``, too.
 
@@ -32,10 +32,10 @@ from archord.solver.contact.tangent import ContactTangent, point_rates
 class Contact:
     """All ``interfaces``, if any, in the displacement space ``V``. Collective.
 
-    A surface belongs to one interface. ``surfaces`` are those of bodies, ``rigid`` the discs, and
-    ``pairs`` those of all interfaces. ``active_set_changes`` counts this rank's points that went
-    over to another branch of their law at the last evaluation. ``tangent`` is the derivative of
-    what `add_force` adds, renewed as the pattern grows.
+    A surface belongs to one interface. ``surfaces`` are surfaces of bodies, ``rigid`` the discs,
+    and ``pairs`` the pairs of all interfaces. ``active_set_changes`` counts this rank's points that
+    went over to another branch of their law at the last evaluation. ``tangent`` is the derivative
+    of what `add_force` adds, renewed as the pattern grows.
     """
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:

@@ -4,9 +4,9 @@
  * With jump = v(x) - v(y), the variation of the closest point is d xi = (jump . tau + d . v'(y)) / (|tau|^2 - g b),
  * where tau and b are the opposite curve's tangent and n . y'' and d = x - y; the normal turns by
  * -(v'(y) . n + b d xi) / |tau| about the unit tangent. At a vertex of the curve xi stands still. The variation of the
- * gap d . n is jump . n less, at a vertex, d . tau times the turn; that of the step's slip (u(x) - u(y)) . tau is
+ * gap d . n is jump . n less, at a vertex, d . tau times the turn; the variation of the step's slip (u(x) - u(y)) . tau is
  * jump . tau + (u(x) - u(y)) . n d turn - u'(y) . tau d xi. The trial traction is the own stress's in the turning frame,
- * less gamma times gap and slip. The law's derivatives take both variations to that of pressure and shear. */
+ * less gamma times gap and slip. The law's derivatives take both variations to the variation of pressure and shear. */
 
 #include <math.h>
 
@@ -38,7 +38,7 @@ static void stress_rates(const Side *s, int32_t i, Row stress[D])
     }
 }
 
-/* All rates at the point i; those of the opening only if they are wanted. */
+/* All rates at the point i; rates of the opening only if they are wanted. */
 static void linearise(const Side *s, int32_t i, int with_opening, Rates *d)
 {
     const int32_t a = s->a, o = s->o, columns = a + o;

@@ -1,7 +1,7 @@
 #include <stdint.h>
 
 /* One side of a contact: n facets of q points, with the arrays of the points in contiguous memory.
- * a nodes a cell, of which k lie on the facet (trace), o nodes of the opposite facet, m derivatives of
+ * a nodes a cell, k of them on the facet (trace), o nodes of the opposite facet, m derivatives of
  * a basis function (by the axes, and perhaps over the radius), g components of the displacement
  * gradient. */
 typedef struct {

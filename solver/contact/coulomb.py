@@ -14,7 +14,7 @@ from archord.solver.contact.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLa
 class FrictionState:
     """History of ``m`` points."""
 
-    elastic_slip: Array  # (m,) gamma times it is what the shear is below that of the own stress
+    elastic_slip: Array  # (m,) gamma times it is what the shear is below the own stress's
     pressure: Array  # (m,)
     dissipated: Array  # (m,) energy per area
 

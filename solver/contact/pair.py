@@ -25,7 +25,7 @@ class Pair:
     set again, on their facets. Raises `ProjectionError`.
 
     Arrays, of the last evaluation, in the order in which they come to be; ``d`` is the number of
-    components of a displacement, of which the frame's normal is first:
+    components of a displacement; the frame's normal is first:
 
     gamma : (m, 2) Nitsche's stiffness of gap and slip
     stress_vector : (m, d) force of the own body's stress per area
@@ -222,7 +222,7 @@ class Pair:
 
     @property
     def weight(self) -> Array:
-        """Weights ``(m,)`` of the points, of which the pair integrates its share."""
+        """Weights ``(m,)`` of the points; the pair integrates its share of them."""
         return self.share * self.surface.weight.ravel()
 
     def integral(self, density: Array | float) -> float:

@@ -9,8 +9,8 @@ from archord.geometry.curve import Projection
 
 
 class SlipOrigin:
-    """The displacements from which a pair of surfaces counts slip: those of the last accepted
-    state.
+    """The displacements from which a pair of surfaces counts slip: the displacements of the
+    last accepted state.
 
     Points that did not touch then may count from where loose bodies touch down: bodies came there
     without load. Arrays:

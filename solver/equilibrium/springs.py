@@ -36,7 +36,7 @@ def spring_modulus(own: float, softest: float) -> float:
 
 
 class Springs:
-    """The springs of what ``rigid`` finds loose, bodies and discs; ``stiffness`` is that of discs.
+    """The springs of what ``rigid`` finds loose, bodies and discs; ``stiffness`` is the discs'.
     Collective.
 
     of_free : their matrix, without prescribed displacements

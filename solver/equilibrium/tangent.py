@@ -42,7 +42,7 @@ class TangentMatrix:
 
     A : matrix of all displacements
     condensed : where ``revise`` is given (see `Condensed`), for elastic bodies which their
-        supports hold: the contact, of which ``A`` is free then; else None
+        supports hold: the contact, which ``A`` lacks then; else None
     factorisations : number of factorisations of sparse matrices that `update` asked for
     """
 
@@ -208,9 +208,9 @@ class TangentMatrix:
         m)`` of the residual by the levels, ``C``, alike, of what the levels' equations prescribe by
         the displacements, and ``D`` ``(m, m)``, of all ranks, by the levels.
 
-        With the contact's ``blocks``, without them those of the last `update`. The bulk's part of B
-        and C is the same where its tangent is symmetric, as of all materials without recovery of
-        back stresses.
+        With the contact's ``blocks``, without them the blocks of the last `update`. The bulk's part
+        of B and C is the same where its tangent is symmetric, as of all materials without recovery
+        of back stresses.
         """
         blocks = self._contact_blocks if blocks is None else blocks
         drives = self.drives

@@ -112,7 +112,7 @@ class Bordered(Strategy):
 
     def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
         """New border for a matrix with new values (see `Border`). Without ``factorise`` the
-        preconditioner stays that of the last matrix that was factorised."""
+        preconditioner stays the last matrix that was factorised."""
         self.last.B = B
         self.last.C = C
         self.last.D = D

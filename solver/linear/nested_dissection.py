@@ -55,7 +55,7 @@ def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.nda
     number = np.cumsum(alone) - 1
     both = alone[rows] & alone[columns]
     order = nested_dissection(int(alone.sum()), number[rows[both]], number[columns[both]])
-    place = np.full(n + 1, n)  # the last is that of no corner
+    place = np.full(n + 1, n)  # the last is of no corner
     place[:-1][alone] = order
     first = np.where(alone, place[:n], place[corner].min(axis=1, initial=n))
     found = np.empty(n, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Sparse systems on several ranks, each of which eliminates its own unknowns (direct
+"""Sparse systems on several ranks: each rank eliminates its own unknowns (direct
 substructuring).
 
 The interface are the unknowns on cells of several ranks, and few more where pairs in contact lie on

@@ -41,8 +41,8 @@ def _fewest_dofs(system: System) -> int:
 
 
 class CoarseStart:
-    """Increments of the state of ``fine`` from those of ``coarse``, the same problem on a coarser
-    mesh, which follows its own ``path``. ``iterations`` are those of the last attempt, on all
+    """Increments of the state of ``fine`` from increments of ``coarse``, the same problem on a
+    coarser mesh, which follows its own ``path``. ``iterations`` are of the last attempt, on all
     coarser meshes. Collective."""
 
     def __init__(self, fine: System, coarse: System) -> None:

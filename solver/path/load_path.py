@@ -14,7 +14,7 @@ from archord.solver.path.newton import Newton
 from archord.solver.path.recovery import Recovery
 
 _STRAIGHT = 1e-6  # part of a step that may lie beside the line of the last one
-# residual of an extrapolated guess over that of a coarse start, below which it serves as well
+# residual of an extrapolated guess over a coarse start's, below which it serves as well
 _AS_GOOD = 2.0
 _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
 
@@ -39,7 +39,7 @@ class Position:
 class Companion(Protocol):
     """What goes ahead of a load path and finds guesses for it: the same problem on a coarser mesh.
 
-    ``iterations`` are those of its last step, on all coarser meshes.
+    ``iterations`` are the iterations of its last step, on all coarser meshes.
     """
 
     iterations: int

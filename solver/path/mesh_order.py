@@ -1,9 +1,9 @@
 """Fields and histories in the order of the mesh generator, whatever the number of ranks and their
 cut of the mesh.
 
-Rank 0 holds what is collected. The number of a point is that of its cell or facet times points per
-cell, plus its own. Neither the order of a cell's nodes, and so of its points, nor that along a
-contact edge depends on the ranks.
+Rank 0 holds what is collected. The number of a point is the number of its cell or facet times
+points per cell, plus its own. The order of a cell's nodes, and so of its points, does not depend on
+the ranks, nor does the order along a contact edge.
 """
 
 from __future__ import annotations

@@ -379,7 +379,7 @@ def test_a_ring_has_axisymmetric_elements_and_the_force_on_all_of_it(quads, tmp_
     assert [rows for keyword, _, rows in found.blocks if keyword == "*SOLID SECTION"] == [[]]
     loads = [rows for keyword, _, rows in found.blocks if keyword == "*CLOAD"]
     assert [float(force) for ((_, axis, force),) in loads if axis == "1"] == [4000.0, 8000.0]
-    assert "forces times 180.0 are those of the whole" in found.text
+    assert "forces times 180.0 are of the whole" in found.text
     assert thickness(system.problem, mesh) == 1 / 180
     if ccx is None:
         pytest.skip("CalculiX is not installed (image target peers)")

@@ -269,7 +269,7 @@ def _swap(run: Path) -> None:
     ("damage", "said"),
     [
         (_cut, "history.csv has 200 bytes, not the "),
-        (_swap, "scene.toml is that of another scene"),
+        (_swap, "scene.toml is of another scene"),
         (lambda run: os.truncate(run / "contact.h5", 2000), "contact.h5 has 2000 bytes, not the "),
     ],
 )

@@ -1,6 +1,6 @@
 """Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file.
 
-Plane elements are those of plane stress, plane strain and axisymmetric problems; which of these is
+Elements are plane: of plane stress, plane strain and axisymmetric problems; which of these is
 solved is for the scene to say. Trusses only name edges, as gmsh writes them. Springs, masses and
 the like name nothing. All else is skipped. meshio's reader of such files knows neither surfaces
 nor plane elements of second order, and forgets all but the last block of nodes.

@@ -69,8 +69,8 @@ def number_of(key: int) -> int:
 
 
 def scoped_blocks(path: Path) -> Iterator[tuple[Scope, Block]]:
-    """The blocks of the file ``path``, those of a part in every instance of it; of parts without
-    any instance, in their own place. Raises ValueError."""
+    """The blocks of the file ``path``, the blocks of a part in every instance of it; of parts
+    without any instance, in their own place. Raises ValueError."""
     parts: dict[str, tuple[str, list[Block]]] = {}
     scopes: dict[str, Scope] = {}
     beside_all = Scope()
@@ -152,7 +152,7 @@ def _instance(name: str, index: int, rows: Rows) -> Scope:
 
 
 def _lines(path: Path, mesh: Path, depth: int = 0) -> Iterator[str]:
-    """The lines of a file, those of keywords whole, and those of the files that it includes, which
+    """The lines of a file, keywords whole, and the lines of the files that it includes, which
     lie in the folder of the ``mesh``."""
     if depth > _DEEPEST:
         raise ValueError(f"{path.name} includes itself")

@@ -228,7 +228,7 @@ def back_displacement(P: float) -> float:
 
 
 def scale(deepest: float) -> float:
-    """The clearance, over that of the joint, of the elastic joint that it is on its way back."""
+    """The clearance of the elastic joint that the joint is on its way back, over its own."""
     ratio, slope = cubic(RATIO, RATIO_SLOPE, deepest)
     ratio = max(ratio, 1e-3)
     return ratio

@@ -2,9 +2,9 @@
 functions that use them.
 
 There are two kinds of laws: tables (`JointCurve`), of the general law or of a run, and the formula
-that is fitted to runs (`FittedLaw`). The functions are those of ``algorithm.py`` in every language,
-less what the law has no need of: the way back of a joint that does not yield, the logarithmic law
-of first touch, pressure and angle where they are unknown.
+that is fitted to runs (`FittedLaw`). The functions of ``algorithm.py`` stand there in every
+language, less what the law has no need of: the way back of a joint that does not yield, the
+logarithmic law of first touch, pressure and angle where they are unknown.
 """
 
 from __future__ import annotations

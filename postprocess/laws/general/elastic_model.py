@@ -28,7 +28,7 @@ from archord.postprocess.laws.general.joint_curve import line_contact
 
 TABLE = Path(__file__).parent / "elastic_model.json"
 FARTHEST = 3.8  # delta/dR at the end of the polynomials; what is fitted ends at 3
-_CLEARANCE = 0.02  # dR/R of which dR/R is counted
+_CLEARANCE = 0.02  # the dR/R in which dR/R is counted
 
 
 class Elastic(NamedTuple):

@@ -1,10 +1,10 @@
-"""Regression of curves by a Gaussian process: several outputs at once, of which later ones are
+"""Regression of curves by a Gaussian process: several outputs at once; later ones are
 known of fewer points.
 
 Rasmussen and Williams (2006), sections 2.2, 2.7 and 5.4. The kernel is Matern's of order 7/2 with a
 length for each input, beside a linear mean with wide prior; outputs share it but for their size.
 Points are ordered so that output j is known of the first n_j: then one Cholesky factor serves all
-outputs, as its leading block is that of the leading points.
+outputs, as its leading block is the factor of the leading points.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from scipy.linalg import cholesky, solve_triangular
 from archord.postprocess.laws.general.joint import Array
 
 _ROWS = 64  # of a matrix at a time, which caches hold
-_WIDE = 1.0  # prior variance of the linear mean's coefficients over that of the rest
+_WIDE = 1.0  # prior variance of the linear mean's coefficients over the variance of the rest
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """``lengths`` ``(d,)`` of the inputs, and ``noise``, the variance of data over that of the
-    process."""
+    """``lengths`` ``(d,)`` of the inputs, and ``noise``, the variance of data over the variance of
+    the process."""
 
     lengths: Array
     noise: float

@@ -31,7 +31,7 @@ CLEARANCES = (1e-3, 0.02)
 RATIOS = (1 / 3, 10.0)
 SMALLEST_S = {"strain": 0.15, "stress": 0.2}
 _LAST_DIGITS = 1e-3  # of the bounds, and of moduli that a scene has rounded
-_ELASTIC_ERROR = 1e-3  # of P, relative: that of 9 in 10 elastic joints is less
+_ELASTIC_ERROR = 1e-3  # of P, relative: 9 in 10 elastic joints have less
 # secant of the way back over the elastic joint's steepest slope: then it is a straight line
 _STEEPEST = 0.999
 
@@ -86,7 +86,7 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
 
 
 def _error_in_words(law: JointCurve) -> str:
-    """The errors that 9 in 10 joints like that of ``law`` keep, at most."""
+    """The errors that 9 in 10 joints like the joint of ``law`` keep, at most."""
     usual, most = (law.error[(NODES >= 0.1) & (end >= NODES)].max() for end in (2.0, 3.0))
     said = f"9 in 10 such joints are within {usual:.1%} of P from 0.1 to 2 dR, {most:.1%} to 3 dR"
     if law.yields:
@@ -136,7 +136,7 @@ def outside(joint: LawJoint) -> str:
     if joint.hardens:
         return (
             "a body hardens, and the law is of perfect plasticity; archord fit RUN --table makes "
-            "that of one joint"
+            "the law of one joint"
         )
     strain, p, m, n, clearance, *stresses = joint_numbers(joint)
     pin_nu, nu = (value / (1 + value) if strain else value for value in (m, n))

@@ -66,7 +66,7 @@ _LAST = 3.0  # x that the law reaches
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
 # Fits of a way back begin with these travels, at most that share of the largest, and toes. In plane
-# stress they find the best fit. In plane strain deep dents have two, of which processes follow the
+# stress they find the best fit. In plane strain deep dents have two; processes follow the
 # one near the largest travel.
 _WAYS = {
     "strain": ((1.5, 0.99, 1e-3), (1.5, 0.85, 0.2)),
@@ -81,7 +81,7 @@ Numbers = tuple[float, ...]  # of a joint, as `joint_numbers` has them
 
 
 def exponents(degree: int) -> Array:
-    """Those of all products of four numbers up to ``degree``, of which the clearance, whose
+    """The exponents of all products of four numbers up to ``degree``; the clearance, whose
     influence is small, counts twice."""
     all_products = np.array([*product(range(degree + 1), repeat=4)], float)
     return all_products[all_products @ [1, 1, 1, 2] <= degree]
@@ -115,7 +115,7 @@ def _polynomials(
 class NodeRun:
     """The ends of a run's stages.
 
-    - ``nodes`` ``(n, 4)``: x, y, p0 R/(E* dR) and eps, of which the first ``loading`` are first
+    - ``nodes`` ``(n, 4)``: x, y, p0 R/(E* dR) and eps; the first ``loading`` of them are first
       loading
     - ``steps``: how many lie between two nodes
     """

@@ -45,8 +45,8 @@ PIN_WEAKER = "strain pin weaker"
 SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
 # Parts by which the other body is stronger, within which it matters by how much: beyond the last it
-# stays elastic. In plane stress the first is that of a contact at the largest pressure of plastic
-# flow, 2/sqrt(3) sigY.
+# stays elastic. In plane stress the first is the part for a contact at the largest pressure of
+# plastic flow, 2/sqrt(3) sigY.
 _STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}
 # exponent of what a yielded pin leaves; x/x0 where that is asked
 _FELT = 0.3
@@ -162,8 +162,8 @@ class YieldModel:
         }
 
     def at(self, inputs: Array, x0: float, x: Array) -> Loss:
-        """What yielding does to a joint with these `features` ``(d,)``, of which ``x0`` is about
-        first yield, at ``x`` ``(k,)``; of side `PIN_WEAKER` what that of the block adds, but for
+        """What yielding does to a joint with these `features` ``(d,)``; ``x0`` is about first
+        yield, at ``x`` ``(k,)``; of side `PIN_WEAKER` what the block's yielding adds, but for
         the way back."""
         u = np.log(x / x0)
         force, deviation = self.processes["force"].predict(inputs[None])
@@ -229,7 +229,7 @@ def total_loss(
 
 def _between(nodes: Array, u: Array, most: float) -> Array:
     """The first of four columns of ``nodes`` ``(multiples, 4)`` at ``ln(x/x0) = u`` ``(k,)``, its
-    slope by u, and the others ``(k, 5)``: smooth between nodes, of which only those up to ``most``
+    slope by u, and the others ``(k, 5)``: smooth between nodes; only nodes up to ``most``
     x0 and one beyond are known."""
     known = np.searchsorted(MULTIPLES, most) + 1
     at = np.log([ELASTIC_BELOW, *MULTIPLES[:known]])
@@ -300,8 +300,8 @@ class SolvedJoints:
 
 
 def sides_of(numbers: Any) -> tuple[str, ...]:
-    """The `SIDES` that a joint with these ``numbers`` (see `SolvedJoints`) belongs to, of which the
-    first tells its law."""
+    """The `SIDES` that a joint with these ``numbers`` (see `SolvedJoints`) belongs to; the first
+    tells its law."""
     strain, *_, pin, block = numbers
     if strain and np.isinf(block):
         return (PIN_ALONE,)
