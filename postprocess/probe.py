@@ -242,8 +242,10 @@ def _contact(run: Probed, edge: str, quantity: str, step: int) -> _Along:
     if circle is None:
         return found
     centre, radius = circle
-    middle = _angle(means.x, centre)
-    half = np.degrees(arc.width / (2 * radius))
+    lengths = arc.weight / kinematics(run.scene.analysis.plane).measure(x)  # the weights of areas
+    length = lengths.sum(axis=1)
+    middle = _angle(np.einsum("fq,fqi->fi", lengths / length[:, None], x), centre)
+    half = np.degrees(length / (2 * radius))
     angle = _rising(_angle(found.x, centre), middle - half, middle + half)
     angle -= 360 * np.floor(angle.min() / 360)
     order = np.argsort(angle)

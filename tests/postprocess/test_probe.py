@@ -170,6 +170,46 @@ def test_a_whole_hole_runs_round_once(tmp_path):
         np.testing.assert_allclose(probe.s, 10 * np.radians(probe.angle), rtol=1e-4)
 
 
+def test_the_arc_of_a_ball_is_a_quarter_of_a_circle(tmp_path):
+    """Of a body of revolution the weights of contact points are areas, and angles count along the
+    arc: from the axis, at 270 degrees, outward."""
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize()
+    try:
+        draw = gmsh.model.geo
+        places = [(0, 0, 0.2), (4, 4, 1), (0, 4, 1), (0, 0, 0.2), (4, 0, 1), (4, -4, 1), (0, -4, 1)]
+        low, side, middle, *corners = [draw.addPoint(x, y, 0, size) for x, y, size in places]
+        edge = draw.addCircleArc(low, middle, side)
+        rest = [draw.addLine(side, middle), draw.addLine(middle, low)]
+        lines = [draw.addLine(corners[k - 1], corners[k]) for k in range(4)]
+        ball = draw.addPlaneSurface([draw.addCurveLoop([edge, *rest])])
+        plate = draw.addPlaneSurface([draw.addCurveLoop(lines)])
+        draw.synchronize()
+        sets = {"edge": edge, "middle": rest[0], "top": lines[1], "bottom": lines[3]}
+        for name, line in sets.items():
+            gmsh.model.addPhysicalGroup(1, [line], name=name)
+        gmsh.model.addPhysicalGroup(2, [ball], name="ball")
+        gmsh.model.addPhysicalGroup(2, [plate], name="plate")
+        steel = archord.Elastic(210e3, 0.3)
+        problem = archord.Problem(
+            gmsh,
+            bodies=[archord.Body("ball", steel), archord.Body("plate", steel)],
+            interactions=[archord.Interaction("contact", ("edge", "top"))],
+            supports=[archord.Support("bottom")],
+            loads=[archord.Load("press", on="middle", direction="y", force=-200.0)],
+            kinematics="axisymmetric",
+            steps=1,
+        )
+        run = archord.solve(problem, tmp_path / "run")
+    finally:
+        gmsh.finalize()
+    for quantity in ("pressure", "facet_pressure"):
+        probe = run.probe("edge", quantity)
+        assert probe.angle[[0, -1]] == pytest.approx([270, 360], abs=8)
+        assert (np.diff(probe.angle) > 0).all()
+        assert probe.values.argmax() < len(probe.values) / 3
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
