@@ -71,14 +71,14 @@ def test_readme_lists_the_file_that_it_names_and_its_law_can_be_exported(tmp_pat
 )
 def test_the_scene_of_a_page_is_a_scene(page, displacement, tmp_path):
     file = tmp_path / "scene.toml"
-    file.write_text("\n".join(code(page, "toml")), encoding="utf-8")
+    file.write_text(code(page, "toml")[0], encoding="utf-8")
     assert archord.load_scene(file).load.displacement == pytest.approx(displacement)
 
 
 def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
     """Each number of the last line of the program to 5 %, as the law may be fitted to more
     joints."""
-    [scene] = code("docs/tutorial.md", "toml")
+    scene, _ = code("docs/tutorial.md", "toml")
     [program] = code("docs/tutorial.md", "c")
     (tmp_path / "bolt.toml").write_text(scene, encoding="utf-8")
     (tmp_path / "impact.c").write_text(program, encoding="utf-8")
@@ -93,6 +93,26 @@ def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
     assert re.sub(number, "#", said.strip()) == re.sub(number, "#", printed)
     found, expected = ([*map(float, re.findall(number, line))] for line in (said, printed))
     assert found == pytest.approx(expected, rel=0.05)
+
+
+def test_the_tutorials_ball_is_solved_as_the_tutorial_says(tmp_path):
+    """Its mesh, coarser, its scene, in fewer steps, and its field and measure."""
+    [drawing] = code("docs/tutorial.md", "text")
+    _, scene = code("docs/tutorial.md", "toml")
+    [program] = [text for text in code("docs/tutorial.md", "python") if "triaxiality" in text]
+    text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    [mesh] = re.findall(r"^    docker/run python3 -c '(.*?)'$", text, re.M | re.S)
+    (tmp_path / "ball.geo").write_text(drawing.replace("near = 0.04", "near = 0.3"), "utf-8")
+    steps = scene.replace("-2000.0", "-200.0").replace("[10, 5]", "[1, 1]")
+    (tmp_path / "ball.toml").write_text(steps, encoding="utf-8")
+    for words in (mesh, program):
+        said = subprocess.run(
+            [sys.executable, "-c", words], cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout
+    assert "mean pressure" in said
+    run = archord.load(tmp_path / "runs" / "own_ball")
+    assert run.history["bottom z"].iloc[0] == pytest.approx(200.0, rel=1e-3)
+    assert run.fields(step=1).cell["triaxiality"].min() < 0
 
 
 def test_every_public_name_is_in_the_reference():
