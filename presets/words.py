@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import re
-from functools import singledispatch
 from typing import Any
+
+import numpy as np
 
 from archord.geometry.meshes.formats.source import Mesh
 from archord.materials.elasticity import Elastic
 from archord.materials.finite import LargeStrain
-from archord.materials.hardening import (
-    LinearHardening,
-    SwiftHardening,
-    TabularHardening,
-    VoceHardening,
-)
+from archord.materials.hardening import Hardening, LinearHardening, TabularHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
+from archord.scene.sections.plasticity import parameters_of
 from archord.solver.contact.coulomb import Coulomb
 from archord.solver.contact.interaction import Interaction
 from archord.solver.expansion import disc_of
@@ -94,32 +91,18 @@ def material_words(material: Any) -> dict[str, Any]:
     return _moduli(material) | {"own": _own(material) | {"plastic": bool(material.yields)}}
 
 
-@singledispatch
-def _hardening(law: Any) -> dict[str, Any] | None:
+def _hardening(law: Hardening) -> dict[str, Any] | None:
     """The keys of a body's section for a hardening law, None for a class of one's own."""
-    return None
-
-
-@_hardening.register
-def _(law: LinearHardening) -> dict[str, Any]:
-    return {"yield_stress": law.yield_stress, "hardening": law.modulus}
-
-
-@_hardening.register
-def _(law: TabularHardening) -> dict[str, Any]:
-    return {"hardening": [list(point) for point in law.points]}
-
-
-@_hardening.register
-def _(law: VoceHardening) -> dict[str, Any]:
-    parameters = {"saturation": law.saturation, "rate": law.rate}
-    return {"yield_stress": law.yield_stress, "hardening": parameters}
-
-
-@_hardening.register
-def _(law: SwiftHardening) -> dict[str, Any]:
-    yield_stress = law.strength * law.offset**law.exponent
-    parameters = {"offset": law.offset, "exponent": law.exponent}
+    if type(law) is LinearHardening:
+        return {"yield_stress": law.yield_stress, "hardening": law.modulus}
+    if type(law) is TabularHardening:
+        return {"hardening": [list(point) for point in law.points]}
+    parameters = parameters_of(law)
+    if parameters is None:
+        return None
+    yield_stress = getattr(law, "yield_stress", None)
+    if yield_stress is None:
+        yield_stress = float(law.stress(np.zeros(1))[0])
     return {"yield_stress": yield_stress, "hardening": parameters}
 
 

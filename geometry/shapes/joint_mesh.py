@@ -145,7 +145,7 @@ def mesh_joint(
 
 def around(x: float) -> str:
     """The distance from (x, 0), for sizes."""
-    return f"Sqrt((x - {x!r})^2 + y^2)"
+    return f"Sqrt((x - ({x!r}))^2 + y^2)"  # gmsh knows no "- -1"
 
 
 def refinements(cells: float) -> int:

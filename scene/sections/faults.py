@@ -21,7 +21,7 @@ _ELSEWHERE = {
     "bushing.rings": "[[sleeve]] and [housing]",
 }
 _ELSEWHERE |= {"load.steps": "path.steps"}
-_TAGS = {"number", "list", "law"}  # kinds of values, in pydantic's places
+_TAGS = {"number", "list", "a law"}  # kinds of values, in pydantic's places
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
@@ -18,7 +18,7 @@ from archord.materials.hardening import (
     VoceHardening,
 )
 from archord.materials.named import metal, metals
-from archord.scene.sections.errors import Fault
+from archord.scene.sections.errors import Fault, toml_value
 from archord.scene.sections.keys import Pair, Positive, Section, key, require
 
 ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
@@ -30,16 +30,27 @@ Points = Annotated[list[Pair], Field(min_length=1)]
 class NamedLaw:
     """A hardening law as a scene states it: a table of ``parameters``.
 
-    ``parameters`` are the type and the meaning of each key; ``make`` takes the yield stress, E and
-    the parameters by name, and returns the `Hardening`. ``begins`` takes the parameters of a law
-    that says itself where it begins, and returns the stresses that a ``yield_stress`` beside it may
-    repeat; the last one is the true stress.
+    - ``name``: the word of the key ``law``, which scenes need where two laws have the same keys
+    - ``law``: the class
+    - ``parameters``: the type and the meaning of each key
+    - ``make``: takes the yield stress, E and the parameters by name, and returns the `Hardening`;
+      by default ``law(yield_stress, **parameters)``
+    - ``begins``: of a law that says itself where it begins, takes the parameters and returns the
+      stresses that a ``yield_stress`` beside it may repeat; the last one is the true stress
     """
 
     name: str
+    law: type[Hardening]
     parameters: dict[str, tuple[Any, str]]
-    make: Callable[..., Hardening]
+    make: Callable[..., Hardening] | None = None
     begins: Callable[[dict[str, Any]], tuple[float, ...]] | None = None
+
+    def of(self, yield_stress: float, E: float, parameters: dict[str, Any]) -> Hardening:
+        """The law of a body with these ``parameters``."""
+        if self.make is None:
+            made: Callable[..., Hardening] = self.law
+            return made(yield_stress, **parameters)
+        return self.make(yield_stress, E, **parameters)
 
 
 def _tension_test(yield_stress: float, E: float, engineering: list[list[float]]) -> Hardening:
@@ -51,10 +62,6 @@ def _first_of_test(parameters: dict[str, Any]) -> tuple[float, float]:
     return float(stress), float(stress * (1 + strain))
 
 
-def _voce(yield_stress: float, E: float, saturation: float, rate: float) -> Hardening:
-    return VoceHardening(yield_stress, saturation, rate)
-
-
 def _swift(yield_stress: float, E: float, offset: float, exponent: float) -> Hardening:
     return SwiftHardening(yield_stress / offset**exponent, offset, exponent)
 
@@ -63,14 +70,15 @@ def _swift(yield_stress: float, E: float, offset: float, exponent: float) -> Har
 LAWS = (
     NamedLaw(
         "Voce",
+        VoceHardening,
         {
             "saturation": (Positive, "yield stress at large PEEQ"),
             "rate": (Positive, "how fast it gets there"),
         },
-        _voce,
     ),
     NamedLaw(
         "Swift",
+        SwiftHardening,
         {
             "offset": (Positive, "PEEQ by which the power law is shifted"),
             "exponent": (Exponent, "exponent of the power law"),
@@ -79,6 +87,7 @@ LAWS = (
     ),
     NamedLaw(
         "a tension test",
+        TabularHardening,
         {"engineering": (Points, "points [strain, stress] from first yield on")},
         _tension_test,
         _first_of_test,
@@ -87,9 +96,20 @@ LAWS = (
 IN_WORDS = ", ".join(f"{{{', '.join(law.parameters)}}} ({law.name})" for law in LAWS)
 
 
-def _law_of(names: Any) -> NamedLaw | None:
-    """The law that has just the parameters of these ``names``."""
-    return next((law for law in LAWS if law.parameters.keys() == set(names)), None)
+def _laws_of(table: dict[str, Any]) -> list[NamedLaw]:
+    """The laws that have just the parameters of a ``table``, and the name that it says."""
+    names = table.keys() - {"law"}
+    fitting = [law for law in LAWS if law.parameters.keys() == names]
+    return [law for law in fitting if table.get("law") in (None, law.name)]
+
+
+def parameters_of(law: Hardening) -> dict[str, Any] | None:
+    """The table of a scene that states ``law``; None for a law of a class without a row."""
+    for row in LAWS:
+        if type(law) is row.law and all(hasattr(law, name) for name in row.parameters):
+            table = {name: getattr(law, name) for name in row.parameters}
+            return table if len(_laws_of(table)) == 1 else {"law": row.name} | table
+    return None
 
 
 class _HardeningTable(Section):
@@ -98,8 +118,10 @@ class _HardeningTable(Section):
     @model_validator(mode="after")
     def _one_law(self) -> _HardeningTable:
         laws = (f"{' and '.join(sorted(law.parameters))} ({law.name})" for law in LAWS)
-        known = _law_of(self.model_dump(exclude_none=True)) is not None
-        require(known, (), f"must have {'; or '.join(laws)}")
+        fitting = _laws_of(self.model_dump(exclude_none=True))
+        require(bool(fitting), (), f"must have {'; or '.join(laws)}")
+        names = " or ".join(toml_value(law.name) for law in fitting)
+        require(len(fitting) == 1, ("law",), f"must be given: {names}")
         return self
 
 
@@ -109,11 +131,14 @@ def _keys() -> dict[str, Any]:
     meanings: dict[str, list[str]] = {}
     for law in LAWS:
         for name, (kind, meaning) in law.parameters.items():
-            types[name] = kind
+            types[name] = types[name] | kind if name in types else kind
             meanings.setdefault(name, []).append(f"{law.name}: {meaning}")
-    return {
+    keys: dict[str, Any] = {
         name: (types[name] | None, key("; ".join(meanings[name]), default=None)) for name in types
     }
+    names = Literal[tuple(law.name for law in LAWS)]  # type: ignore[valid-type]
+    said = "name of the law, which its keys tell, too, unless two laws have the same"
+    return keys | {"law": (names | None, key(said, default=None))}
 
 
 HardeningLaw = create_model("HardeningLaw", __base__=_HardeningTable, **_keys())
@@ -122,13 +147,13 @@ HardeningLaw = create_model("HardeningLaw", __base__=_HardeningTable, **_keys())
 def _kind(value: Any) -> str:
     if isinstance(value, list):
         return "list"
-    return "law" if isinstance(value, dict | HardeningLaw) else "number"
+    return "a law" if isinstance(value, dict | HardeningLaw) else "number"
 
 
 HardeningKey = Annotated[
     Annotated[float, Field(ge=0), Tag("number")]
     | Annotated[Points, Tag("list")]
-    | Annotated[HardeningLaw, Tag("law")],  # type: ignore[valid-type]
+    | Annotated[HardeningLaw, Tag("a law")],  # type: ignore[valid-type]
     Discriminator(_kind),
 ]
 
@@ -213,6 +238,6 @@ def hardening_law(yield_stress: float, hardening: Any, E: float) -> Hardening:
     if not isinstance(hardening, HardeningLaw):
         return LinearHardening(yield_stress, hardening)
     parameters = hardening.model_dump(exclude_none=True)
-    law = _law_of(parameters)
-    assert law is not None  # `_one_law` has checked it
-    return law.make(yield_stress, E, **parameters)
+    (law,) = _laws_of(parameters)  # `_one_law` has checked it
+    parameters.pop("law", None)
+    return law.of(yield_stress, E, parameters)

@@ -1,11 +1,16 @@
 """Where a body yields: what a named metal brings, what the scene gives beside it, and what is said
 of both."""
 
+from dataclasses import dataclass
+
+import numpy as np
 import pytest
 
+from archord.materials.hardening import Hardening, SwiftHardening, VoceHardening
 from archord.materials.named import metal, metals
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, parse_scene, resolved
+from archord.scene.sections import plasticity
 from archord.scene.sections.bodies import Solid
 from archord.scene.sections.units import Units
 
@@ -169,3 +174,53 @@ def test_a_metal_whose_name_is_a_number_needs_no_quotes(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(resolved(parse_scene(joint(STEEL))))
     assert load_scene(path, ["block.material=4340"]) == load_scene(path, ['block.material="4340"'])
+
+
+def test_a_law_may_be_named_and_its_name_must_fit_its_keys():
+    voce = {"saturation": 500.0, "rate": 10.0}
+    steel = STEEL | {"yield_stress": 300.0}
+    named = block(steel | {"hardening": voce | {"law": "Voce"}})
+    assert named.law == block(steel | {"hardening": voce}).law
+    with pytest.raises(InputError, match=r"block\.hardening\.law = \"Ludwik\" must be 'Voce'"):
+        block(steel | {"hardening": voce | {"law": "Ludwik"}})
+    with pytest.raises(InputError, match=r"block\.hardening must have rate and saturation"):
+        block(steel | {"hardening": voce | {"law": "Swift"}})
+    with pytest.raises(InputError, match=r"block\.hardening\.speed .*is not a known key"):
+        block(steel | {"hardening": voce | {"speed": 1.0}})
+
+
+def test_a_law_is_one_row(monkeypatch):
+    """Of a class: by its parameters, from its words and back; two laws with the same keys by
+    name."""
+
+    @dataclass(frozen=True)
+    class Ludwik(Hardening):
+        yield_stress: float
+        strength: float
+        power: float
+
+        def stress(self, peeq):
+            return self.yield_stress + self.strength * peeq**self.power
+
+    keys = {"strength": (float, "rise"), "power": (float, "power")}
+    row = plasticity.NamedLaw("Ludwik", Ludwik, keys)
+    law = Ludwik(300.0, 500.0, 0.4)
+    assert plasticity.parameters_of(law) is None
+    monkeypatch.setattr(plasticity, "LAWS", (*plasticity.LAWS, row))
+    words = {"strength": 500.0, "power": 0.4}
+    assert plasticity.parameters_of(law) == words
+    assert row.of(300.0, 2e5, words) == law
+    other = plasticity.NamedLaw("another", SwiftHardening, keys)
+    monkeypatch.setattr(plasticity, "LAWS", (*plasticity.LAWS, other))
+    assert plasticity.parameters_of(law) == {"law": "Ludwik"} | words
+
+
+@pytest.mark.parametrize(
+    "law", [VoceHardening(300.0, 500.0, 10.0), SwiftHardening(700.0, 0.01, 0.2)]
+)
+def test_the_words_of_a_law_make_it_again(law):
+    words = plasticity.parameters_of(law)
+    first = float(law.stress(np.zeros(1))[0])
+    again = block(STEEL | {"yield_stress": first, "hardening": words}).law
+    peeq = np.linspace(0, 0.1, 5)
+    np.testing.assert_allclose(again.stress(peeq), law.stress(peeq), rtol=1e-14)
