@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from archord.scene.presets.joint import Scene
     from archord.scene.problem import ProblemScene
     from archord.solver.contact.coulomb import Coulomb
+    from archord.solver.contact.exponential import Exponential
     from archord.solver.contact.law import ContactLaw, Quantity, Response
     from archord.solver.path.system import System
     from archord.solver.problem import Body, Coupling, Interaction, Load, Problem, Support
@@ -47,6 +48,7 @@ __all__ = [
     "Coulomb",
     "Coupling",
     "Elastic",
+    "Exponential",
     "InputError",
     "Interaction",
     "J2Material",
@@ -97,6 +99,7 @@ _HOME = {
     "archord.scene.problem": ["ProblemScene"],
     "archord.scene.presets.joint": ["Scene"],
     "archord.solver.contact.coulomb": ["Coulomb"],
+    "archord.solver.contact.exponential": ["Exponential"],
     "archord.solver.contact.law": ["ContactLaw", "Quantity", "Response"],
     "archord.solver.path.system": ["System"],
     "archord.solver.problem": ["Body", "Coupling", "Interaction", "Load", "Problem", "Support"],

@@ -22,6 +22,7 @@ from archord.presets.joint import joint_mesh
 from archord.report.errors import InputError
 from archord.scene import parts
 from archord.scene.problem import ProblemScene
+from archord.solver.contact.named import LAWS
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.path.system import displacement_space
 from archord.solver.problem import Interaction, Problem
@@ -126,10 +127,14 @@ def _interaction(part: parts.InteractionSection, analysis: Any) -> Interaction:
     first: Any = part.surfaces[0]
     if part.rigid is not None:
         first = RigidCircle(np.array(part.rigid.centre), part.rigid.radius)
+    law: Any = part.law
+    if part.parameters:
+        make: Any = LAWS[part.law]
+        law = make(**part.parameters)
     return Interaction(
         part.name,
         (first, part.surfaces[-1]),
-        law=part.law,
+        law=law,
         friction=part.friction,
         kinematics=analysis.kinematics,
         gamma_factor=analysis.gamma_factor,

@@ -15,9 +15,11 @@ from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
+from archord.scene.sections.contact import CONTACT_LAWS
 from archord.scene.sections.plasticity import parameters_of
 from archord.solver.contact.coulomb import Coulomb
 from archord.solver.contact.interaction import Interaction
+from archord.solver.contact.named import LAWS
 from archord.solver.expansion import disc_of
 from archord.solver.parts import Body, Load, Support
 from archord.solver.problem import Problem
@@ -145,6 +147,9 @@ def _law(law: Any) -> dict[str, Any]:
         return {"law": law}
     if law == Coulomb(getattr(law, "friction", 0.0)):
         return {"law": "coulomb", "friction": law.friction}
+    names = {kind: name for name, kind in LAWS.items() if CONTACT_LAWS[name]}
+    if type(law) in names:
+        return {"law": names[type(law)], "parameters": vars(law)}
     units = {name: quantity.unit for name, quantity in law.quantities(law.state(1)).items()}
     return {"own": _own(law) | {"friction": bool(law.has_friction), "quantities": units}}
 

@@ -3,16 +3,18 @@ path of the loads."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from archord.scene.presets.known import AnyShape
 from archord.scene.sections.bodies import NotNegative, Solid
+from archord.scene.sections.contact import CONTACT_LAWS, PARAMETERS_IN_WORDS, require_parameters
 from archord.scene.sections.keys import Name, Pair, PartName, Positive, Section, given, key, require
 from archord.scene.sections.loading import Loading, StepCounts, Steps, Targets
 
 Freedom = Literal["x", "y", "rotation"]
+ContactLawName: Any = Literal[tuple(CONTACT_LAWS)]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
 _RIGHT_ANGLE = 1.5708
 _OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no surface's
@@ -112,9 +114,13 @@ class InteractionSection(Section):
     rigid: DiscSection | None = key(
         "rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0}
     )
-    law: Literal["frictionless", "coulomb", "tied"] = key(
-        "contact without friction, with Coulomb's friction, or tied surfaces",
+    law: ContactLawName = key(
+        "contact without friction, with Coulomb's friction, tied surfaces, or soft contact",
         default="frictionless",
+    )
+    parameters: dict[str, Positive] | None = key(
+        f"parameters of the law; {PARAMETERS_IN_WORDS}",
+        other={"pressure": 50.0, "clearance": 0.01},
     )
     friction: float = key(
         "Coulomb's coefficient of friction, also without law = coulomb", default=0.0, ge=0, le=1e6
@@ -166,7 +172,10 @@ class InteractionSection(Section):
             "integrated",
             f"must be one of the surfaces {self.surfaces}",
         )
+        require_parameters(self.law, self.parameters or {})
         require(not (self.friction and self.law == "tied"), "friction", "is not for tied surfaces")
+        soft = bool(CONTACT_LAWS[self.law])
+        require(not (self.friction and soft), "friction", f'is not for law = "{self.law}"')
         rubs = self.law != "coulomb" or self.friction > 0
         require(rubs, "friction", 'must be positive where law = "coulomb"')
         fits = self.interference or self.overlap

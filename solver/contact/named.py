@@ -6,6 +6,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.solver.contact.coulomb import Coulomb
+from archord.solver.contact.exponential import Exponential
 from archord.solver.contact.law import OPEN, SLIDE, STICK, ContactLaw, Response, State
 
 
@@ -40,8 +41,15 @@ class Tied(ContactLaw):
         return Response(trial, by_trial, None, np.full(m, STICK), state)
 
 
-LAWS: dict[str, ContactLaw] = {"frictionless": Frictionless(), "tied": Tied()}
-NAMES = (*LAWS, "coulomb")
+# A new law is a class, a row here, and a row of CONTACT_LAWS in scene/sections/contact.py.
+LAWS: dict[str, type[ContactLaw]] = {
+    "frictionless": Frictionless,
+    "coulomb": Coulomb,
+    "tied": Tied,
+    "exponential": Exponential,
+}
+WITHOUT_PARAMETERS = ("frictionless", "tied")
+NAMES = (*WITHOUT_PARAMETERS, "coulomb")  # what a `Problem` may say, with a coefficient of friction
 
 
 def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
@@ -63,6 +71,6 @@ def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
         return Coulomb(friction)
     if not isinstance(law, str):
         return law
-    if law not in LAWS:
+    if law not in WITHOUT_PARAMETERS:
         raise ValueError(f"there is no contact law {law!r}; there are {', '.join(NAMES)}")
-    return LAWS[law]
+    return LAWS[law]()
