@@ -12,7 +12,9 @@ from archord.scene.parts import MeshSection
 from archord.scene.presets.joint import FORMAT as JOINT_FORMAT
 from archord.scene.presets.joint import Scene
 from archord.scene.presets.known import PRESETS, SHAPES
+from archord.scene.presets.preset import Preset
 from archord.scene.problem import FORMAT, ProblemScene
+from archord.scene.sections.bodies import Solid
 from archord.scene.sections.errors import toml_value
 
 _JOINT: dict[str, Any] = {
@@ -22,11 +24,13 @@ _GENERAL: dict[str, Any] = {
     name: info for name, info in ProblemScene.model_fields.items() if name != "format"
 }
 _GENERAL["mesh.circle"] = MeshSection.model_fields["circle"]
-# sections of presets; the load is the same for all
-_LUG = {name: PRESETS["lug"].model_fields[name] for name in ("lug", "plate", "bushing")}
-_CLEVIS = {name: PRESETS["clevis"].model_fields[name] for name in ("clevis", "inner", "outer")}
-_RINGS = {
-    name: PRESETS["bushing"].model_fields[name] for name in ("bushing", "sleeve", "housing", "load")
+_PRESETS: dict[str, dict[str, Any]] = {
+    name: {
+        section: info
+        for section, info in scene.model_fields.items()
+        if section not in Preset.model_fields
+    }
+    for name, scene in PRESETS.items()
 }
 _SHAPED = {
     "pin": '`"half"`, `"whole"` or `"none"`, for a rigid disc',
@@ -92,6 +96,7 @@ def example(general: bool = False) -> str:
 
 def reference() -> str:
     """All sections and keys as Markdown tables."""
+    presets = " or ".join(_in_words(*preset) for preset in _PRESETS.items())
     parts = [
         "# Scene reference\n",
         "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A "
@@ -111,16 +116,37 @@ def reference() -> str:
         *_shapes(),
         *_MEETING,
         "## Presets\n",
-        "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, "
-        "`[outer]`), or `[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a "
-        "general one, which `archord scene --expand` prints. The section pin is the same as for "
+        f"A scene with {presets} stands for a general one, which `archord scene --expand` prints; "
+        "the first of these sections that it has counts. The section pin is the same as for "
         "joints; plates, bushing, sleeves and housing have materials like it. The other sections "
         "are the same as for general scenes.\n",
-        *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
-        *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
-        *_tables(_RINGS, dict.fromkeys(("sleeve", "housing"), _JOINT["block"])),
+        *(
+            table
+            for sections in _PRESETS.values()
+            for table in _tables(sections, _solids(sections))
+        ),
+        *_tables({"load": Preset.model_fields["load"]}, {}),
     ]
     return "\n".join(parts)
+
+
+def _solids(sections: dict[str, Any]) -> dict[str, Any]:
+    """The section of the block, with the keys of all materials, for each solid of ``sections``."""
+    solid = [name for name, info in sections.items() if issubclass(_model_of(info), Solid)]
+    return dict.fromkeys(solid, _JOINT["block"])
+
+
+def _model_of(section: Any) -> Any:
+    return next(iter(get_args(section.annotation)), section.annotation)
+
+
+def _in_words(preset: str, sections: dict[str, Any]) -> str:
+    """The sections of a ``preset``, as the page names them."""
+    others = [(_heading(name, info), info) for name, info in sections.items() if name != preset]
+    needed = [f"`{heading}`" for heading, info in others if info.is_required()]
+    possible = [f"perhaps `{heading}`" for heading, info in others if not info.is_required()]
+    said = ", ".join(needed + possible)
+    return f"`[{preset}]` (and {said})" if said else f"`[{preset}]`"
 
 
 def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
@@ -181,7 +207,7 @@ def materials() -> str:
 
 def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
     """Name, field and JSON schema of every key of a section."""
-    model = next(iter(get_args(section.annotation)), section.annotation)
+    model = _model_of(section)
     schemas = model.model_json_schema()["properties"]
     for name in sorted(schemas, key=lambda name: (name != "name", name not in ("E", "nu"))):
         if "unit" in schemas[name]:

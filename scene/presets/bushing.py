@@ -62,6 +62,7 @@ class BushingScene(Preset):
     """A pin, sleeves around it and a housing; they touch on the load axis at first if the load is a
     force."""
 
+    shape = BushingShape
     bushing: Bushing = Field(description="radius of the pin, and mesh")
     sleeve: list[Ring] = Field(default_factory=list, description="sleeves from the pin outward")
     housing: Ring = Field(description="geometry and material of the housing")

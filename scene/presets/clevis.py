@@ -68,6 +68,7 @@ class ClevisScene(Preset):
     """A pin through one inner plate and two outer ones: the plane problem of the inner plate, under
     the force P, beside the one of an outer plate, under P/2, each per unit of its own thickness."""
 
+    shape = ClevisShape
     clevis: Clevis = Field(description="radius of the pin, clearance in all plates, and mesh")
     inner: ClevisPlate = Field(description="geometry and material of the inner plate")
     outer: ClevisPlate = Field(description="geometry and material of each of the two outer plates")

@@ -7,22 +7,20 @@ from typing import Annotated, Any, Union
 
 from pydantic import Field
 
-from archord.scene.presets.bushing import BushingScene, BushingShape
-from archord.scene.presets.clevis import ClevisScene, ClevisShape
+from archord.scene.presets.bushing import BushingScene
+from archord.scene.presets.clevis import ClevisScene
 from archord.scene.presets.joint_shape import JointShape
-from archord.scene.presets.lug import LugScene, LugShape
+from archord.scene.presets.lug import LugScene
 from archord.scene.presets.preset import Preset, Shape
 
-# scenes by the section that tells them, and the shapes that meshes are drawn from
 PRESETS: dict[str, type[Preset]] = {
     "lug": LugScene,
     "clevis": ClevisScene,
     "bushing": BushingScene,
-}
+}  # by the section that tells them; a scene is the first of them that it has a section of
+# what meshes are drawn from
 SHAPES: dict[str, type[Shape] | type[JointShape]] = {
-    "lug": LugShape,
-    "clevis": ClevisShape,
-    "bushing": BushingShape,
+    **{name: scene.shape for name, scene in PRESETS.items()},
     "joint": JointShape,
 }
 AnyShape: Any = Annotated[Union[*SHAPES.values()], Field(discriminator="kind")]

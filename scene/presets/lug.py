@@ -122,6 +122,7 @@ class LugShape(Lug):
 class LugScene(Preset):
     """A lug and its pin."""
 
+    shape = LugShape
     lug: Lug = Field(description="geometry and mesh")
     plate: Solid = Field(description="material of the lug")
     bushing: LugBushing | None = Field(None, description="a bushing pressed into the hole of a lug")

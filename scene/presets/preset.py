@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -91,7 +91,10 @@ class PinLoad(Loading):
 
 
 class Preset(Checked):
-    """What the scenes of presets share; each defines `general`."""
+    """What the scenes of presets share; each says the ``shape`` of its mesh and defines
+    `general`."""
+
+    shape: ClassVar[type[Shape]]
 
     format: Literal[2] = key("version of the scene format", default=2)
     units: Units = Field(default_factory=Units, description="names of the units")

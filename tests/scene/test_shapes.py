@@ -7,9 +7,11 @@ import pytest
 import tomli_w
 from mpi4py import MPI
 
+from archord.presets.problem import _SHAPES as drawn
 from archord.presets.problem import general_problem
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, resolved
+from archord.scene.presets.known import SHAPES
 from archord.scene.problem import ProblemScene
 from archord.solver.path.system import System
 
@@ -27,6 +29,10 @@ BUSHING = {
     "housing": {"bore": 13.98, "outer": 30.0, "E": 70000.0, "nu": 0.33},
     "load": {"displacement": [0.05, 0.2], "steps": [1, 3]},
 }
+
+
+def test_every_shape_is_drawn():
+    assert drawn.keys() == SHAPES.keys()
 
 
 def changed(data: dict, place: str, value) -> dict:
