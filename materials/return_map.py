@@ -1,4 +1,5 @@
-"""The return map of J2 plasticity with isotropic hardening, on arrays of points.
+"""The return map of J2 plasticity with isotropic hardening and its consistent tangent, on arrays of
+points.
 
 Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity,
 1998, Boxes 3.2 and 3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P``

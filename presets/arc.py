@@ -1,4 +1,4 @@
-"""The contact pressure along the arcs of a joint: peak and contact angle.
+"""The contact pressure along the arcs of a joint: peak and semi-angle.
 
 Angles and arc lengths are measured on the undeformed arcs from the contact axis.
 """

@@ -20,3 +20,13 @@ def test_the_files_that_the_recipes_name_are_there():
     files = set(re.findall(r"`((?:\w+/)+\w+\.\w+)`", PAGE))
     assert files
     assert not {file for file in files if not (ROOT / file).exists()}
+
+
+def test_a_word_of_the_field_leads_to_its_file():
+    """The table of docs/architecture.md: each file has the name that it gives."""
+    plan = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = plan.partition("## Where the words are")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| ([^|]+) \| `([^`]+)` \| `([^`]+)` \|$", table, re.MULTILINE)
+    assert len(rows) > 12
+    for word, file, name in rows:
+        assert name in (ROOT / file).read_text(encoding="utf-8"), word

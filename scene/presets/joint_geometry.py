@@ -1,5 +1,5 @@
-"""The section ``joint`` of a scene: the geometry of pin and hole, and how finely they are
-meshed."""
+"""The section ``joint`` of a scene: the radius of the pin, the clearance, and how finely
+pin and hole are meshed."""
 
 from __future__ import annotations
 

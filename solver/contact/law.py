@@ -1,5 +1,5 @@
-"""The protocol of contact laws: the traction at points of a surface, from how they lie to their
-partners.
+"""The protocol of contact laws: the contact traction at points of a surface, from how they lie to
+their partners.
 
 All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` first,
 then its tangent, which in a plane is ``n`` turned by a quarter anticlockwise. There are as many

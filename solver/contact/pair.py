@@ -1,4 +1,5 @@
-"""One integrated surface against its opposite: pairs, openings and tractions at its points."""
+"""One integrated surface against its opposite: pairs, gaps and contact tractions at its
+points."""
 
 from __future__ import annotations
 

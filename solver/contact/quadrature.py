@@ -1,4 +1,4 @@
-"""Quadrature that respects the facets of the opposite curve.
+"""Quadrature with breaks where facets of the opposite curve end.
 
 A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its
 ends. Points that ignore them integrate a uniform pressure with an error of the order of the mesh;

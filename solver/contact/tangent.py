@@ -1,4 +1,4 @@
-"""The consistent linearisation of the contact forces as blocks of a matrix, each place once.
+"""The consistent tangent of the contact forces as blocks of a matrix, each place once.
 
 The kernel in C (contact_tangent.c has the formulas) adds up points in slots found once for facets
 that may meet.

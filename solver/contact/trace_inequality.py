@@ -1,4 +1,5 @@
-"""How large the traction on a facet can be for the elastic energy of its cell.
+"""The trace constant of Nitsche's gamma: how large the traction on a facet can be for the elastic
+energy of its cell.
 
 Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue
 problem of each contact cell is solved, with its curved geometry and its elastic moduli.

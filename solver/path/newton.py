@@ -1,5 +1,5 @@
-"""Newton's method for equilibrium: PETSc's SNES, with a linear strategy, and tests of its own for
-when to stop."""
+"""Newton's method for equilibrium: PETSc's SNES, with or without a line search, with a linear
+strategy, and tests of its own for when to stop."""
 
 from __future__ import annotations
 
