@@ -112,9 +112,7 @@ class Progress:
                 transient=True,
             )
             self.moving.add_task("meshing", total=None)
-        self.cells = (
-            scene.joint.expected_cells if isinstance(scene, Scene) and not self.by_mesh else 0.0
-        )
+        self.cells = 0.0 if self.by_mesh else scene.expected_cells
         self.title, self.columns, last, self.unit = _shown(scene)
         if self.by_mesh:
             self.print(

@@ -137,14 +137,9 @@ def scene(
         )
     from archord.scene import reference as pages
     from archord.scene.file import load_scene, parse_any, resolved
-    from archord.scene.presets.joint import Scene
-    from archord.scene.presets.joint_shape import general_joint
 
     if expand is not None:
-        given = load_scene(expand)
-        print(
-            resolved(parse_any(general_joint(given)) if isinstance(given, Scene) else given), end=""
-        )
+        print(resolved(parse_any(load_scene(expand).general())), end="")
     elif materials:
         print(pages.materials(), end="")
     else:
@@ -168,23 +163,20 @@ def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: 
     from archord.geometry.meshes.fenicsx import gathered
     from archord.output.user_file import check_target
     from archord.postprocess.pictures.mesh import draw_mesh, mesh_text
-    from archord.presets.joint import joint_problem
     from archord.presets.problem import as_input_error, mesh_name, scene_mesh
-    from archord.scene.file import load_scene, override_key
-    from archord.scene.presets.joint import Scene
+    from archord.scene.file import load_scene, override_key, parse_any
     from archord.scene.problem import MeshScene
 
     if file.suffix == ".toml":
-        scene: Any = load_scene(file, overrides)
+        loaded = load_scene(file, overrides)
+        loaded.require_mesh()
+        scene: Any = parse_any(loaded.general())
     else:
         given: Any = {"mesh": {"file": str(file)}}
         make: Any = MeshScene
         scene = make(str(file), {override_key(given, o): f"--set {o}" for o in overrides}, **given)
-    if isinstance(scene, Scene):
-        whole = gathered(joint_problem(scene, MPI.COMM_SELF).mesh)
-    else:
-        with as_input_error(mesh_name(scene)):
-            whole = gathered(scene_mesh(scene, MPI.COMM_SELF))
+    with as_input_error(mesh_name(scene)):
+        whole = gathered(scene_mesh(scene, MPI.COMM_SELF))
     assert whole is not None  # this is rank 0
     print(mesh_text(str(file), whole))
     if pictures:

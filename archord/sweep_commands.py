@@ -57,7 +57,6 @@ def sweep(
     from archord.studies.sweep import (
         FILE,
         claim,
-        expected_seconds,
         open_cases,
         part_of,
         write_tables,
@@ -79,7 +78,7 @@ def sweep(
     def prepared():
         design = read_sweep(source, overrides)
         mine = part_of(design.distinct, array)
-        minutes = sum(expected_seconds(case.scene) for case in design.distinct) / 60
+        minutes = sum(case.scene.expected_seconds for case in design.distinct) / 60
         distinct = f"{len(design.distinct)} of them distinct"
         say(f"{len(design.cases)} cases, {distinct}; about {minutes:.1f} min on one rank")
         if dry_run:
@@ -147,12 +146,12 @@ def sweep(
 
 def _table(design) -> Table:
     """A line for each case: what is varied, and what it may cost."""
-    from archord.studies.sweep import expected_seconds, heading, shown
+    from archord.studies.sweep import shown
 
     table = Table(
         "case",
         "run",
-        *(heading(key, design.cases[0].scene) for key in design.keys),
+        *map(design.cases[0].scene.heading, design.keys),
         "steps",
         "seconds",
     )
@@ -163,6 +162,6 @@ def _table(design) -> Table:
             case.run,
             *values,
             len(case.scene.targets),
-            f"{expected_seconds(case.scene):.2g}",
+            f"{case.scene.expected_seconds:.2g}",
         )
     return table

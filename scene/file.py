@@ -292,19 +292,11 @@ def resolved(scene: AnyScene, beside: Path | None = None) -> str:
     may move then."""
     import tomli_w
 
-    data = scene.model_dump(exclude_none=True)
+    data = scene.resolved_data()
     if beside is not None and "file" in data.get("mesh", {}):
         mesh = Path(data["mesh"]["file"])
         if mesh.resolve() == beside.resolve():
             data["mesh"]["file"] = mesh.name
-    if isinstance(scene, Scene):
-        data["joint"]["block_size"] = scene.joint.W
-        if "element_size" not in data["joint"]:
-            data["joint"].setdefault("relative_element_size", 0.04)
-        if scene.pin.rigid:
-            data["pin"] = {"rigid": True}
-    for section, key in (name.split(".") for name in CHOSEN if scene.analysis.accuracy is not None):
-        data.get(section, {}).pop(key, None)
     return tomli_w.dumps(data)
 
 

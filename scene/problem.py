@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,6 +27,7 @@ from archord.scene.sections.loading import steps_of
 from archord.scene.sections.units import Units
 
 FORMAT = 2
+_SECONDS = 0.5  # of an output step: a guess, as the mesh is not known yet
 # parts whose names must differ, as results, reactions and drives are found by them
 _APART = {
     "body": (),
@@ -95,6 +96,7 @@ class ProblemScene(Checked):
     2
     """
 
+    chosen: ClassVar[tuple[str, ...]] = STEPS
     format: Literal[2] = key("version of the scene format", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
     mesh: MeshSection = Field(description="the mesh")
@@ -138,7 +140,7 @@ class ProblemScene(Checked):
         self._directions()
         require_different(self)
         require_solids({("body", name): body for name, body in self.solids.items()})
-        self.require_open(STEPS)
+        self.require_open()
         steps_of(self.path.steps, self.n_stages, "path.steps")
         return self
 
@@ -178,6 +180,11 @@ class ProblemScene(Checked):
         if not self.fits:
             found += unused(self.path, "path", "fit_steps", "an overlap or an interference")
         return found
+
+    @property
+    def expected_seconds(self) -> float:
+        """About how long a solve will take on one rank of a machine of 2020."""
+        return _SECONDS * len(self.targets)
 
     @property
     def n_stages(self) -> int:

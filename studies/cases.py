@@ -40,7 +40,6 @@ from archord.scene.file import (
     read_toml,
     resolved,
 )
-from archord.scene.presets.joint import Scene
 from archord.scene.sections.errors import toml_value
 from archord.scene.sections.faults import shortened
 from archord.scene.sections.keys import Section
@@ -203,12 +202,7 @@ class Case:
 
     def value(self, key: str) -> Any:
         """What the case's scene says for the dotted ``key``; None if nothing."""
-        # a scene holds the targets that were in the file of its path, and a preset's scene none of
-        # the preset's keys
-        if key == "load.path" or not isinstance(self.scene, Scene):
-            return self.overrides.get(key)
-        section, _, name = key.partition(".")
-        return getattr(getattr(self.scene, section), name)
+        return self.scene.value(key, self.overrides.get(key))
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,6 @@ from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
 from archord.report.errors import InputError
 from archord.report.readable import require_file
-from archord.scene.file import AnyScene
-from archord.scene.presets.joint import Scene
 from archord.scene.sections.errors import toml_value
 from archord.studies.cases import Case, Sweep
 
@@ -33,10 +31,6 @@ _PER_STEP = (
     "cutbacks",
     "seconds [s]",
 )  # of history.csv; cases.csv has sums of them
-_DOFS_PER_CELL = {2: 4.3, 3: 9.5}
-_STEP = {False: 1.7e-5, True: 2.8e-5}  # seconds per dof of an elastic and of a plastic output step
-_GENERAL = 0.5  # seconds of an output step of a general scene
-_LINEAR = 3e4  # dofs up to which a step costs in proportion to them
 Row = list[str]
 
 
@@ -110,7 +104,7 @@ def part_of(cases: list[Case], part: str) -> list[Case]:
     found = re.fullmatch(r"(\d+)/(\d+)", part)
     if not found or not 1 <= int(found[1]) <= int(found[2]):
         raise InputError(f"--array {part}: must be I/N, with I from 1 to N.")
-    longest = sorted(cases, key=lambda case: -expected_seconds(case.scene))
+    longest = sorted(cases, key=lambda case: -case.scene.expected_seconds)
     return longest[int(found[1]) - 1 :: int(found[2])]
 
 
@@ -126,20 +120,6 @@ def open_cases(
     left = [case for case, result in zip(cases, results, strict=True) if result.status not in over]
     damaged = [result for result in results if result.damaged]
     return [result for result in results if result.status in over], left, damaged
-
-
-def expected_seconds(scene: AnyScene) -> float:
-    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has
-    solved before; of a general scene, whose mesh is not known yet, a guess.
-
-    Fitted by hand to runs of 2 450 to 8 336 dofs, elastic and plastic (README); beyond ``_LINEAR``
-    dofs the factorisation of a plane mesh grows as dofs^1.5 (George 1973).
-    """
-    if not isinstance(scene, Scene):
-        return _GENERAL * len(scene.targets)
-    dofs = _DOFS_PER_CELL[scene.analysis.degree] * scene.joint.expected_cells
-    step = 0.02 + _STEP[scene.plastic] * dofs * max(1.0, (dofs / _LINEAR) ** 0.5)
-    return 0.1 + 2e-5 * dofs + len(scene.targets) * step
 
 
 def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> dict[str, Result]:
@@ -177,7 +157,8 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
         dict.fromkeys(name for names in headings for name in names)
     )  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
-    head = ["case", "run", "status", *(heading(key, sweep.cases[0].scene) for key in sweep.keys)]
+    first_scene = sweep.cases[0].scene
+    head = ["case", "run", "status", *map(first_scene.heading, sweep.keys)]
     steps = [[*head, *history]]
     cases = [[*head, *_COST, *(history[i] for i in last)]]
     for case in sweep.cases:
@@ -214,17 +195,6 @@ def _history(run: Path) -> list[Row]:
     ):
         return list(csv.reader(file))
     return []
-
-
-def heading(key: str, scene: AnyScene) -> str:
-    """The dotted ``key`` with its unit: ``joint.clearance [mm]``; without, of a general scene."""
-    if not isinstance(scene, Scene):
-        return key
-    section, _, name = key.partition(".")
-    extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
-    kind = extra.get("unit") if isinstance(extra, dict) else None
-    known = {**scene.units.model_dump(), "force": scene.units.force_of(scene.analysis.thickness)}
-    return f"{key} [{known[kind]}]" if kind else key
 
 
 def shown(value: Any) -> str:

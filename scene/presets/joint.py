@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from archord.materials.elasticity import contact_modulus
 from archord.report.errors import InputError
 from archord.scene.presets.joint_geometry import JointGeometry
+from archord.scene.presets.preset import general_scene
 from archord.scene.sections.analysis import Analysis, Output, Stepping
 from archord.scene.sections.bodies import Pin, Solid, require_solids
 from archord.scene.sections.checked import Checked
@@ -26,6 +27,9 @@ STEPS = (
     "stepping.maximum",
 )  # what an accuracy chooses of any scene, and of a joint
 CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", *STEPS)
+_DOFS_PER_CELL = {2: 4.3, 3: 9.5}
+_SECONDS = {False: 1.7e-5, True: 2.8e-5}  # per dof of an elastic and of a plastic output step
+_LINEAR = 3e4  # dofs up to which a step costs in proportion to them
 _FAR = 0.1  # displacement over R beyond which small strain may be qualitatively wrong
 _STIFFEST = 1.6  # P over E* delta of no joint in a block: 1.53 where the clearance vanishes
 _STIFFEST_STUCK = (
@@ -78,6 +82,8 @@ class Scene(Checked):
     scene: block.E = -1.0 must be greater than 0.
     """
 
+    chosen: ClassVar[tuple[str, ...]] = CHOSEN
+    has_laws: ClassVar[bool] = True
     format: Literal[1] = key(
         "version of the scene format; a scene of a newer version is refused", default=FORMAT
     )
@@ -97,7 +103,7 @@ class Scene(Checked):
         joint = self.joint
         pin = self.pin
         load = f"load.{self.load.kind}"
-        self.require_open(CHOSEN)
+        self.require_open()
         require_solids({(name,): body for name, body in self.solids.items()})
         said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
         require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)
@@ -126,6 +132,86 @@ class Scene(Checked):
                 f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it "
                 "here."
             )
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for; its pin is pressed along -y."""
+        g = self.joint
+        pin = self.pin
+        load = self.load
+        contact: dict[str, Any] = {
+            "name": "contact",
+            "surfaces": ["pin", "hole"],
+            "overlap": max(-g.dR, 0.0),
+        }
+        if pin.rigid:
+            contact |= {"surfaces": ["hole"], "rigid": {"centre": [0.0, -g.dR], "radius": g.radius}}
+        elif self.analysis.integration != "both":
+            contact["integrated"] = "pin" if self.analysis.integration == "pin" else "hole"
+        on = "pin" if g.is_ring else "pin top"
+        if pin.rigid:
+            on = "contact"
+        press: dict[str, Any] = {"name": "press", "on": on, "direction": "y"}
+        press["force" if self.force_controlled else "displacement"] = [
+            -at * self.load_unit for at in load.stages
+        ]
+        if g.is_ring:
+            press["core"] = {"centre": [0.0, 0.0], "radius": load.core_radius * g.radius}
+        shape = g.model_dump(exclude_none=True) | {"kind": "joint", "core_radius": load.core_radius}
+        axis = {"name": "axis", "on": "symmetry", "fixed": ["x"]}
+        block = {"name": "block", "on": "block held", "fixed": ["x", "y"]}
+        parts = {
+            "interaction": [contact],
+            "support": [axis, block],
+            "load": [press],
+            "path": {"steps": load.stage_steps},
+        }
+        return general_scene(self, shape, 2, {"block": self.block}, **parts)
+
+    def resolved_data(self) -> dict[str, Any]:
+        """The table of the scene, with every default filled in but for what an accuracy chooses."""
+        data = super().resolved_data()
+        joint = data["joint"]
+        joint["block_size"] = self.joint.W
+        if "element_size" not in joint and self.analysis.accuracy is None:
+            joint.setdefault("relative_element_size", 0.04)
+        if self.pin.rigid:
+            data["pin"] = {"rigid": True}
+        return data
+
+    @property
+    def expected_cells(self) -> float:
+        """About how many triangles the mesh will have."""
+        return self.joint.expected_cells
+
+    @property
+    def expected_seconds(self) -> float:
+        """About how long a solve will take on one rank of a machine of 2020, in a process that has
+        solved before.
+
+        Fitted by hand to runs of 2 450 to 8 336 dofs, elastic and plastic (README); beyond
+        ``_LINEAR`` dofs the factorisation of a plane mesh grows as dofs^1.5 (George 1973).
+        """
+        dofs = _DOFS_PER_CELL[self.analysis.degree] * self.expected_cells
+        step = 0.02 + _SECONDS[self.plastic] * dofs * max(1.0, (dofs / _LINEAR) ** 0.5)
+        return 0.1 + 2e-5 * dofs + len(self.targets) * step
+
+    def heading(self, key: str) -> str:
+        """The dotted ``key`` with its unit: ``joint.clearance [mm]``."""
+        section, _, name = key.partition(".")
+        extra = type(getattr(self, section)).model_fields[name].json_schema_extra
+        kind = extra.get("unit") if isinstance(extra, dict) else None
+        if not kind:
+            return key
+        units = self.units.model_dump() | {"force": self.units.force_of(self.analysis.thickness)}
+        return f"{key} [{units[kind]}]"
+
+    def value(self, key: str, given: Any = None) -> Any:
+        """What the scene says for the dotted ``key``; for the file of a path, of which it holds the
+        targets, what was ``given``."""
+        if key == "load.path":
+            return given
+        section, _, name = key.partition(".")
+        return getattr(getattr(self, section), name)
 
     @property
     def force_controlled(self) -> bool:

@@ -1,13 +1,14 @@
 """The section ``joint`` of a scene: the radius of the pin, the clearance, and how finely
-pin and hole are meshed."""
+pin and hole are meshed; and the same as a shape of a general scene."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from archord.scene.presets.preset import PinPart
 from archord.scene.sections.keys import Positive, Section, given, key, require
 
 _WIDEST = 1e6  # block_size over R
@@ -170,3 +171,15 @@ class JointGeometry(Section):
             if self.element_size is None
             else self.element_size
         )
+
+
+class JointShape(JointGeometry):
+    """The paper's joint: half a block or a ring with a pin."""
+
+    pin: PinPart = "half"
+    core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1)
+    kind: Literal["joint"] = "joint"
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it."""
+        return {"kind": "joint", "geometry": self, "pin": self.pin, "core_radius": self.core_radius}

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from archord.scene.presets.bushing import BushingScene
 from archord.scene.presets.clevis import ClevisScene
-from archord.scene.presets.joint_shape import JointShape
+from archord.scene.presets.joint_geometry import JointShape
 from archord.scene.presets.lug import LugScene
 from archord.scene.presets.preset import Preset, Shape
 

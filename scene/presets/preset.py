@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from archord.scene.presets.joint import Scene
 from archord.scene.sections.analysis import PresetAnalysis, ProblemOutput, Stepping
 from archord.scene.sections.bodies import Pin, Solid
 from archord.scene.sections.checked import Checked
@@ -164,7 +163,7 @@ class Preset(Checked):
 
 
 def general_scene(
-    scene: Scene | Preset,
+    scene: Any,
     shape: dict[str, Any],
     symmetry: int,
     solids: Mapping[str, Solid],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import ValidationError
 
@@ -14,7 +14,15 @@ from archord.scene.sections.keys import Section, plain, require
 
 class Checked(Section):
     """A scene, checked: sections given as tables or as their classes; the default ``format`` is the
-    newest."""
+    newest.
+
+    What the commands ask of any scene stands here as a general scene answers it.
+    """
+
+    # keys that an accuracy chooses
+    chosen: ClassVar[tuple[str, ...]] = ()
+    # whether the closed-form laws of P(delta) are for scenes of this kind
+    has_laws: ClassVar[bool] = False
 
     def __init__(
         self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any
@@ -43,15 +51,48 @@ class Checked(Section):
                 in_sentences(error.errors(), data, type(self), source, dict(origin or {}))
             ) from None
 
-    def require_open(self: Any, chosen: tuple[str, ...]) -> None:
-        """Raise `Fault` if the scene gives a key of those that its accuracy chooses."""
-        for name in chosen if self.analysis.accuracy is not None else ():
-            section, key = name.split(".")
+    def require_open(self: Any) -> None:
+        """Raise `Fault` if the scene gives a key that its accuracy chooses."""
+        for section, key in self._left_open:
             table = getattr(self, section)
             free = key not in table.model_fields_set or getattr(table, key) is None
-            require(
-                free, name, "must not be given together with analysis.accuracy, which chooses it"
-            )
+            said = "must not be given together with analysis.accuracy, which chooses it"
+            require(free, f"{section}.{key}", said)
+
+    @property
+    def _left_open(self: Any) -> list[list[str]]:
+        """Sections and keys that the scene leaves to its accuracy; none if it asks for none."""
+        if self.analysis.accuracy is None:
+            return []
+        return [name.split(".") for name in self.chosen]
+
+    def require_mesh(self) -> None:
+        """Raise `InputError` if the scene leaves open which mesh is meant."""
+
+    def general(self) -> dict[str, Any]:
+        """The table of the general scene that this one stands for: its own, if it is one."""
+        return self.resolved_data()
+
+    def resolved_data(self) -> dict[str, Any]:
+        """The table of the scene, with every default filled in but for what an accuracy chooses."""
+        data = self.model_dump(exclude_none=True)
+        for section, key in self._left_open:
+            data[section].pop(key, None)
+        return data
+
+    @property
+    def expected_cells(self) -> float:
+        """About how many cells the mesh will have; 0 where nobody knows before it is made."""
+        return 0.0
+
+    def heading(self, key: str) -> str:
+        """What heads a column of the dotted ``key``."""
+        return key
+
+    def value(self, key: str, given: Any = None) -> Any:
+        """What a table shows for the dotted ``key`` that was ``given``: a preset's scene holds none
+        of the preset's keys."""
+        return given
 
     @property
     def thickness(self: Any) -> float:

@@ -10,7 +10,6 @@ from archord.output.run import solve_scene
 from archord.postprocess.decks.deck import deck, system_of
 from archord.postprocess.decks.mesh import deck_mesh, label
 from archord.scene.file import parse_any, resolved
-from archord.scene.presets.joint_shape import general_joint
 
 STEEL = {"E": 210000.0, "nu": 0.3}
 SIZES = {"element_size": 1.5, "growth": 0.6}
@@ -34,7 +33,7 @@ def joint():
         "block": STEEL,
         "load": {"displacement": 0.04, "steps": 2},
     }
-    return parse_any(general_joint(parse_any(data)))
+    return parse_any(parse_any(data).general())
 
 
 def lug():

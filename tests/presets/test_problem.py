@@ -8,7 +8,6 @@ from archord.benchmarks.case import paper_joint
 from archord.presets.account import account_of
 from archord.report.errors import InputError
 from archord.scene.file import parse_any
-from archord.scene.presets.joint_shape import general_joint
 from archord.solver.path.stepping import Step, march
 from tests.solver.solving import solve
 
@@ -205,7 +204,7 @@ def test_a_joint_stands_for_a_general_scene(changes):
     """Which has the same force and displacement, step by step, after the stage in which an
     interference arises."""
     scene = paper_joint(0.2, 2, **changes)
-    general = parse_any(general_joint(scene))
+    general = parse_any(scene.general())
     account = account_of(general, MPI.COMM_SELF)
     steps = []
 

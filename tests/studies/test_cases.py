@@ -23,7 +23,7 @@ from archord.studies.cases import (
     run_name,
     samples,
 )
-from archord.studies.sweep import expected_seconds, heading, part_of
+from archord.studies.sweep import part_of
 
 SCENES = Path(__file__).parents[2] / "scenes"
 DOCS = SCENES.parent / "docs"
@@ -95,11 +95,11 @@ def test_every_stratum_of_a_range_holds_one_sample(number, seed, low, factor):
 def test_a_heading_has_the_unit_of_its_key():
     """Forces are per unit thickness unless the scene has one."""
     scene = load_scene(ELASTIC)
-    assert heading("load.force", scene) == "load.force [E* R]"
+    assert scene.heading("load.force") == "load.force [E* R]"
     thick = scene.model_copy(
         update={"analysis": scene.analysis.model_copy(update={"thickness": 10.0})}
     )
-    assert heading("load.force", thick) == "load.force [E* R2]"
+    assert thick.heading("load.force") == "load.force [E* R2]"
 
 
 def test_overrides_mean_what_set_means(tmp_path):
@@ -297,7 +297,7 @@ def test_the_parts_of_an_array_are_the_whole(tmp_path):
     cases = read_sweep(written(tmp_path, text)).cases
     parts = [part_of(cases, f"{i}/3") for i in (1, 2, 3)]
     assert sorted(case.number for part in parts for case in part) == [case.number for case in cases]
-    cost = [sum(expected_seconds(case.scene) for case in part) for part in parts]
+    cost = [sum(case.scene.expected_seconds for case in part) for part in parts]
     assert max(cost) < 1.2 * min(cost)
     with pytest.raises(InputError, match="--array 0/3: must be I/N"):
         part_of(cases, "0/3")
