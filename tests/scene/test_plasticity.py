@@ -224,3 +224,11 @@ def test_the_words_of_a_law_make_it_again(law):
     again = block(STEEL | {"yield_stress": first, "hardening": words}).law
     peeq = np.linspace(0, 0.1, 5)
     np.testing.assert_allclose(again.stress(peeq), law.stress(peeq), rtol=1e-14)
+
+
+def test_a_law_that_softens_is_refused():
+    voce = {"saturation": 200.0, "rate": 10.0}
+    with pytest.raises(InputError, match=r"block\.hardening must not soften"):
+        block(STEEL | {"yield_stress": 300.0, "hardening": voce})
+    flat = voce | {"saturation": 300.0}
+    assert block(STEEL | {"yield_stress": 300.0, "hardening": flat}).plastic
