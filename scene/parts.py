@@ -132,14 +132,14 @@ class InteractionSection(Section):
         "the one facet set whose points carry the contact; both do if absent", other="hole"
     )
     interference: NotNegative = key(
-        "of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are "
-        "pushed together, in a stage first; a drawn gap is taken off",
+        "press fit that the mesh does not show: how far the surfaces, which are drawn in touch, "
+        "are pushed together, in a stage before the loads; a drawn gap is subtracted",
         "length",
         default=0.0,
     )
     overlap: NotNegative = key(
-        "of a press fit that the mesh shows: how deep the surfaces are drawn into each other, for "
-        "that stage; instead of interference",
+        "press fit that the mesh shows: how deep the surfaces are drawn into each other, for the "
+        "stage before the loads; instead of interference",
         "length",
         default=0.0,
     )
@@ -200,10 +200,10 @@ class SupportSection(Section):
 
     name: PartName = key("name of the support", example="clamp")
     on: Name = key(
-        "coupling, or facet, point or cell set: the first that has the name", example="clamp"
+        "coupling, or facet, point or cell set: the first with this name", example="clamp"
     )
     fixed: Freedoms = key(
-        "directions held, also where a load's set shares nodes; rotation is of couplings alone",
+        "directions held, also at nodes that a load shares; rotation is for couplings only",
         example=["x", "y"],
     )
 
@@ -214,7 +214,7 @@ class LoadSection(Loading):
     kinds = ("displacement", "force", "pressure")
     name: PartName = key("name of the load", example="press")
     on: Name = key(
-        "disc's interaction, coupling, facet, point or cell set: the first of the name",
+        "interaction of a disc, or coupling, facet, point or cell set: the first with this name",
         example="flat",
     )
     direction: Freedom | None = key(

@@ -39,28 +39,29 @@ _SHAPED = {
 }
 _MEETING = (
     "### Sets that meet\n",
-    "Supports, loads and rigid couplings may have nodes in common. The order of the sections has "
-    "no part in what holds there:\n",
+    "Supports, loads and rigid couplings may have nodes in common. The order of the sections does "
+    "not matter. These rules hold:\n",
     "- A support wins over a displacement: its nodes stay, and a warning names the sets and a "
     "place.\n"
     "- A set that moves as one must not meet a support that bends it: an edge under a force, and a "
     "rigid coupling. The scene is refused, unless the set leaves the node at rest. Fix the same "
     "freedoms of the coupling, or load the set by a pressure or a distributing coupling.\n"
-    "- A displacement is refused where supports hold every node of its set.\n"
-    "- All other motions of a node must be alike, in value and path. Different ones are refused.\n"
+    "- A displacement is refused if supports hold every node of its set.\n"
+    "- All other motions of a node must agree in value and path. Otherwise they are refused.\n"
     "- Supports that fix a node together have equal parts of its reaction.\n",
     "### Press fits\n",
-    "The mesh shows a fit, or it does not. `overlap` is for surfaces that cross in the mesh: a pin "
-    "of radius 10.03 is drawn in a hole of radius 10. `interference` is for surfaces that lie on "
-    "one line in the mesh: a pin of radius 10 is drawn in a hole of radius 10, and is made 0.03 "
-    "too large.\n",
+    "Use `overlap` for a fit that the mesh shows: the surfaces cross in the mesh, such as a pin of "
+    "radius 10.03 in a hole of radius 10. Use `interference` for a fit that the mesh does not "
+    "show: the surfaces lie on one line in the mesh, such as a pin of radius 10 in a hole of "
+    "radius 10, and archord makes the pin 0.03 too large.\n",
     "```text\n"
     "overlap = 0.03                     interference = 0.03\n"
     "\n"
     "  ------ edge of the pin, 10.03      ------ edge of the pin and edge of the hole, 10\n"
     "  ------ edge of the hole, 10\n"
     "```\n",
-    "Both at once count the fit twice: where they are alike the scene is refused.\n",
+    "A fit that the mesh shows and that `interference` gives, too, would count twice: the scene is "
+    "refused if both are of similar size.\n",
 )
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {
@@ -99,27 +100,27 @@ def reference() -> str:
     presets = " or ".join(_in_words(*preset) for preset in _PRESETS.items())
     parts = [
         "# Scene reference\n",
-        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A "
-        f"scene may begin with the version of its format, `format = {JOINT_FORMAT}`, of a general "
-        f"scene `format = {FORMAT}`, and what is written by archord does so. A scene of a newer "
-        "version is refused.\n",
+        "`archord scene --reference` prints this page. Any consistent set of units works. A scene "
+        f"may begin with the version of its format: `format = {JOINT_FORMAT}` for a joint, and "
+        f"`format = {FORMAT}` for a general scene. Scenes that archord writes have this line. A "
+        "scene of a newer version is refused.\n",
         "## Joints\n",
-        "A scene with the section `[joint]` is one of a pin in a hole.\n",
+        "A scene with the section `[joint]` describes a pin in a hole.\n",
         *_tables(_JOINT, {}),
         "## General scenes\n",
-        "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The "
+        "A scene with the section `[mesh]` is a general scene, with any bodies on any mesh. The "
         "sections units, stepping and output are the same as for joints. Headings in double "
-        "brackets may stand any number of times.\n",
+        "brackets may be repeated.\n",
         *_tables(
             _GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}
         ),
         *_shapes(),
         *_MEETING,
         "## Presets\n",
-        f"A scene with {presets} stands for a general one, which `archord scene --expand` prints; "
-        "the first of these sections that it has counts. The section pin is the same as for "
-        "joints; plates, bushing, sleeves and housing have materials like it. The other sections "
-        "are the same as for general scenes.\n",
+        f"A scene with {presets} stands for a general scene. `archord scene --expand` prints it. "
+        "If a scene has several of these sections, the first one counts. The section pin is the "
+        "same as for joints. Plates, bushing, sleeves and housing have the same material keys. The "
+        "other sections are the same as for general scenes.\n",
         *(
             table
             for sections in _PRESETS.values()
@@ -179,9 +180,9 @@ def _shapes() -> Iterator[str]:
     yield "### [mesh.shape]\n"
     yield (
         "Instead of a file: the shape of a preset, as `archord scene --expand` prints it. Its "
-        "`kind` tells which keys it has. `--set mesh.shape.radius=12.0` changes one. The other "
-        "sections stay as they are, also the `overlap` of an interaction, which is the clearance "
-        "below 0.\n"
+        "`kind` decides which keys it has. `--set mesh.shape.radius=12.0` changes one key. The "
+        "other sections do not follow the change. So change the `overlap` of an interaction, too, "
+        "if you change a clearance below 0.\n"
     )
     yield table.markdown()
 

@@ -38,7 +38,7 @@ class Modelling(Section):
         "Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6
     )
     accuracy: Accuracy | None = key(
-        "relative error of P (delta under a force) to reach by mesh and steps", other=0.001
+        "relative error of P (under a force: of delta) to reach by mesh and steps", other=0.001
     )
     degree: Literal[2, 3] = key(
         "polynomial degree of displacements and of the curved geometry", default=2
@@ -87,7 +87,7 @@ class Analysis(PresetAnalysis):
         "guess every step on a fine mesh from a coarser one; false: for comparison", default=True
     )
     integration: Side = key(
-        "whose edge carries the contact integral: both (unbiased), or one side's", default="both"
+        "edge of the contact integral: both (unbiased), or the edge of one body", default="both"
     )
 
 
@@ -149,9 +149,9 @@ class Output(Section):
     """What a run writes besides its curves."""
 
     fields: Literal[False, "cells", "nodes", "points"] = key(
-        "write the fields of every step to fields.h5 and fields.xdmf: of stress and plastic strain "
-        "the means of cells, or also values at the nodes, or also those at the integration points; "
-        "true is the default",
+        "write the fields of every step to fields.h5 and fields.xdmf: stress and plastic strain "
+        "as means of cells, or also at the nodes, or also at the integration points; false writes "
+        "none, true is the default",
         default="cells",
     )
 
