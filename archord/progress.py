@@ -3,7 +3,6 @@ the next."""
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
@@ -12,13 +11,11 @@ from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from archord.presets.views import plane_words
+from archord.presets.views import view_of
 from archord.ranks import on_terminal
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
-from archord.scene.presets.joint import Scene
 
-_LOADS_SHOWN = 3
 _LONG_SILENCE = 20.0  # seconds after which a solve that has said nothing says where it is
 _LONG_STEP = 5.0  # seconds that a step takes at least which is told to be long
 _MUCH_LONGER = 20.0  # times the median of the steps before it
@@ -32,58 +29,6 @@ if TYPE_CHECKING:
     from archord.output.run import Outcome
     from archord.solver.path.newton import Newton
     from archord.studies.accuracy import Level
-
-Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value of a step
-
-
-def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
-    """What is solved in words, the columns of its steps (of a general scene displacement and force
-    of each load), and name and unit of what tells how accurate a mesh is."""
-    kind = "elastic-plastic" if scene.plastic else "elastic"
-    plane = plane_words(scene)
-    if isinstance(scene, Scene):
-        dR = scene.joint.dR
-        R = scene.joint.radius
-        E_star = scene.E_star
-        unit = E_star * R * scene.thickness
-        last = ("delta/dR", dR) if scene.force_controlled else ("P/(E* R)", unit)
-        return (
-            f"{kind} joint, {plane}, dR/R = {dR / R:g}",
-            [
-                ("delta/dR", "9.5g", lambda m: m["delta"] / dR),
-                (
-                    "P/(E* R)",
-                    "11.7f",
-                    lambda m: round(m["P"] / unit, 7) + 0.0,
-                ),  # no minus before a zero
-                ("eps/deg", "8.3f", lambda m: math.degrees(m["eps"])),
-                ("p0/E*", "9.6f", lambda m: m["p0"] / E_star),
-                ("PEEQ max", "9.2e", lambda m: m["peeq_max"]),
-                ("at contact", "10.2e", lambda m: m.values.get("contact peeq_max", m["peeq_max"])),
-            ],
-            *last,
-        )
-
-    def value(name: str) -> Column:
-        return name, f"{max(14, len(name))}.6g", lambda m: m[name]
-
-    def peeq(m: Any) -> float:
-        return max(
-            (value for name, value in m.values.items() if name.endswith("peeq_max")), default=0.0
-        )
-
-    loads = [
-        value(f"{load.name} {what}")
-        for load in scene.load[:_LOADS_SHOWN]
-        for what in ("displacement", "force")
-    ]
-    bodies = "1 body" if len(scene.body) == 1 else f"{len(scene.body)} bodies"
-    columns: list[Column] = [
-        ("load factor", "11.5g", lambda m: m.at),
-        *loads,
-        ("PEEQ max", "9.2e", peeq),
-    ]
-    return f"{bodies}, {kind}, {plane}", columns, "last value", 1.0
 
 
 class Progress:
@@ -113,7 +58,10 @@ class Progress:
             )
             self.moving.add_task("meshing", total=None)
         self.cells = 0.0 if self.by_mesh else scene.expected_cells
-        self.title, self.columns, last, self.unit = _shown(scene)
+        view = view_of(scene)
+        self.title = view.title
+        self.columns = view.printed
+        last, self.unit = view.last_value
         if self.by_mesh:
             self.print(
                 f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest "
@@ -121,8 +69,7 @@ class Progress:
             )
             self.strengths()
             costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
-            sizes = "elements/R" if isinstance(scene, Scene) or scene.mesh.shape else "size/file"
-            self.print(f" mesh  {sizes:>10s}  growth  {costs}")
+            self.print(f" mesh  {view.size_heading:>10s}  growth  {costs}")
 
     def show(self, load: float, iterations: int) -> None:
         """Show on a terminal the load that was tried last, and the Newton iterations so far."""
@@ -197,16 +144,12 @@ class Progress:
 
     def headings(self) -> None:
         """Print the headings of steps."""
-        widths = ((name, int(form.partition(".")[0])) for name, form, _ in self.columns)
-        self.print(
-            "  ".join(
-                [" step", *(f"{name:>{width}s}" for name, width in widths), "iterations  cutbacks"]
-            )
-        )
+        headings = [f"{column.heading:>{column.width}s}" for column in self.columns]
+        self.print("  ".join([" step", *headings, "iterations  cutbacks"]))
 
     def step(self, m: Any) -> None:
         """Show an accepted output step."""
-        cells = (f"{value(m):{form}}" for _, form, value in self.columns)
+        cells = [f"{column.value(m):{column.form}}" for column in self.columns]
         self.print("  ".join([f"{m.step:5d}", *cells, f"{m.iterations:10d}  {m.cutbacks:8d}"]))
         self._done = m.step
         self._substep = 1

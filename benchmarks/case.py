@@ -13,12 +13,11 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from archord.measures.record import Record
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome
 from archord.report.files import Row, write_report
 from archord.report.table import Table
-from archord.scene.file import AnyScene, parse_scene, resolved
+from archord.scene.file import parse_scene, resolved
 from archord.scene.presets.joint import Scene
 from archord.studies.accuracy import solve_to_accuracy
 
@@ -29,8 +28,8 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Expected:
-    """``quantity`` (a key of `quantities`) at the last step must be ``value`` within the relative
-    ``tolerance``.
+    """``quantity`` (a key of the view's `quantities`) at the last step must be ``value`` within the
+    relative ``tolerance``.
 
     ``value`` is a number or, times ``factor``, the value of another case by name. ``source`` says
     where it comes from.
@@ -131,24 +130,6 @@ def _without_none(keys: Any) -> Any:
     if not isinstance(keys, dict):
         return keys
     return {key: value for key, value in keys.items() if value is not None}
-
-
-def quantities(scene: AnyScene, last: Record) -> dict[str, float]:
-    """What cases are compared by at the step ``last``: of a joint without units, of a general scene
-    the columns."""
-    if not isinstance(scene, Scene):
-        return last.values
-    E_star = scene.E_star
-    R = scene.joint.radius
-    P = last["P"] / scene.thickness
-    p0 = last["p0"]
-    return {
-        "P/(E* R)": P / (E_star * R),
-        "p0/E*": p0 / E_star,
-        "eps": last["eps"],
-        "delta/dR": last["delta"] / scene.joint.dR,
-        "p0/P": p0 * R / P if P else 0.0,
-    }
 
 
 def slug(name: str) -> str:

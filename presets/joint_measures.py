@@ -52,7 +52,7 @@ def joint_account(
         checks=step_checks(scene, system),
         refusal=lambda steps: "",  # supports and the load hold both bodies
         ending=ending,
-        fit=int(scene.joint.dR < 0),
+        fit=int(scene.fits),
         at="delta",
         copies=SYMMETRY,
     )

@@ -27,11 +27,10 @@ from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint_doubts import UNSEEN
+from archord.presets.views import view_of
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
-from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
-from archord.studies.mesh_family import MeshFamily, ProblemFamily
 
 MOST_SUBSTEPS = 64
 
@@ -126,13 +125,7 @@ class _Search:
         self.begun = perf_counter()
         self.levels = list[Level]()
         self.step_error = None if self.scene.plastic else 0.0
-        self.family: MeshFamily | ProblemFamily
-        if isinstance(self.scene, Scene):
-            self.family = MeshFamily(
-                self.scene, self.asked / 2 if self.scene.plastic else self.asked
-            )
-        else:
-            self.family = ProblemFamily(self.scene)
+        self.family = view_of(self.scene).mesh_family(self.asked)
 
     def refine(self) -> None:
         """Solve until the estimate is as small as asked. Raises `_End` if there is no finer mesh,

@@ -11,8 +11,8 @@ import numpy as np
 from archord.benchmarks.case import Case, E, paper_joint, varied
 from archord.output.run import Outcome
 from archord.postprocess.convergence import difference
+from archord.presets.mesh_family import RATIO, MeshFamily
 from archord.scene.presets.joint import Scene
-from archord.studies.mesh_family import RATIO, MeshFamily
 
 ELASTIC = 1e-2, 3e-3, 1e-3, 3e-4, 1e-4
 PLASTIC = 1e-2, 3e-3, 1e-3

@@ -24,9 +24,9 @@ from archord.materials.elasticity import von_mises
 from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
 from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label, surface_name
 from archord.postprocess.run import Run
+from archord.presets.views import view_of
 from archord.report.table import Table
 from archord.scene.file import AnyScene, load_scene
-from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
@@ -87,9 +87,10 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
         raise Failure("; ".join(faults))
     text = (folder / "deck.frd").read_text()
     p0 = None
-    if isinstance(scene, Scene):
+    centre = view_of(scene).arc_centre
+    if centre is not None:
         arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
-        angle = np.arctan2(mesh.x[:, 0], -mesh.x[:, 1] - scene.joint.dR)
+        angle = np.arctan2(mesh.x[:, 0] - centre[0], centre[1] - mesh.x[:, 1])
         pressure = read_nodal(text, "CONTACT", mesh)[:, 3]
         pressed = arc[pressure[arc] > 0]
         p0 = axis_pressure(angle[pressed], pressure[pressed])

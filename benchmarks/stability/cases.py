@@ -20,9 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.case import Case, Expected, paper_joint, quantities, varied
+from archord.benchmarks.case import Case, Expected, paper_joint, varied
 from archord.benchmarks.persson import persson_joint, theory
 from archord.benchmarks.stability.eye import drawn_eye
+from archord.presets.views import view_of
 from archord.scene.file import AnyScene, parse_any
 from archord.scene.presets.joint import Scene
 
@@ -186,7 +187,8 @@ def main() -> None:
         if name not in values and any(expected.value == FINE for expected in case.expected):
             fine = replace(case, scene=fine_scene(case.scene))
             with tempfile.TemporaryDirectory() as folder:
-                values[name] = quantities(fine.scene, fine.solve(Path(folder)).steps[-1])
+                last = fine.solve(Path(folder)).steps[-1]
+            values[name] = view_of(fine.scene).quantities(last)
             print(f"{case.group}: {name}: {values[name]}", flush=True)
             kept = {other: values[other] for other in known if other in values}
             FILE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")

@@ -15,15 +15,15 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
-from archord.benchmarks.case import Case, Expected, matches, quantities, side_by_side
+from archord.benchmarks.case import Case, Expected, matches, side_by_side
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
+from archord.presets.views import view_of
 from archord.report.errors import InputError
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.file import AnyScene
-from archord.scene.presets.joint import Scene
 from archord.solver.path.stepping import Step, StepFailure
 
 _BALANCE = 1e-8  # largest difference of forces over P, unless round-off is known to be larger
@@ -171,7 +171,7 @@ def solve_case(case: Case, folder: Path) -> Result:
             result.forces = Check(balance, allowed, f"forces differ by {balance:.1e} of P")
             limit = 1.001 * _energy_limit(scene, outcome.steps) + 1e-8
             result.energy = Check(energy, limit, f"energy is off by {energy:.1e} of the work")
-            result.quantities = quantities(scene, outcome.steps[-1])
+            result.quantities = view_of(scene).quantities(outcome.steps[-1])
     except Exception as error:
         result.status = "failed"
         result.message = f"{type(error).__name__}: {error}"
@@ -183,19 +183,14 @@ def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
     """How far the trapezoidal rule can be from the work, over the work, where loads are monotonic
     between two steps: half the sum of |dP d delta|. That of interferences counts from their first
     step on; a single step tells nothing."""
-    if isinstance(scene, Scene):
-        fits = scene.joint.dR < 0
-        path = np.array([[(m["P"], m["delta"])] for m in steps])
-    else:
-        fits = scene.fits
-        loads = [load.name for load in scene.load]
-        path = np.array([[(m[f"{n} force"], m[f"{n} displacement"]) for n in loads] for m in steps])
-    if fits and len(steps) == 1:
+    columns = view_of(scene).work_columns
+    path = np.array([[(m[force], m[moved]) for force, moved in columns] for m in steps])
+    if scene.fits and len(steps) == 1:
         return math.inf
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
     if not largest:
         return 0.0
-    if not fits:
+    if not scene.fits:
         path = np.concatenate([np.zeros_like(path[:1]), path])
     rectangles = np.prod(np.diff(path, axis=0), axis=2)
     return float(np.abs(rectangles).sum() / 2 / largest)

@@ -179,6 +179,11 @@ class Scene(Checked):
         return data
 
     @property
+    def fits(self) -> bool:
+        """Whether pin and hole are pressed into each other before they are loaded."""
+        return self.joint.dR < 0
+
+    @property
     def expected_cells(self) -> float:
         """About how many triangles the mesh will have."""
         return self.joint.expected_cells

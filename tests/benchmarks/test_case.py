@@ -6,11 +6,11 @@ from archord.benchmarks.case import (
     Case,
     matches,
     paper_joint,
-    quantities,
     side_by_side,
     slug,
     varied,
 )
+from archord.presets.views import view_of
 from archord.scene.file import resolved
 
 
@@ -31,7 +31,8 @@ def test_joints_are_compared_per_thickness():
     large."""
     thin, thick = ({"P": P, "p0": 0.5, "eps": 1.0, "delta": 0.01} for P in (2.0, 20.0))
     scene = paper_joint()
-    assert quantities(varied(scene, analysis={"thickness": 10.0}), thick) == quantities(scene, thin)
+    thicker = varied(scene, analysis={"thickness": 10.0})
+    assert view_of(thicker).quantities(thick) == view_of(scene).quantities(thin)
 
 
 def test_names_become_folders_and_are_found(tmp_path):
