@@ -246,8 +246,14 @@ def plane_words(scene: Any) -> str:
 
 def given(part: Any) -> str:
     """The keys of a ``part`` of a scene that say something, but its name."""
-    keys = part.model_dump(exclude_none=True, exclude={"name"})
+    own = getattr(part, "own", None)
+    hidden = {"name", "own"}
+    if own is not None:  # it takes the place of these keys
+        hidden |= {"law", "friction", "hardening"}
+    keys = part.model_dump(exclude_none=True, exclude=hidden)
     said = [f"{key} = {value}" for key, value in keys.items() if _says_something(value)]
+    if own is not None:
+        said.append(own.text)
     return ", ".join(said)
 
 

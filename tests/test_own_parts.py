@@ -119,6 +119,17 @@ def test_a_run_of_own_objects_is_read_as_any_other(run, tmp_path, command, capsy
     assert cli.run(words) == 0, capsys.readouterr().err
 
 
+def test_an_object_is_shown_instead_of_the_keys_that_it_replaces(run, capsys):
+    """No "law = frictionless" of a law of one's own, no "hardening = 0.0" of such a material."""
+    assert cli.run(["show", str(run.folder)]) == 0
+    shown = capsys.readouterr().out
+    (rub,) = (line for line in shown.splitlines() if line.startswith("interaction rub"))
+    (lower,) = (line for line in shown.splitlines() if line.startswith("body lower"))
+    assert rub.endswith("Wear(k=0.001)")
+    assert "frictionless" not in rub
+    assert "hardening" not in lower
+
+
 @pytest.mark.parametrize("words", [["{}/scene.toml", "-o", "{}/again"], ["{}", "--restart"]])
 def test_no_scene_is_solved_with_the_description_of_an_object(run, tmp_path, words, capsys):
     """One sentence, exit code 2; what the run left stays."""
