@@ -49,7 +49,7 @@ def strips(law, *, down=0.03, steps=3) -> archord.Problem:
 
 
 @pytest.mark.mpi
-def test_strips_follow_the_closed_form_and_the_command_line_goes_on(comm, tmp_path):
+def test_strips_follow_the_closed_form_and_the_folder_has_the_words(comm, tmp_path):
     """The pressure p of the law at the gap that is left: ``0.02 - down + 2 p/E``."""
     folder = comm.bcast(tmp_path) / "run"
     run = archord.solve(strips(LAW), folder, comm=comm)
