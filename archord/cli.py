@@ -28,7 +28,8 @@ FILES = {
     "result_commands": ("show", "compare", "export", "export-deck", "picture", "report", "probe"),
     "margin_command": ("margin",),
     "sweep_commands": ("sweep",),
-    "law_commands": ("laws", "law", "fit"),
+    "law_commands": ("laws", "law"),
+    "fit_command": ("fit",),
     "benchmark_commands": ("reproduce", "benchmark"),
 }
 SOLVERS = (

@@ -67,8 +67,9 @@ class Problem:
     fit_steps : int
         Output steps of the stage before, in which interferences arise.
     kinematics : {"plane strain", "plane stress", "axisymmetric"}
-        How displacement becomes strain, in all bodies. Axisymmetric problems have the coordinates
-        x = r and y = z, and forces of the whole ring.
+        The kinematics of strain: how displacement becomes strain, in all bodies. Axisymmetric
+        problems have the coordinates x = r and y = z, and forces of the whole ring. The kinematics
+        of an `Interaction` are of contact.
     thickness : float
         The thickness; forces and energies are per unit thickness without it.
     strain : {"small", "large"}

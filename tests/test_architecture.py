@@ -156,6 +156,13 @@ def test_no_imports_at_the_top_of_files_make_a_circle():
     TopologicalSorter(graph).prepare()  # raises CycleError
 
 
+def test_only_presets_ask_whether_a_scene_is_the_papers_joint():
+    """All scenes and their views tell the same things, so that no one else has to ask."""
+    asking = re.compile(r"isinstance\(.*\bScene\b")
+    files = [file for room in ROOMS if room != "presets" for file in files_of(room)]
+    assert not [file for file in files if asking.search(file.read_text(encoding="utf-8"))]
+
+
 def test_the_plan_of_the_house_names_every_room_and_lists_every_file():
     """The list of docs/rooms.py is made of docstrings: each begins with a sentence."""
     listed = subprocess.run(

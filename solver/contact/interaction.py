@@ -66,9 +66,9 @@ class Interaction:
     friction : float
         Coulomb's coefficient of friction, of the laws "frictionless" and "coulomb".
     kinematics : {"current", "reference"}
-        Closest points on the deformed curves; or on the undeformed ones, with the normal of the
-        first surface for both, and a gap that is linear in the displacement. A law whose points do
-        not slide has the second.
+        The kinematics of contact: closest points on the deformed curves; or on the undeformed ones,
+        with the normal of the first surface for both, and a gap that is linear in the displacement.
+        A law whose points do not slide has the second. The kinematics of a `Problem` are of strain.
     gamma_factor : float
         Nitsche's gamma over the trace constant of each contact cell.
     integrated : str

@@ -67,9 +67,7 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     >>> print(f"{law.at(0.05).load:.0f}")
     6341
     """
-    for name in ("plane", "nu"):
-        if getattr(joint, name) is None:
-            raise ValueError(f"archord: this law needs {name}.")
+    plane_and_nu(joint)
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
     if reason and not extrapolate:
         raise ValueError(f"archord: {reason}.")
@@ -123,8 +121,8 @@ def outside(joint: LawJoint) -> str:
 
     Raises
     ------
-    AssertionError
-        For a joint without ``nu``.
+    ValueError
+        For a joint without ``plane`` or ``nu``.
 
     Examples
     --------
@@ -161,13 +159,24 @@ def outside(joint: LawJoint) -> str:
     return ""
 
 
+def plane_and_nu(joint: LawJoint) -> tuple[str, float]:
+    """Plane and Poisson's ratio of the block. Raises ValueError for a joint without."""
+    plane = joint.plane
+    nu = joint.nu
+    if plane is None:
+        raise ValueError("archord: this law needs plane.")
+    if nu is None:
+        raise ValueError("archord: this law needs nu.")
+    return plane, nu
+
+
 def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
     """What decides a joint: plane (1: strain), p, m, n, dR/R, and s of pin and block, infinite of
-    an elastic body, as `SolvedJoints` has them."""
-    assert joint.nu is not None
-    strain = joint.plane == "strain"
-    pin_nu = joint.nu if joint.pin_nu is None else joint.pin_nu
-    m, n = (nu / (1 - nu) if strain else nu for nu in (pin_nu, joint.nu))
+    an elastic body, as `SolvedJoints` has them. Raises ValueError without plane or nu."""
+    plane, nu = plane_and_nu(joint)
+    strain = plane == "strain"
+    pin_nu = nu if joint.pin_nu is None else joint.pin_nu
+    m, n = (ratio / (1 - ratio) if strain else ratio for ratio in (pin_nu, nu))
     clearance = joint.clearance / joint.radius
     numbers = [float(strain), joint.pin_share, m if joint.pin_share else 0.0, n, clearance]
     unit = joint.unit / joint.radius

@@ -206,6 +206,14 @@ def test_what_is_outside_is_said(change: dict, said: str) -> None:
     assert bool(found) == bool(said)
 
 
+@pytest.mark.parametrize("name", ["plane", "nu"])
+def test_a_joint_without_plane_or_nu_has_no_range(name: str) -> None:
+    """The sentence says which is missing."""
+    joint = replace(LawJoint(10.0, 0.05, 115e3, plane="strain", nu=0.3), **{name: None})
+    with pytest.raises(ValueError, match=f"archord: this law needs {name}"):
+        outside(joint)
+
+
 def test_elastic_law_is_a_table_of_few_numbers() -> None:
     """At most 500 numbers, of three functions of 46, 11 and 11 products."""
     model = elastic_model()

@@ -1,0 +1,56 @@
+"""What the commands of laws share: files with laws, warnings, and bad input in a sentence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from archord.report.errors import InputError
+
+if TYPE_CHECKING:
+    from archord.postprocess.laws.fitted_law import FittedLaw
+    from archord.postprocess.laws.general.joint_curve import JointCurve
+
+Text = tuple[Path, Callable[[], str]]  # a file, and what makes its text
+
+
+@contextmanager
+def sentences() -> Iterator[None]:
+    """Around formulas, whose ValueErrors are bad input here."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(str(error)) from error
+
+
+def warn(*messages: str) -> None:
+    """Print each of the warnings once."""
+    for message in dict.fromkeys(messages):
+        print(f"archord: warning: {message}.", file=sys.stderr)
+
+
+def exports_of(law: JointCurve | FittedLaw, targets: Iterable[Path]) -> list[Text]:
+    """The files ``targets`` with a law, for `write`."""
+    from archord.postprocess.laws.exports.export import export_law
+
+    return [(target, partial(export_law, law, target)) for target in targets]
+
+
+def write(texts: list[Text], inputs: list[Path], force: bool) -> list[Path]:
+    """Write the files that are named, and return them. Raises `InputError` before for one of the
+    ``inputs`` among them, for two of one name, and, without ``force``, for files that are there."""
+    from archord.output.user_file import check_target, writing
+
+    targets = [target for target, _ in texts]
+    for target in targets:
+        check_target(target, inputs, force=force)
+    if len({target.resolve() for target in targets}) < len(targets):
+        raise InputError(f"{targets[0]}: is named for two files; choose different ones.")
+    for target, text in [(target, text()) for target, text in texts]:
+        with writing(target) as new:
+            new.write_text(text, encoding="utf-8", newline="")
+    return targets
