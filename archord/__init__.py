@@ -17,7 +17,7 @@ from archord.report.version import VERSION
 __version__ = VERSION
 
 if TYPE_CHECKING:
-    from archord.api import InputError, Run, Sweep, load, load_scene, solve
+    from archord.api import InputError, Run, Sweep, export_deck, load, load_scene, solve
     from archord.geometry.curve import RigidCircle
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.geometry.meshes.formats.source import Mesh
@@ -72,6 +72,7 @@ __all__ = [
     "TabularHardening",
     "VoceHardening",
     "draw_run",
+    "export_deck",
     "gmsh_to_mesh",
     "load",
     "load_scene",
@@ -79,7 +80,7 @@ __all__ = [
     "solve",
 ]
 _HOME = {
-    "archord.api": ["InputError", "Run", "Sweep", "load", "load_scene", "solve"],
+    "archord.api": ["InputError", "Run", "Sweep", "export_deck", "load", "load_scene", "solve"],
     "archord.geometry.curve": ["RigidCircle"],
     "archord.geometry.meshes.fenicsx": ["gmsh_to_mesh"],
     "archord.geometry.meshes.formats.source": ["Mesh"],

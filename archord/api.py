@@ -1,5 +1,5 @@
-"""archord from Python: load results, load scenes, solve problems and scenes. The names are names
-of the package: ``archord.load``."""
+"""archord from Python: load results, load scenes, solve problems and scenes, write their decks. The
+names are names of the package: ``archord.load``."""
 
 from __future__ import annotations
 
@@ -189,6 +189,60 @@ def solve(
     return Run(folder)
 
 
+def export_deck(
+    problem: Problem | AnyScene | str | Path | Mapping[str, Any],
+    path: str | Path,
+    *,
+    force: bool = False,
+) -> Path:
+    """Write an input deck for CalculiX, and but for lines that say so for Abaqus.
+
+    Parameters
+    ----------
+    problem : Problem, Scene, ProblemScene, str, Path or dict
+        As for `solve`. Its elements are of second order in the deck.
+    path : str or Path
+        The file to write.
+    force : bool
+        Overwrite a file that is there.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        For what a deck cannot say, as own laws and own materials, and for the file.
+
+    Examples
+    --------
+    >>> from archord import Body, Elastic, Load, Problem, Support, export_deck, rectangles
+    >>> problem = Problem(
+    ...     rectangles({"block": (0.0, 0.0, 2.0, 1.0)}, size=0.5),
+    ...     bodies=[Body("block", Elastic(210e3, 0.3))],
+    ...     supports=[Support("block bottom")],
+    ...     loads=[Load("pull", on="block top", direction="y", displacement=0.01)],
+    ...     kinematics="axisymmetric",
+    ... )
+    >>> "TYPE=CAX6" in export_deck(problem, "block.inp", force=True).read_text()
+    True
+    """
+    from archord.output.user_file import check_target
+    from archord.postprocess.decks import deck
+
+    path = Path(path)
+    check_target(path, force=force)
+    given = _problem_of(problem)
+    if given is None:
+        scene = _scene_of(problem, "archord.export_deck")
+    else:
+        scene = _words_of(given, path.parent, "nodes")
+    deck.export_deck(scene, path, path.stem, given)
+    return path
+
+
 def _problem_of(given: Any) -> Problem | None:
     """The problem, None where something else is given."""
     if isinstance(given, (str, Path, Mapping, AnyScene)):
@@ -205,16 +259,16 @@ def _words_of(problem: Problem, folder: Path, fields: str | bool) -> AnyScene:
     return words_of(problem, str(folder.absolute() / MESH), fields)
 
 
-def _scene_of(given: Any) -> AnyScene:
+def _scene_of(given: Any, caller: str = "archord.solve") -> AnyScene:
     """A scene that is one already, a file with one, or the table of such a file. Raises
-    `InputError`."""
+    `InputError`, which names the ``caller``."""
     if isinstance(given, (str, Path)):
         return load_scene(given)
     if isinstance(given, Mapping):
         return scene_file.parse_any(plain(given))
     if not isinstance(given, AnyScene):
         said = "problem must be a Problem, a scene, a scene file or its table"
-        raise InputError(f"archord.solve: {said}, not {shortened(repr(given))}.")
+        raise InputError(f"{caller}: {said}, not {shortened(repr(given))}.")
     return given
 
 

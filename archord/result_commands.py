@@ -188,22 +188,13 @@ def probe(
 @flag("--force", "overwrite a file that is there")
 def export_deck(scene: Path, output: Path | None, overrides: tuple[str, ...], force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
-    from archord.output.user_file import check_target, writing
-    from archord.postprocess.decks.deck import deck, system_of
-    from archord.postprocess.decks.mesh import deck_mesh
+    from archord.output.user_file import check_target
+    from archord.postprocess.decks.deck import export_deck
     from archord.scene.file import files_read, load_scene
 
     checked = load_scene(scene, overrides)
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, files_read(scene, overrides), force=force)
-    system = system_of(checked)
-    try:
-        text = deck(
-            system, deck_mesh(system), checked.targets, f"{scene.stem} in {checked.units.length}"
-        )
-    except ValueError as error:
-        raise InputError(f"{scene}: {error}.") from error
-    with writing(path) as new:
-        new.write_text(text, encoding="utf-8")
+    export_deck(checked, path, str(scene))
     print(path)
     return 0

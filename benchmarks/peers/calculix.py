@@ -28,6 +28,7 @@ from archord.presets.views import view_of
 from archord.report.table import Table
 from archord.scene.file import AnyScene, load_scene
 from archord.solver.path.system import System
+from archord.solver.problem import Problem
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
@@ -41,11 +42,13 @@ Printed = list[
 @dataclass(frozen=True)
 class SecondOpinion:
     """CalculiX's results on ``mesh``: the ``forces`` ``(steps,)`` on drives by name; at the last
-    step the ``stress`` ``(n, 4)`` at the nodes (xx, yy, zz, xy), the pressure on the axis of a
-    joint and the integral of PEEQ over the whole; iterations of all steps."""
+    step the ``displacement`` ``(n, 2)`` and the ``stress`` ``(n, 4)`` at the nodes (xx, yy, zz,
+    xy), the pressure on the axis of a joint and the integral of PEEQ over the whole; iterations of
+    all steps."""
 
     mesh: DeckMesh
     forces: dict[str, Array]
+    displacement: Array
     stress: Array
     p0: float | None
     peeq_integral: float
@@ -57,10 +60,10 @@ class SecondOpinion:
         return float(next(iter(self.forces.values()))[-1])
 
 
-def process(scene: AnyScene, folder: Path) -> Process:
-    """CalculiX on the deck of ``scene``, which is written into ``folder``; its result is a
-    `SecondOpinion`."""
-    system = system_of(scene)
+def process(scene: AnyScene, folder: Path, given: Problem | None = None) -> Process:
+    """CalculiX on the deck of ``scene``, or of the problem that was ``given`` from Python; the deck
+    is written into ``folder``. Its result is a `SecondOpinion`."""
+    system = system_of(scene, given)
     mesh = deck_mesh(system)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.inp").write_text(deck(system, mesh, scene.targets), encoding="utf-8")
@@ -78,8 +81,8 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
     """CalculiX's results in ``folder``. Raises `Failure` if it did not reach the last step."""
     tables = folder / "deck.dat"
     printed = read_printed(tables.read_text()) if tables.exists() else []
-    forces = drive_forces(system, mesh, printed)
-    reached = min(map(len, forces.values()))
+    held = moved_sets(system, mesh)[0]
+    reached = len(step_forces(printed, label(held.node_set)))
     if reached != len(scene.targets):
         said = (folder / "stdout.txt").read_text(errors="replace").splitlines()
         faults = [f"CalculiX ended after step {reached} of {len(scene.targets)}"]
@@ -98,7 +101,8 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
     counted = [row for row in increments if len(row) > 5 and row[0].isdigit() and row[3].isdigit()]
     return SecondOpinion(
         mesh,
-        forces,
+        drive_forces(system, mesh, printed),
+        read_nodal(text, "DISP", mesh)[:, :2],
         read_nodal(text, "STRESS", mesh)[:, :4],
         p0,
         peeq_integral(printed, mesh) * system.problem.whole,
@@ -176,15 +180,16 @@ def _polygon_areas(x: Array) -> Array:
 
 def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
     """Values ``(n, 6)`` at the nodes of ``mesh``, from the last ``block`` of the ``.frd`` file
-    ``text``: "CONTACT" (the fourth is the pressure), "STRESS" (xx, yy, zz, xy, yz, zx); zero
-    elsewhere.
+    ``text``: "DISP" (x, y, z), "CONTACT" (the fourth is the pressure), "STRESS" (xx, yy, zz, xy,
+    yz, zx); zero elsewhere.
 
     Columns 4 to 13 of a record are the node, from 14 on twelve to a component.
     """
     values = np.zeros((len(mesh.x), 6))
     for line in text.rpartition(f" -4  {block}")[2].partition("\n -3")[0].splitlines():
         if line.startswith(" -1"):
-            values[int(line[3:13]) - 1] = [float(line[k : k + 12]) for k in range(13, 85, 12)]
+            found = [float(line[k : k + 12]) for k in range(13, len(line.rstrip()), 12)]
+            values[int(line[3:13]) - 1, : len(found)] = found
     return values
 
 

@@ -1,5 +1,5 @@
 """A problem as an input deck for CalculiX, and but for lines that say so for Abaqus: ``archord
-export-deck``.
+export-deck`` and `archord.export_deck`.
 
 The deck is the modelled part: plane elements in unit thickness or, in plane stress, a thin slice;
 or axisymmetric elements. Contact acts on the deformed curves by a stiff linear penalty, and there
@@ -15,7 +15,8 @@ by 180. Forces of Abaqus are all of the whole ring.)
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,10 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.materials.elasticity import Elastic, contact_modulus
 from archord.materials.j2 import J2Material
-from archord.postprocess.decks.mesh import DeckMesh, Ints, label, surface_name
+from archord.output.user_file import writing
+from archord.postprocess.decks.mesh import DeckMesh, Ints, deck_mesh, label, surface_name
 from archord.presets.account import account_of
+from archord.report.errors import InputError
 from archord.scene.file import AnyScene
 from archord.solver.contact.coulomb import Coulomb
 from archord.solver.contact.named import Frictionless, Tied, contact_law
@@ -43,11 +46,27 @@ _LARGE = (
 _RESULTS = ["*NODE FILE, OUTPUT=2D", "U", "*EL FILE, OUTPUT=2D", "S", "*CONTACT FILE", "CSTR"]
 
 
-def system_of(scene: AnyScene) -> System:
-    """The problem of ``scene`` with nodes of quadratic elements, on this rank alone. Raises
-    `InputError`."""
+def system_of(scene: AnyScene, given: Problem | None = None) -> System:
+    """The problem of ``scene`` with nodes of quadratic elements, on this rank alone; or the problem
+    that was ``given`` from Python, which the scene tells about. Raises `InputError`."""
     analysis = scene.analysis.model_copy(update={"degree": 2})
-    return account_of(scene.model_copy(update={"analysis": analysis}), MPI.COMM_SELF).system
+    scene = scene.model_copy(update={"analysis": analysis})
+    if given is not None:
+        given = replace(given, degree=2)
+    return account_of(scene, MPI.COMM_SELF, given=given).system
+
+
+def export_deck(scene: AnyScene, path: Path, name: str, given: Problem | None = None) -> None:
+    """Write the deck of ``scene``, or of the problem that was ``given`` from Python, to ``path``;
+    messages call it by this ``name``. Raises `InputError`."""
+    system = system_of(scene, given)
+    heading = f"{Path(name).stem} in {scene.units.length}"
+    try:
+        text = deck(system, deck_mesh(system), scene.targets, heading)
+    except ValueError as error:
+        raise InputError(f"{name}: {error}.") from error
+    with writing(path) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def contact_stiffness(problem: Problem, mesh: DeckMesh, interaction: Interaction) -> float:

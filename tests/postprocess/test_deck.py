@@ -13,13 +13,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import areas
 from archord.cli import run
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.shapes.bushing import bushing
+from archord.geometry.shapes.rectangles import rectangles
 from archord.materials.elasticity import Elastic
+from archord.materials.hardening import LinearHardening
+from archord.materials.kinematic import KinematicMaterial
 from archord.materials.kinematics import AXISYMMETRIC
 from archord.postprocess.decks.deck import (
     _Writer,
@@ -37,9 +41,11 @@ from archord.solver.problem import (
     Dirichlet,
     Drive,
     Interaction,
+    Load,
     Mean,
     Problem,
     Rigid,
+    Support,
 )
 
 ccx = shutil.which("ccx")
@@ -442,3 +448,31 @@ def test_the_command_writes_a_deck_and_nothing_over_what_is_there(
         said = f"{name}: cannot be written: it is an input of the command.\n"
         assert refused(["export-deck", "joint.toml", *with_path, "--force", "-o", name]) == said
     assert (tmp_path / "joint.inp").read_text() == text
+
+
+def test_a_problem_from_python_has_a_deck(tmp_path):
+    """With elements of second order whatever the problem's degree, and a step to each output."""
+    block = {"block": (0.0, 0.0, 2.0, 1.0)}
+    problem = Problem(
+        rectangles(block, size=0.5),
+        [Body("block", Elastic(210e3, 0.3))],
+        supports=[Support("block bottom")],
+        loads=[Load("pull", on="block top", direction="y", displacement=0.01)],
+        steps=3,
+        degree=3,
+    )
+    path = archord.export_deck(problem, tmp_path / "block.inp")
+    text = path.read_text()
+    assert (text.count("*STEP"), text.count("TYPE=CPE6")) == (3, 1)
+    assert "archord: block in mm" in text
+    with pytest.raises(archord.InputError, match="is there already"):
+        archord.export_deck(problem, path)
+    hardening = LinearHardening(200.0)
+    cyclic = Body(
+        "block", KinematicMaterial(210e3, 0.3, hardening=hardening, back_stresses=((1e3, 5.0),))
+    )
+    with pytest.raises(archord.InputError, match="the material of 'block' cannot be exported"):
+        archord.export_deck(replace(problem, bodies=[cyclic]), path, force=True)
+    assert path.read_text() == text
+    with pytest.raises(archord.InputError, match=r"^archord.export_deck: problem must be"):
+        archord.export_deck(3, path, force=True)
