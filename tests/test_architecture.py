@@ -44,6 +44,7 @@ ROOMS = [
     "benchmarks.paper",
     "benchmarks.stability",
     "benchmarks.peers",
+    "benchmarks.axisymmetric",
     "benchmarks.cost",
     "archord",
 ]

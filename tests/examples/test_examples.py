@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import archord
+from archord.materials.named import named_material
 
 FOLDER = Path(__file__).parents[2] / "examples"
 SHORT = ["three_stack", "three_bodies", "lug", "own_material", "own_law", "axisymmetric_punch"]
@@ -105,6 +106,24 @@ def test_a_ball_on_a_block_has_the_pressure_of_hertz(run_of):
     half_width = (3 * force * R / (4 * E)) ** (1 / 3)
     assert columns["contact largest pressure"][-1] == pytest.approx(pressure, rel=0.01)
     assert columns["contact contact area"][-1] == pytest.approx(np.pi * half_width**2, rel=0.05)
+
+
+@pytest.mark.mpi
+def test_a_ball_in_steel_has_the_pressure_of_tabor(tmp_path):
+    """The mean pressure is about three times the yield stress at Tabor's representative strain, 0.2
+    a/R (The Hardness of Metals, 1951, chapter V); the block's base carries the ball, which leaves
+    an indentation."""
+    scene = archord.load_scene(FOLDER.parent / "scenes" / "ball.toml")
+    columns = archord.solve(scene, tmp_path / "run").columns
+    deepest = 9
+    force = -np.array(columns["ball force"])
+    area = columns["contact contact area"][deepest]
+    strain = 0.2 * np.sqrt(area / np.pi) / 5.0
+    yield_stress = named_material("S355", "MPa").hardening.stress(np.array([strain]))[0]
+    assert 2.7 < force[deepest] / area / yield_stress < 3.2
+    assert columns["base z"][deepest] == pytest.approx(force[deepest], rel=1e-8)
+    assert columns["ball displacement"][-1] == pytest.approx(-0.18)
+    assert force[-1] == 0
 
 
 def test_the_force_of_an_eyebar_is_that_of_other_codes(tmp_path):

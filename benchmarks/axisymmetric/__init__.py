@@ -1,0 +1,1 @@
+"""Bodies of revolution against closed forms and other codes."""

@@ -1,0 +1,76 @@
+"""Axisymmetric problems against closed forms and other codes, as a table: ``python3 -m
+archord.benchmarks.axisymmetric``. Every mesh has at most 3000 nodes.
+
+With ``--calculix`` archord and CalculiX solve the ring and the punch on the same meshes of second
+order (CAX8, CAX6), each twice as fine as the one before. The stored values of CalculiX are printed
+so by CalculiX 2.20 of the image target peers: ``ARCHORD_TARGET=peers docker/run python3 -m
+archord.benchmarks.axisymmetric --calculix``.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from time import perf_counter
+
+from archord.benchmarks.axisymmetric import balls, punch, ring, thick_walls
+from archord.benchmarks.axisymmetric.case import Case, Study, solved
+from archord.benchmarks.peers.calculix import process
+from archord.benchmarks.timing import run_once
+from archord.output.folder import MESH
+from archord.presets.words import words_of
+from archord.report.table import Table
+
+STUDIES = (ring.STUDY, punch.STUDY)
+CASES = (*thick_walls.CASES, *balls.CASES, *(study.case() for study in STUDIES))
+FINER = (1, 2, 4)
+
+
+def rows(case: Case) -> Iterator[tuple[str, ...]]:
+    """Solve a ``case``; its rows of the table."""
+    start = perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        run = solved(case.problem(), Path(folder))
+        seconds = perf_counter() - start
+        nodes = len(run.fields().coordinates)
+        found = list(case.compare(run))
+    iterations = round(sum(run.columns["iterations"]))
+    cost = (str(2 * nodes), str(nodes), str(iterations), f"{seconds:.1f}")
+    for what, reference, by, ours in found:
+        off = f"{ours / reference - 1:+.2%}"
+        yield (case.name, what, f"{reference:.6g}", by, f"{ours:.6g}", off, *cost)
+
+
+def study_rows(study: Study, finer: int) -> Iterator[tuple[str, ...]]:
+    """Solve a ``study`` by archord and by CalculiX on one mesh; the rows of the table."""
+    problem = study.problem(finer)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        fields = solved(problem, folder).fields()
+        calculix = process(words_of(problem, str(folder / MESH)), folder / "calculix", problem)
+        theirs = run_once(calculix).result
+    for place in study.places:
+        ours = place.read(fields.coordinates, fields.displacement)
+        other = place.read(theirs.mesh.x, theirs.displacement)
+        off = f"{ours / other - 1:+.2%}"
+        yield (study.name, place.what, str(len(theirs.mesh.x)), f"{ours:.6g}", f"{other:.6g}", off)
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Solve all cases, or with ``--calculix`` the studies, and print the table."""
+    if "--calculix" in arguments:
+        table = Table("case", "quantity", "nodes", "archord", "CalculiX", "relative difference")
+        found = (row for study in STUDIES for finer in FINER for row in study_rows(study, finer))
+    else:
+        headings = ["case", "quantity", "reference", "by", "archord", "relative difference"]
+        table = Table(*headings, "dofs", "nodes", "iterations", "seconds")
+        found = (row for case in CASES for row in rows(case))
+    for row in found:
+        table.add(*row)
+    print(table.markdown())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
