@@ -230,7 +230,7 @@ def export_deck(
     True
     """
     from archord.output.user_file import check_target
-    from archord.postprocess.decks import deck
+    from archord.postprocess.decks.deck import write_deck
 
     path = Path(path)
     check_target(path, force=force)
@@ -239,7 +239,7 @@ def export_deck(
         scene = _scene_of(problem, "archord.export_deck")
     else:
         scene = _words_of(given, path.parent, "nodes")
-    deck.export_deck(scene, path, path.stem, given)
+    write_deck(scene, path, path.stem, given)
     return path
 
 

@@ -189,12 +189,12 @@ def probe(
 def export_deck(scene: Path, output: Path | None, overrides: tuple[str, ...], force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target
-    from archord.postprocess.decks.deck import export_deck
+    from archord.postprocess.decks.deck import write_deck
     from archord.scene.file import files_read, load_scene
 
     checked = load_scene(scene, overrides)
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, files_read(scene, overrides), force=force)
-    export_deck(checked, path, str(scene))
+    write_deck(checked, path, str(scene))
     print(path)
     return 0

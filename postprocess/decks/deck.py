@@ -56,7 +56,7 @@ def system_of(scene: AnyScene, given: Problem | None = None) -> System:
     return account_of(scene, MPI.COMM_SELF, given=given).system
 
 
-def export_deck(scene: AnyScene, path: Path, name: str, given: Problem | None = None) -> None:
+def write_deck(scene: AnyScene, path: Path, name: str, given: Problem | None = None) -> None:
     """Write the deck of ``scene``, or of the problem that was ``given`` from Python, to ``path``;
     messages call it by this ``name``. Raises `InputError`."""
     system = system_of(scene, given)
