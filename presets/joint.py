@@ -13,13 +13,10 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import refinements
-from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
+from archord.geometry.shapes.pin_in_block import pin_joint
 from archord.materials.kinematics import kinematics
 from archord.presets.arc import SYMMETRY
 from archord.scene.presets.joint import Scene
-from archord.scene.presets.joint_geometry import JointGeometry
 from archord.solver.core_load import core_density
 from archord.solver.problem import (
     Body,
@@ -39,7 +36,7 @@ _COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 
 
 def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
-    """The problem that ``scene`` states; ``partitioner`` as for `quarter_joint`. Collective over
+    """The problem that ``scene`` states; ``partitioner`` as for `mesh_joint`. Collective over
     ``comm``.
 
     Raises `InputError` if the scene leaves the mesh open.
@@ -71,9 +68,11 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     )
 
     core = core_density((0.0, 0.0), scene.load.core_radius * g.radius)
-    part = "whole" if scene.pin.whole else "half"
+    drawn = g.arguments() | {"pin": "whole" if scene.pin.whole else "half"}
     if rigid:
-        part = "none"
+        drawn["pin"] = "none"
+    drawn["core_radius"] = scene.load.core_radius
+    mesh = pin_joint(comm, degree=analysis.degree, partitioner=partitioner, **drawn)
 
     def guess(load: float) -> Guess:
         """The pin moved by the load, or by about what a force would press it, from where it touches
@@ -83,7 +82,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(
-        joint_mesh(comm, g, part, scene.load.core_radius, analysis.degree, partitioner),
+        mesh,
         [
             Body(name, solid.constitutive(analysis.plane, analysis.strain))
             for name, solid in scene.solids.items()
@@ -102,28 +101,6 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         from_rest=g.dR > 0,
         kinematics=kinematics(analysis.plane, scene.thickness),
         coarser=(lambda: joint_problem(_coarser(scene), comm)) if analysis.coarse_start else None,
-    )
-
-
-def joint_mesh(
-    comm: MPI.Comm,
-    geometry: JointGeometry,
-    pin: str,
-    core_radius: float,
-    degree: int,
-    partitioner=None,
-) -> TaggedMesh:
-    """The mesh of a joint with its ``pin`` "half", "whole" or "none"; a ring's core has
-    ``core_radius``, over R."""
-    g = geometry
-    sizes = g.radius, g.dR, g.W, g.h, g.growth
-    options = {"size_ratio": g.size_ratio, "degree": degree, "partitioner": partitioner}
-    options["refinements"] = refinements(g.expected_cells)
-    if g.is_ring:
-        return half_ring(comm, *sizes, core_radius * g.radius, **options)
-    edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
-    return quarter_joint(
-        comm, *sizes, edge=edge, rigid_pin=pin == "none", whole_pin=pin == "whole", **options
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,7 @@ from mpi4py import MPI
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.formats.source import Mesh, circles_in
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.bushing import bushing
-from archord.geometry.shapes.clevis import clevis
-from archord.geometry.shapes.lug import lug
 from archord.materials.kinematics import kinematics
-from archord.presets.joint import joint_mesh
 from archord.report.errors import InputError
 from archord.scene import parts
 from archord.scene.problem import ProblemScene
@@ -26,13 +23,6 @@ from archord.solver.contact.named import LAWS
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.path.system import displacement_space
 from archord.solver.problem import Interaction, Problem
-
-_SHAPES: dict[str, Callable[..., TaggedMesh]] = {
-    "lug": lug,
-    "clevis": clevis,
-    "bushing": bushing,
-    "joint": joint_mesh,
-}
 
 
 def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
@@ -68,7 +58,8 @@ def scene_mesh(scene: Any, comm: MPI.Comm) -> TaggedMesh:
     mesh = scene.mesh
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
-        draw = _SHAPES[shape.pop("kind")]
+        del shape["kind"]
+        draw = resolve_name(mesh.shape.drawing)
         return draw(comm, degree=scene.analysis.degree, **shape)
     circles = circles_in(mesh.circle)
     return Mesh(mesh.file, mesh.scale, mesh.order, mesh.refine, circles).on(comm)

@@ -148,7 +148,7 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     are absolute. It is not checked, as it may be whole only with what is varied. Raises
     `InputError` with one sentence per fault."""
     data = read_toml(path)
-    if "base" not in data and not {"joint", "mesh", "lug", "clevis", "bushing"}.isdisjoint(data):
+    if "base" not in data and not {"joint", "mesh", *PRESETS}.isdisjoint(data):
         raise InputError(
             f"{path}: is a scene, not a sweep; solve it by archord solve, or name a scene as a "
             "base."

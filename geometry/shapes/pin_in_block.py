@@ -12,11 +12,37 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint, refinements
 
 _EDGE_GROWTH = (
     0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
 )
+
+
+def pin_joint(
+    comm: MPI.Comm,
+    *,
+    ring: bool,
+    radius: float,
+    clearance: float,
+    block_size: float,
+    element_size: float,
+    growth: float,
+    edge: tuple[float, float] | None,
+    expected_cells: float,
+    pin: str,
+    core_radius: float,
+    **options,
+) -> TaggedMesh:
+    """Mesh a joint: a `half_ring` or a `quarter_joint`, whose arguments these are, with a ``pin``
+    that is "half", "whole" or "none"; a ring's core has ``core_radius``, over R."""
+    sizes = radius, clearance, block_size, element_size, growth
+    options["refinements"] = refinements(expected_cells)
+    if ring:
+        return half_ring(comm, *sizes, core_radius * radius, **options)
+    return quarter_joint(
+        comm, *sizes, edge=edge, rigid_pin=pin == "none", whole_pin=pin == "whole", **options
+    )
 
 
 def quarter_joint(

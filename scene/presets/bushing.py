@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -43,6 +43,7 @@ class BushingShape(Bushing):
     rings: list[Pair] = Field(default=[], description="inner and outer radii from the pin outward")
     pin: PinPart = "half"
     kind: Literal["bushing"] = "bushing"
+    drawing: ClassVar[str] = "archord.geometry.shapes.bushing:bushing"
 
     @model_validator(mode="after")
     def _bushing(self) -> BushingShape:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -51,6 +51,7 @@ class ClevisShape(Clevis):
     outer: DrawnPlate
     pin: PinPart = "half"
     kind: Literal["clevis"] = "clevis"
+    drawing: ClassVar[str] = "archord.geometry.shapes.clevis:clevis"
 
     @model_validator(mode="after")
     def _plates(self) -> ClevisShape:

@@ -4,7 +4,7 @@ pin and hole are meshed; and the same as a shape of a general scene."""
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -105,6 +105,23 @@ class JointGeometry(Section):
         require(cells <= _MOST_CELLS, name, said)
         return self
 
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        edge = None
+        if self.edge_angle is not None:
+            edge = (self.edge_angle, self.edge_ratio * self.h)
+        return {
+            "ring": self.is_ring,
+            "radius": self.radius,
+            "clearance": self.dR,
+            "block_size": self.W,
+            "element_size": self.h,
+            "growth": self.growth,
+            "size_ratio": self.size_ratio,
+            "edge": edge,
+            "expected_cells": self.expected_cells,
+        }
+
     @property
     def expected_cells(self) -> float:
         """About how many triangles the mesh will have.
@@ -179,7 +196,9 @@ class JointShape(JointGeometry):
     pin: PinPart = "half"
     core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1)
     kind: Literal["joint"] = "joint"
+    drawing: ClassVar[str] = "archord.geometry.shapes.pin_in_block:pin_joint"
 
     def arguments(self) -> dict[str, Any]:
         """What draws it."""
-        return {"kind": "joint", "geometry": self, "pin": self.pin, "core_radius": self.core_radius}
+        drawn = {"kind": self.kind, "pin": self.pin, "core_radius": self.core_radius}
+        return super().arguments() | drawn

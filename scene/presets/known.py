@@ -1,5 +1,5 @@
 """The presets by name: a new preset is a file of this room, a drawing in geometry/shapes, and a row
-here and in presets/problem.py."""
+here."""
 
 from __future__ import annotations
 

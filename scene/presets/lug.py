@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -103,6 +103,7 @@ class LugShape(Lug):
 
     pin: PinPart = "half"
     kind: Literal["lug"] = "lug"
+    drawing: ClassVar[str] = "archord.geometry.shapes.lug:lug"
     wall: Positive | None = key(
         "thickness of a bushing's wall, if there is one", "length", default=None
     )

@@ -26,6 +26,8 @@ PinPart = Literal["half", "whole", "none"]
 class Shape(Section):
     """A shape around a pin, and how finely it is meshed."""
 
+    # of a shape with a kind, what draws it, "module:function": scenes load without gmsh
+    drawing: ClassVar[str] = ""
     radius: float = key("radius R of the pin", "length", example=10.0, ge=1e-30, le=1e30)
     element_size: Positive | None = key(
         "edge length of elements on the arcs; 0.04 R if absent", "length", other=0.4
