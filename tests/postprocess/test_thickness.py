@@ -4,12 +4,13 @@ large."""
 import pytest
 
 import archord
-from archord.benchmarks.case import paper_joint, quantities
+from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
 from archord.postprocess.decks.deck import deck, system_of
 from archord.postprocess.decks.mesh import deck_mesh
 from archord.postprocess.pictures.joint import force_panel
 from archord.postprocess.tables import run_text
+from archord.presets.views import view_of
 from archord.report.figure import new_figure
 from tests.output.run_files import solved
 from tests.postprocess.test_probe import solved as lug
@@ -43,7 +44,8 @@ def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
             < 1e-9
         )
     last = {name: values[-1] for name, values in thick.columns.items()}
-    assert abs(quantities(thick.scene, last)["P/(E* R)"] / thick.columns["P/(E* R)"][-1] - 1) < 1e-9
+    compared = view_of(thick.scene).quantities(last)
+    assert abs(compared["P/(E* R)"] / thick.columns["P/(E* R)"][-1] - 1) < 1e-9
     assert command(["compare", str(thin.folder), str(thick.folder), "--no-pictures"]) == 0
 
 
