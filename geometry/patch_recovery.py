@@ -30,6 +30,27 @@ class PatchRecovery:
     The first nodes are the vertices; ``between`` are the vertices ``(i, e)`` that the further nodes
     lie between, one array after the other. Bodies share no vertex, so that nothing is smoothed over
     their boundaries.
+
+    Attributes
+    ----------
+    _powers : array (c, 2)
+        The powers of x and y in the monomials of the polynomials.
+    _cell : array (p,)
+        The cells of all patches, one patch after the other.
+    _first : array (patches,)
+        The places in ``_cell`` where the patches begin.
+    _patch : array (vertices,)
+        The number of each vertex' patch.
+    _scale : array (patches,)
+        The lengths by which coordinates in the patches are divided.
+    _fit : array (p, c, q)
+        What takes the values at a cell's points to its part of the patch's coefficients.
+    _start : array (n,)
+        The places where the terms of each node's mean begin.
+    _source : array (t,)
+        The patch of each term.
+    _value : array (t, c)
+        What takes the patch's coefficients to the term.
     """
 
     def __init__(
@@ -40,57 +61,59 @@ class PatchRecovery:
         points: Array,
         degree: int,
     ) -> None:
-        n_vertices, (n_cells, k) = len(nodes) - sum(map(len, between)), cells.shape
-        sides = np.sort(
-            np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1
-        )
-        number, count = np.unique(sides[:, 0] * n_vertices + sides[:, 1], return_counts=True)
-        edges = np.column_stack(np.divmod(number, n_vertices))
-        outside = np.zeros(n_vertices, dtype=bool)
-        outside[edges[count == 1]] = True
-        both = np.concatenate([edges, edges[:, ::-1]])
-        inward = both[outside[both[:, 0]] & ~outside[both[:, 1]]]
-        alone = outside.copy()
+        n_vertices = len(nodes) - sum(map(len, between))
+        edges, outside = _boundary(cells, n_vertices)
+        inward = _inward(edges, outside)
+        alone = outside.copy()  # on the boundary, without a neighbour inside
         alone[inward[:, 0]] = False
         own = np.flatnonzero(~outside | alone)
         wanted, source = np.concatenate([inward, np.column_stack([own, own])]).T
 
-        around = np.argsort(cells.ravel(), kind="stable")
-        vertex, cell = cells.ravel()[around], around // k
-        wide, keep = np.repeat(alone[vertex], k), ~outside[vertex]
-        place, wider = _joined(cells[cell].ravel()[wide], vertex, cell)
-        wider = np.unique(np.repeat(vertex, k)[wide][place] * n_cells + wider)
-        vertex, self._cell = (
-            np.append(vertex[keep], wider // n_cells),
-            np.append(cell[keep], wider % n_cells),
-        )
+        self._powers = np.array([[i - j, j] for i in range(degree + 1) for j in range(i + 1)])
+        vertex, self._cell = _patches(cells, outside, alone)
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
         self._patch = np.zeros(n_vertices, dtype=np.int64)
         self._patch[vertex[self._first]] = np.arange(len(self._first))
-        self._powers = np.array([[i - j, j] for i in range(degree + 1) for j in range(i + 1)])
-
         ray = points[self._cell] - nodes[vertex][:, None]
+        self._fit_patches(ray, self._patch[vertex], alone[vertex])
+        self._mean_of_vertices(nodes, between, wanted, source)
+
+    def _fit_patches(self, ray: Array, patch: np.ndarray, wide: np.ndarray) -> None:
+        """The fits of all patches by the ``ray`` ``(p, q, 2)`` from their vertices to their points;
+        in ``wide`` ones ``(p,)`` near points count more."""
         square = (ray**2).sum(axis=-1)
         size = np.maximum.reduceat(square.max(axis=1), self._first)
-        scale = np.sqrt(size)
-        patch = self._patch[vertex]
-        weight = np.where(alone[vertex][:, None], 1 / (_CORE + square / size[patch][:, None]), 1.0)
-        P = self._monomials(ray / scale[patch][:, None, None])
-        M = np.add.reduceat(np.swapaxes(P * weight[..., None], 1, 2) @ P, self._first)
-        M += _SINGULAR * np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(M.shape[1])
-        self._fit = np.linalg.inv(M)[patch] @ np.swapaxes(P * weight[..., None], 1, 2)
+        self._scale = np.sqrt(size)
+        near = 1 / (_CORE + square / size[patch][:, None])
+        weight = np.where(wide[:, None], near, 1.0)
+        monomials = self._monomials(ray / self._scale[patch][:, None, None])
+        weighted = np.swapaxes(monomials * weight[..., None], 1, 2)
+        moments = np.add.reduceat(weighted @ monomials, self._first)
+        trace = np.trace(moments, axis1=1, axis2=2)
+        moments += _SINGULAR * trace[:, None, None] * np.eye(moments.shape[1])
+        self._fit = np.linalg.inv(moments)[patch] @ weighted
 
+    def _mean_of_vertices(
+        self,
+        nodes: Array,
+        between: Sequence[np.ndarray],
+        wanted: np.ndarray,
+        source: np.ndarray,
+    ) -> None:
+        """The terms of the means at all nodes: the vertices ``wanted`` have the mean of the
+        polynomials of their ``source``, and further nodes the mean of their vertices."""
+        n_vertices = len(self._patch)
         groups = [np.arange(n_vertices)[:, None], *between]
-        end, n_ends = (
-            np.concatenate([g.ravel() for g in groups]),
-            [np.full(len(g), g.shape[1]) for g in groups],
-        )
-        count = np.concatenate(n_ends)
+        end = np.concatenate([group.ravel() for group in groups])
+        n_ends = np.concatenate([np.full(len(group), group.shape[1]) for group in groups])
         place, source = _joined(end, wanted, source)
-        node = np.repeat(np.arange(len(nodes)), count)[place]
-        self._start, self._source = np.flatnonzero(np.diff(node, prepend=-1)), self._patch[source]
-        value = self._monomials((nodes[node] - nodes[source]) / scale[self._source][:, None])
-        self._value = value / (count[node] * np.bincount(wanted)[end[place]])[:, None]
+        node = np.repeat(np.arange(len(nodes)), n_ends)[place]
+        n_sources = np.bincount(wanted)[end[place]]
+        self._start = np.flatnonzero(np.diff(node, prepend=-1))
+        self._source = self._patch[source]
+        scale = self._scale[self._source]
+        value = self._monomials((nodes[node] - nodes[source]) / scale[:, None])
+        self._value = value / (n_ends[node] * n_sources)[:, None]
 
     def _monomials(self, y: Array) -> Array:
         powers = np.ones((self._powers.max() + 1, *y.shape))
@@ -104,9 +127,49 @@ class PatchRecovery:
         return np.add.reduceat(parts[:, 0], self._start)
 
 
+def _boundary(cells: np.ndarray, n_vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    """The edges ``(e, 2)`` between vertices, and which vertices ``(n_vertices,)`` lie on the
+    boundary."""
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1)
+    low, high = np.sort(sides.reshape(-1, 2), axis=1).T
+    number, count = np.unique(low * n_vertices + high, return_counts=True)
+    edges = np.column_stack(np.divmod(number, n_vertices))
+    outside = np.zeros(n_vertices, dtype=bool)
+    outside[edges[count == 1]] = True
+    return edges, outside
+
+
+def _inward(edges: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Pairs ``(k, 2)`` of a vertex on the boundary and a neighbour inside."""
+    both = np.concatenate([edges, edges[:, ::-1]])
+    begins_outside = outside[both[:, 0]]
+    ends_inside = ~outside[both[:, 1]]
+    return both[begins_outside & ends_inside]
+
+
+def _patches(
+    cells: np.ndarray, outside: np.ndarray, alone: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices and the cells ``(p,)`` of their patches: one layer around vertices inside, two
+    around those on the boundary that are ``alone``."""
+    n_cells, k = cells.shape
+    around = np.argsort(cells.ravel(), kind="stable")
+    vertex = cells.ravel()[around]
+    cell = around // k
+    wide = np.repeat(alone[vertex], k)
+    centre = np.repeat(vertex, k)[wide]
+    place, second = _joined(cells[cell].ravel()[wide], vertex, cell)
+    both_layers = np.unique(centre[place] * n_cells + second)
+    wide_vertex, wide_cell = np.divmod(both_layers, n_cells)
+    inside = ~outside[vertex]
+    return np.append(vertex[inside], wide_vertex), np.append(cell[inside], wide_cell)
+
+
 def _joined(keys: np.ndarray, of: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """All ``items`` ``of`` each of ``keys``, in turn, and the place in ``keys`` of each."""
     order = np.argsort(of, kind="stable")
-    first, end = np.searchsorted(of[order], keys), np.searchsorted(of[order], keys, "right")
-    place = np.repeat(np.arange(len(keys)), end - first)
-    return place, items[order[np.arange(len(place)) + (end - np.cumsum(end - first))[place]]]
+    first = np.searchsorted(of[order], keys)
+    count = np.searchsorted(of[order], keys, "right") - first
+    place = np.repeat(np.arange(len(keys)), count)
+    shift = first + count - np.cumsum(count)
+    return place, items[order[np.arange(len(place)) + shift[place]]]

@@ -14,7 +14,9 @@ out of it is zero.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +43,30 @@ class KinematicState(PlasticState):
 
     back_stress: Array
     work: Array
+
+
+class _Increment(NamedTuple):
+    """How far ``n`` points yield, with ``m`` back stresses ``a``.
+
+    Attributes
+    ----------
+    d_peeq : array (n,)
+        The increment of PEEQ.
+    fall : array (n,)
+        How fast the difference from the yield condition falls with it.
+    theta : array (n, m)
+        ``1 / (1 + gamma d_peeq)``.
+    eta : array (n, 4)
+        ``trial stress - sum of theta a``.
+    rate : array (n, 4)
+        The derivative of ``eta`` by ``d_peeq``.
+    """
+
+    d_peeq: Array
+    fall: Array
+    theta: Array
+    eta: Array
+    rate: Array
 
 
 @dataclass(frozen=True)
@@ -132,9 +158,11 @@ class KinematicMaterial(J2Material):
             close = 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains
             return stress[:, 2], tangent[:, 2, 2], close / tangent[:, 2, 2], stress, tangent, new
 
-        elastic, far = strain - old.plastic_strain * _TWICE, np.full(len(strain), 1e100)
-        z = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * (elastic[:, 0] + elastic[:, 1])
-        _, (_, _, _, *found) = bracketed_newton(off, z, -far, far)
+        elastic = strain - old.plastic_strain * _TWICE
+        in_plane = elastic[:, 0] + elastic[:, 1]
+        start = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * in_plane
+        far = np.full(len(strain), 1e100)
+        _, (_, _, _, *found) = bracketed_newton(off, start, -far, far)
         return tuple(found)
 
     def _return(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
@@ -150,65 +178,79 @@ class KinematicMaterial(J2Material):
         if not len(p):
             return stress, tangent, old
         hardening = self.hardening.at(p)
-        d_peeq, fall, theta, eta, rate = self._increment(
-            trial[p], old.back_stress[p], old.peeq[p], hardening
-        )
-        length = _norm(eta)
-        n = eta / length[:, None]
-        flow = np.sqrt(1.5) * d_peeq[:, None] * n
+        grown = self._increment(trial[p], old.back_stress[p], old.peeq[p], hardening)
+        length = _norm(grown.eta)
+        n = grown.eta / length[:, None]
+        flow = np.sqrt(1.5) * grown.d_peeq[:, None] * n
         stress[p] -= 2 * mu * flow
-        before, after, (C, gamma) = old.back_stress[p], old.peeq[p] + d_peeq, self._moduli
-        back = theta[:, :, None] * (before + 2 / 3 * C[:, None] * flow[:, None, :])
+
+        shrunk = np.sqrt(6) * mu * grown.d_peeq / length
+        aside = grown.rate - _dot(grown.rate, n)[:, None] * n
+        drift = np.sqrt(6) * mu * n + shrunk[:, None] * aside
+        turned = _DEVIATOR - n[:, :, None] * n[:, None, :]
+        stretch = (np.sqrt(6) * mu / grown.fall)[:, None] * drift
+        tangent[p] -= shrunk[:, None, None] * 2 * mu * turned
+        tangent[p] -= stretch[:, :, None] * n[:, None, :]
+        return stress, tangent, self._grown(old, p, grown, flow, hardening)
+
+    def _grown(
+        self,
+        old: KinematicState,
+        p: np.ndarray,
+        grown: _Increment,
+        flow: Array,
+        hardening: Hardening,
+    ) -> KinematicState:
+        """The state when the points ``p`` have yielded, by the increments ``flow`` of the plastic
+        strain."""
+        C, gamma = self._moduli
+        before = old.back_stress[p]
+        after = old.peeq[p] + grown.d_peeq
+        moved = before + 2 / 3 * C[:, None] * flow[:, None, :]
+        back = grown.theta[:, :, None] * moved
 
         # stress . d eps_p = yield stress d_peeq + sum of d(a . a) 3 / (4 C) + gamma a . a 3 / (2 C)
         # d_peeq
-        now, between, then = (
-            _dot(a, b) / C for a, b in ((back, back), (back, before), (before, before))
-        )
-        kept, lost = 0.75 * (now - then).sum(axis=1), 0.75 * d_peeq * ((now + between) @ gamma)
+        now = _dot(back, back) / C
+        between = _dot(back, before) / C
+        then = _dot(before, before) / C
+        kept = 0.75 * (now - then).sum(axis=1)
+        lost = 0.75 * grown.d_peeq * ((now + between) @ gamma)
         isotropic = hardening.work(after) - hardening.work(old.peeq[p])
-        new = KinematicState(
-            *(a.copy() for a in (old.plastic_strain, old.peeq, old.back_stress, old.work))
-        )
-        new.plastic_strain[p] += flow
-        new.peeq[p], new.back_stress[p] = after, back
-        new.work[p] += isotropic + kept + lost
 
-        shrunk = np.sqrt(6) * mu * d_peeq / length
-        aside = rate - _dot(rate, n)[:, None] * n
-        drift = np.sqrt(6) * mu * n + shrunk[:, None] * aside
-        tangent[p] -= shrunk[:, None, None] * 2 * mu * (_DEVIATOR - n[:, :, None] * n[:, None, :])
-        tangent[p] -= (np.sqrt(6) * mu / fall)[:, None, None] * drift[:, :, None] * n[:, None, :]
-        return stress, tangent, new
+        new = deepcopy(old)
+        new.plastic_strain[p] += flow
+        new.peeq[p] = after
+        new.back_stress[p] = back
+        new.work[p] += isotropic + kept + lost
+        return new
 
     def _increment(
         self, trial: Array, back: Array, peeq: Array, hardening: Hardening
-    ) -> tuple[Array, Array, Array, Array, Array]:
+    ) -> _Increment:
         """The increment of PEEQ at which ``sqrt(1.5) |eta| = (3 mu + sum of theta C) d_peeq + yield
-        stress``, with ``theta = 1 / (1 + gamma d_peeq)`` and ``eta = trial - sum of theta a``; how
-        fast the difference falls, with ``theta``, ``eta`` and its derivative."""
-        (_, mu), (C, gamma) = self.lame, self._moduli
+        stress``."""
+        mu = self.lame[1]
+        C, gamma = self._moduli
         high = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
-        close, start = 1e-14 * high, np.zeros(len(trial))
+        close = 1e-14 * high
 
         def off(d_peeq: Array) -> tuple:
             theta = 1 / (1 + gamma * d_peeq[:, None])
             eta = trial - np.einsum("nk,nki->ni", theta, back)
             rate = np.einsum("nk,nki->ni", gamma * theta**2, back)
-            length, after = _norm(eta), peeq + d_peeq
-            value = (3 * mu + theta @ C) * d_peeq + hardening.stress(after) - np.sqrt(1.5) * length
-            fall = (
-                3 * mu
-                + theta**2 @ C
-                + hardening.slope(after)
-                - np.sqrt(1.5) * _dot(rate, eta) / length
-            )
+            length = _norm(eta)
+            after = peeq + d_peeq
+            strength = hardening.stress(after)
+            value = (3 * mu + theta @ C) * d_peeq + strength - np.sqrt(1.5) * length
+            hardened = 3 * mu + theta**2 @ C + hardening.slope(after)
+            fall = hardened - np.sqrt(1.5) * _dot(rate, eta) / length
             return value, fall, close, theta, eta, rate
 
-        d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(
-            off, start, start, high, STEEP * mu
-        )
-        return d_peeq, fall, theta, eta, rate
+        start = np.zeros(len(trial))
+        d_peeq, found = bracketed_newton(off, start, start, high, STEEP * mu)
+        _, fall, _, theta, eta, rate = found
+        return _Increment(d_peeq, fall, theta, eta, rate)
 
     def centre(self, state: State) -> Array:
         """The sum of the back stresses ``(n, 4)``."""

@@ -27,9 +27,8 @@ from archord.materials.hardening import Hardening
 from archord.materials.material import Array
 
 _ITERATIONS = 60
-STEEP = (
-    1e3  # slope over what elasticity makes of it, from which it says nothing of where the zero is
-)
+# slope over what elasticity makes of it, from which it says nothing of where the zero is
+STEEP = 1e3
 _NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
 _STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
 # by whether there is a stress out of the plane (plane stress has none): the components of stresses
@@ -89,8 +88,9 @@ def return_map(
     stress[p[:, None], parts] = sigma
 
     flow = sigma @ P
-    xx, yy, xy = flow[:, 0], flow[:, 1], flow[:, -1]
-    grown = np.stack([xx, yy, -xx - yy, xy], axis=1) / ENGINEERING
+    xx = flow[:, 0]
+    yy = flow[:, 1]
+    grown = np.stack([xx, yy, -xx - yy, flow[:, -1]], axis=1) / ENGINEERING
     plastic_strain = old.plastic_strain.copy()
     plastic_strain[p] += zeta[:, None] * grown
     peeq = old.peeq.copy()
@@ -100,7 +100,8 @@ def return_map(
     direction = np.einsum("nij,nj->ni", softened, flow)
     slope = np.minimum(hardening.slope(peeq[p]), _STEEPEST * m.E)
     left = 1 - 2 / 3 * slope * zeta
-    factor = left / (left * np.einsum("ni,ni->n", flow, direction) + 4 / 9 * slope * q**2)
+    work = np.einsum("ni,ni->n", flow, direction)
+    factor = left / (left * work + 4 / 9 * slope * q**2)
     consistent = softened - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
     kept = np.searchsorted(parts, m.working)
     tangent[p] = consistent[:, kept[:, None], kept]
@@ -135,22 +136,20 @@ def plastic_multiplier(
         now = peeq + 2 / 3 * zeta * q
         strength = hardening.stress(now)
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
-        return (
-            1 / q - 1 / strength,
-            fall / q**2 + rise / strength**2,
-            1e-10 * (zeta + 1 / compliance.max()),
-        )
+        value = 1 / q - 1 / strength
+        slope = fall / q**2 + rise / strength**2
+        close = 1e-10 * (zeta + 1 / compliance.max())
+        return value, slope, close
 
-    start, q = np.zeros(len(a)), np.sqrt(a**2 @ weights)
-    steep = STEEP * compliance.max() / q
-    zeta, (value, slope, close) = bracketed_newton(
-        off, start, start, np.full(len(a), np.inf), steep
-    )
-    last = np.clip(
-        value / slope, -close, close
-    )  # so short a step of Newton's leaves nothing but round-off
+    start = np.zeros(len(a))
+    anywhere = np.full(len(a), np.inf)
+    steep = STEEP * compliance.max() / np.sqrt(a**2 @ weights)
+    zeta, (value, slope, close) = bracketed_newton(off, start, start, anywhere, steep)
+    # so short a step of Newton's leaves nothing but round-off
+    last = np.clip(value / slope, -close, close)
     zeta = np.maximum(zeta - last, 0.0)
-    return zeta, np.sqrt((a / (1 + zeta[:, None] * compliance)) ** 2 @ weights)
+    shrink = 1 + zeta[:, None] * compliance
+    return zeta, np.sqrt((a / shrink) ** 2 @ weights)
 
 
 def bracketed_newton(
@@ -163,14 +162,18 @@ def bracketed_newton(
     below ``steep``, as of a law that begins vertically: they are short far from a zero."""
     for _ in range(_ITERATIONS):
         found = off, slope, close, *_ = f(x)
-        low, high = np.where(off < 0, x, low), np.where(off > 0, x, high)
-        step, trusted = off / slope, slope < steep
-        moving = ~np.where(trusted, np.abs(step) <= close, high - low <= _NARROW * close)
+        low = np.where(off < 0, x, low)
+        high = np.where(off > 0, x, high)
+        step = off / slope
+        trusted = slope < steep
+        is_narrow = high - low <= _NARROW * close
+        moving = ~np.where(trusted, np.abs(step) <= close, is_narrow)
         if not moving.any():
             return x, found
         x = np.where(moving, x - step, x)
         astray = moving & ~((x > low) & (x < high) & trusted)
-        x = np.where(astray, np.where(high == np.inf, 2 * low + close, (low + high) / 2), x)
+        halved = np.where(high == np.inf, 2 * low + close, (low + high) / 2)
+        x = np.where(astray, halved, x)
     x = np.where(moving, np.nan, x)
     return x, f(x)
 
