@@ -154,8 +154,8 @@ def solve(
     """
     from mpi4py import MPI
 
+    from archord.commands.progress import solve_and_report
     from archord.output.cell_fields import own_rows
-    from archord.progress import solve_and_report
 
     folder = Path(folder)
     comm = MPI.COMM_WORLD if comm is None else comm

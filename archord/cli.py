@@ -15,8 +15,8 @@ from time import perf_counter, sleep
 import click
 
 import archord
-from archord.options import Group
-from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
+from archord.commands.options import Group
+from archord.commands.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.report.errors import InputError
 
 # seconds in which a launcher (MPICH's) hands on what a rank said, which it drops with a job that
@@ -52,7 +52,7 @@ class _Commands(Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
-        file = importlib.import_module(f"archord.{COMMANDS[name]}")
+        file = importlib.import_module(f"archord.commands.{COMMANDS[name]}")
         return getattr(file, name.replace("-", "_"))
 
 

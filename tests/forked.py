@@ -21,7 +21,7 @@ _FORKS.set_forkserver_preload(
         "gmsh",
         "archord.cli",
         "archord.materials.j2",
-        "archord.progress",
+        "archord.commands.progress",
         "archord.output.restart",
         "archord.output.run",
     ]

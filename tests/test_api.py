@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import archord
-from archord.progress import Progress
+from archord.commands.progress import Progress
 from archord.report.errors import InputError
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")

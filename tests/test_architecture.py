@@ -46,6 +46,7 @@ ROOMS = [
     "benchmarks.peers",
     "benchmarks.axisymmetric",
     "benchmarks.cost",
+    "commands",
     "archord",
 ]
 

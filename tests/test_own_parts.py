@@ -12,9 +12,9 @@ from mpi4py import MPI
 
 import archord
 from archord import cli
+from archord.commands.progress import Progress
 from archord.materials.kinematics import Kinematics
 from archord.postprocess.laws.run_steps import read_steps
-from archord.progress import Progress
 
 Worn = make_dataclass("Worn", ["depth"])
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from archord import progress
-from archord.progress import Progress
+from archord.commands import progress
+from archord.commands.progress import Progress
 from archord.scene.file import parse_any
 
 RESULT = SimpleNamespace(residuals=[1.0, 2.5e-3], active_set_changes=[0, 7])

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from archord import cli, ranks
+from archord import cli
+from archord.commands import ranks
 from tests.test_cli import archord
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")

@@ -12,12 +12,12 @@ from dolfinx.mesh import create_mesh, create_unit_square, locate_entities_bounda
 from mpi4py import MPI
 
 import archord
+from archord.commands.progress import Progress
 from archord.geometry.basis import TRIANGLE
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.formats.read import read_mesh, tagged
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
-from archord.progress import Progress
 
 CURVED = np.array(
     [[0, 0], [1, 0], [0, 1], [0.55, 0.6], [0, 0.5], [0.5, 0], [1, 1], [0.45, 1], [1, 0.55]],

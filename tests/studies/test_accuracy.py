@@ -13,11 +13,11 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.cost.work_precision_codes import CASES
+from archord.commands.progress import Progress
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.presets import mesh_family
 from archord.presets.mesh_family import MeshFamily, ProblemFamily
-from archord.progress import Progress
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, parse_scene, resolved
 from archord.scene.presets import joint_geometry as scene_geometry

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from archord.options import PATH, SCENE, argument, flag, output, overrides, pictures, quiet
+from archord.commands.options import PATH, SCENE, argument, flag, output, overrides, pictures, quiet
 
 if TYPE_CHECKING:
     from archord.scene.file import AnyScene
@@ -81,7 +81,7 @@ def _solve(
     """`solve_and_report`, with its ``options``; returns the exit code."""
     from mpi4py import MPI
 
-    from archord.progress import solve_and_report
+    from archord.commands.progress import solve_and_report
 
     def doubted() -> AnyScene:
         """The scene; what is to be doubted of it is told before it is solved."""

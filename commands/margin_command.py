@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from archord.options import argument
+from archord.commands.options import argument
 
 
 @click.command()

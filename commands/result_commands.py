@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from archord.options import SCENE, argument, file, flag, output, overrides, pictures
-from archord.ranks import terminal_width
+from archord.commands.options import SCENE, argument, file, flag, output, overrides, pictures
+from archord.commands.ranks import terminal_width
 from archord.report.errors import InputError
 
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from archord.law_files import exports_of, sentences, warn, write
-from archord.law_joint import joint_of
-from archord.options import argument, file, flag, overrides
+from archord.commands.law_files import exports_of, sentences, warn, write
+from archord.commands.law_joint import joint_of
+from archord.commands.options import argument, file, flag, overrides
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:

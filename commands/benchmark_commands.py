@@ -9,7 +9,7 @@ from time import perf_counter
 
 import click
 
-from archord.options import Group, argument, output, quiet
+from archord.commands.options import Group, argument, output, quiet
 from archord.report.errors import InputError
 
 Say = Callable[[str], None]

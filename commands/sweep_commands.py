@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from archord.options import argument, flag, output, overrides, quiet
+from archord.commands.options import argument, flag, output, overrides, quiet
 from archord.report.errors import InputError
 from archord.report.table import Table
 

@@ -11,8 +11,8 @@ from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from archord.commands.ranks import on_terminal
 from archord.presets.views import view_of
-from archord.ranks import on_terminal
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
 
