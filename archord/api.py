@@ -197,6 +197,8 @@ def export_deck(
 ) -> Path:
     """Write an input deck for CalculiX, and but for lines that say so for Abaqus.
 
+    Collective: rank 0 writes.
+
     Parameters
     ----------
     problem : Problem, Scene, ProblemScene, str, Path or dict
@@ -214,7 +216,8 @@ def export_deck(
     Raises
     ------
     InputError
-        For what a deck cannot say, as own laws and own materials, and for the file.
+        For what a deck cannot say, as own laws and own materials, for a mesh that is on several
+        ranks, and for the file.
 
     Examples
     --------
@@ -229,18 +232,25 @@ def export_deck(
     >>> "TYPE=CAX6" in export_deck(problem, "block.inp", force=True).read_text()
     True
     """
+    from mpi4py import MPI
+
+    from archord.output.ranks import agreed
     from archord.output.user_file import check_target
     from archord.postprocess.decks.deck import write_deck
 
     path = Path(path)
-    check_target(path, force=force)
-    given = _problem_of(problem)
-    if given is None:
-        scene = _scene_of(problem, "archord.export_deck")
-    else:
-        scene = _words_of(given, path.parent, "nodes")
-    write_deck(scene, path, path.stem, given)
-    return path
+
+    def write() -> Path:
+        check_target(path, force=force)
+        given = _problem_of(problem)
+        if given is None:
+            scene = _scene_of(problem, "archord.export_deck")
+        else:
+            scene = _words_of(given, path.parent, "nodes")
+        write_deck(scene, path, path.stem, given)
+        return path
+
+    return agreed(MPI.COMM_WORLD, write)
 
 
 def _problem_of(given: Any) -> Problem | None:

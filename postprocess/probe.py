@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from archord.materials.kinematics import kinematics
+from archord.materials.kinematics import AXISYMMETRIC, kinematics
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arc import undeformed
@@ -130,7 +130,12 @@ class Probe:
 
     def over(self, length: float) -> Probe:
         """This over P / ``length``, the mean stress that the force makes in a section. Raises
-        `InputError`."""
+        `InputError`, also for a body of revolution, whose force is of the whole ring."""
+        if self.axes == AXISYMMETRIC.axes:
+            raise InputError(
+                f"{self.place}: has no factor over a length, as the force of a body of revolution "
+                "is of the whole ring; divide by the mean stress of the section's area."
+            )
         if not (self.force and length > 0):
             section = f"a section of {length:g} under a force of {self.force:g}"
             raise InputError(f"{self.place}: has no factor over {section}.")

@@ -145,7 +145,7 @@ def _law(law: Any) -> dict[str, Any]:
     """The keys of an interaction's section for a contact law."""
     if isinstance(law, str):
         return {"law": law}
-    if law == Coulomb(getattr(law, "friction", 0.0)):
+    if type(law) is Coulomb and law == Coulomb(law.friction):
         return {"law": "coulomb", "friction": law.friction}
     names = {kind: name for name, kind in LAWS.items() if CONTACT_LAWS[name]}
     if type(law) in names:

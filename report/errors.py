@@ -56,6 +56,6 @@ def require_of(part: Any, holds: bool, key: str, said: str) -> None:
     """Raise `InputError` unless it ``holds`` what is ``said`` of the ``key`` of ``part``."""
     if not holds:
         kind = type(part).__name__
-        place = f'{kind.lower()} "{part.name}".{key}'
+        place = f'{kind.lower()} "{part.name}".{key}' if hasattr(part, "name") else key
         value = shown(getattr(part, key))
         raise InputError(f"archord.{kind}: {place} = {value} {said}.")

@@ -112,10 +112,10 @@ def _elastic() -> Problem:
     )
 
 
-def _deep() -> Problem:
-    material = perfectly_plastic(YIELD_STRESS)
-    mesh = half_space_mesh("0.28", 6.0)
-    return _pressed(mesh, material, SMALL_BALL, DEPTH, steps=10, strain="large")
+def _deep(size: float = 0.28, yield_stress: float = YIELD_STRESS, strain: str = "large") -> Problem:
+    material = perfectly_plastic(yield_stress)
+    mesh = half_space_mesh(repr(size), 6.0)
+    return _pressed(mesh, material, SMALL_BALL, DEPTH, steps=10, strain=strain)
 
 
 def _hertz(run: Run, modulus: float) -> Iterator[Compared]:
@@ -131,8 +131,8 @@ def _hertz(run: Run, modulus: float) -> Iterator[Compared]:
     yield Compared("p0", pressure, "Hertz", run.columns["contact largest pressure"][-1])
 
 
-def _johnson(run: Run) -> Iterator[Compared]:
-    exact = 3 * math.pi * SMALL_BALL * YIELD_STRESS * DEPTH / 0.368
+def _johnson(run: Run, yield_stress: float = YIELD_STRESS) -> Iterator[Compared]:
+    exact = 3 * math.pi * SMALL_BALL * yield_stress * DEPTH / 0.368
     yield Compared("P", exact, "Johnson", abs(run.columns["ball force"][-1]))
 
 
@@ -140,4 +140,12 @@ CASES = (
     Case("rigid ball on a half-space", _rigid, lambda run: _hertz(run, MODULUS)),
     Case("elastic ball on a half-space", _elastic, lambda run: _hertz(run, MODULUS / 2)),
     Case("rigid ball deep in a half-space", _deep, _johnson),
+)
+STIFF = E / 20_000
+# what the difference of the deep ball depends on
+DEEP = (
+    CASES[-1],
+    Case("elements half as large", lambda: _deep(size=0.14), _johnson),
+    Case("E/sigY = 20 000", lambda: _deep(yield_stress=STIFF), lambda run: _johnson(run, STIFF)),
+    Case("small strain", lambda: _deep(strain="small"), _johnson),
 )

@@ -23,6 +23,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.geometry.meshes.formats.source import Mesh
 from archord.materials.elasticity import Elastic, contact_modulus
 from archord.materials.j2 import J2Material
 from archord.output.user_file import writing
@@ -52,6 +53,13 @@ def system_of(scene: AnyScene, given: Problem | None = None) -> System:
     analysis = scene.analysis.model_copy(update={"degree": 2})
     scene = scene.model_copy(update={"analysis": analysis})
     if given is not None:
+        n_ranks = Mesh.of(given.mesh).n_ranks
+        if n_ranks > 1:
+            raise InputError(
+                f"archord.export_deck: the mesh is on {n_ranks} ranks, and a deck is made from the "
+                "whole mesh on one rank: make the mesh on MPI.COMM_SELF, or write the deck without "
+                "mpirun."
+            )
         given = replace(given, degree=2)
     return account_of(scene, MPI.COMM_SELF, given=given).system
 

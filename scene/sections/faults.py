@@ -21,7 +21,8 @@ _ELSEWHERE = {
     "bushing.rings": "[[sleeve]] and [housing]",
 }
 _ELSEWHERE |= {"load.steps": "path.steps"}
-_TAGS = {"number", "list", "a law"}  # kinds of values, in pydantic's places
+# kinds of values, in pydantic's places; no key is called so
+_TAGS = {"number", "list", "a law"}
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",

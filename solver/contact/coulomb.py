@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.report.errors import in_sentences, require_of
 from archord.solver.contact.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLaw, Response
 
 
@@ -19,6 +20,7 @@ class FrictionState:
     dissipated: Array  # (m,) energy per area
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Coulomb(ContactLaw):
     """Coulomb's friction: shear within the cone ``|q| <= friction p``.
@@ -42,6 +44,11 @@ class Coulomb(ContactLaw):
         Kacanov (1959). It is slower, but bodies that only friction keeps from turning keep a
         stiffness.
 
+    Raises
+    ------
+    InputError
+        For a coefficient that is negative or not finite.
+
     Examples
     --------
     >>> import numpy as np
@@ -58,6 +65,11 @@ class Coulomb(ContactLaw):
     secant: bool = False
     has_friction = True
     unilateral = True
+
+    def __post_init__(self) -> None:
+        """Check the coefficient; raise `InputError`."""
+        is_friction = 0 <= self.friction < np.inf
+        require_of(self, is_friction, "friction", "must not be negative, and be finite")
 
     def state(self, n: int) -> FrictionState:
         """Points at rest."""

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.report.errors import in_sentences, require_of
 from archord.solver.contact.law import OPEN, SLIDE, ContactLaw, Response, State
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Exponential(ContactLaw):
     """Soft contact without friction: the exponential pressure-overclosure law of Abaqus.
@@ -25,6 +27,11 @@ class Exponential(ContactLaw):
     clearance : float
         The gap at which the pressure begins.
 
+    Raises
+    ------
+    InputError
+        For a parameter that is not positive or not finite.
+
     Examples
     --------
     >>> import numpy as np
@@ -38,6 +45,11 @@ class Exponential(ContactLaw):
 
     pressure: float
     clearance: float
+
+    def __post_init__(self) -> None:
+        """Check the parameters; raise `InputError`."""
+        for name, value in vars(self).items():
+            require_of(self, 0 < value < np.inf, name, "must be positive and finite")
 
     def respond(
         self, opening: Array, trial: Array, gamma: Array, state: State, dt: float

@@ -476,3 +476,25 @@ def test_a_problem_from_python_has_a_deck(tmp_path):
     assert path.read_text() == text
     with pytest.raises(archord.InputError, match=r"^archord.export_deck: problem must be"):
         archord.export_deck(3, path, force=True)
+
+
+@pytest.mark.mpi
+def test_ranks_write_one_deck_of_a_whole_mesh(comm, tmp_path):
+    """Rank 0 writes; a mesh on several ranks, of which a rank has a part, is refused on all."""
+    box = {"block": (0.0, 0.0, 2.0, 1.0)}
+    parts = {
+        "bodies": [Body("block", Elastic(210e3, 0.3))],
+        "supports": [Support("block bottom")],
+        "loads": [Load("pull", on="block top", direction="y", displacement=0.01)],
+    }
+    path = comm.bcast(tmp_path) / "block.inp"
+    archord.export_deck(Problem(rectangles(box, 0.25, MPI.COMM_SELF), **parts), path)
+    text = path.read_text()
+    assert "*STATIC" in text
+    shared = Problem(rectangles(box, 0.25, comm), **parts)
+    if comm.size == 1:
+        archord.export_deck(shared, path, force=True)
+    else:
+        with pytest.raises(archord.InputError, match=f"the mesh is on {comm.size} ranks"):
+            archord.export_deck(shared, path, force=True)
+    assert path.read_text() == text

@@ -208,6 +208,8 @@ def test_the_arc_of_a_ball_is_a_quarter_of_a_circle(tmp_path):
         assert probe.angle[[0, -1]] == pytest.approx([270, 360], abs=8)
         assert (np.diff(probe.angle) > 0).all()
         assert probe.values.argmax() < len(probe.values) / 3
+    with pytest.raises(archord.InputError, match="no factor over a length"):
+        probe.over(4.0)
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,16 @@ class Mesh:
         return str(self.source) if isinstance(self.source, (str, Path)) else ""
 
     @property
+    def n_ranks(self) -> int:
+        """How many ranks the mesh is on already; 1 if it is still to be read."""
+        source = self.source
+        if hasattr(source, "facet_sets"):
+            return source.mesh.comm.size
+        if isinstance(source, tuple):
+            return source[0].comm.size
+        return 1
+
+    @property
     def name(self) -> str:
         """What messages call the mesh."""
         return self.file or "the mesh"

@@ -35,6 +35,16 @@ def test_the_derivative_is_a_difference_and_the_ends_are_the_parameters():
     np.testing.assert_array_equal(_pressure(gap).branch > 0, gap < 0.01)
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_parameters_that_make_no_law_are_refused(value):
+    for name in ("pressure", "clearance"):
+        with pytest.raises(archord.InputError, match=f"{name}.* must be positive and finite"):
+            Exponential(**{"pressure": 50.0, "clearance": 0.01} | {name: value})
+    if value != 0:
+        with pytest.raises(archord.InputError, match=r"friction.* must not be negative"):
+            archord.Coulomb(value)
+
+
 def strips(law, *, down=0.03, steps=3) -> archord.Problem:
     """Two strips 1 high, 0.02 apart; the upper one moves ``down``."""
     soft = archord.Elastic(E, 0.0)
