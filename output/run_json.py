@@ -105,6 +105,7 @@ class Report:
             "coarse_iterations": step.coarse_iterations,
             "factorisations": sum(a.factorisations for a in step.attempts),
             "evaluations": sum(a.evaluations for a in step.attempts),
+            "krylov_iterations": sum(a.krylov_iterations for a in step.attempts),
             "residuals": [a.residuals for a in step.attempts],
         }
         self.content["steps"].append(_finite(m.plain() | cost))

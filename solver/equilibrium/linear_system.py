@@ -31,7 +31,7 @@ class LinearSystem:
         self.choice = choose(self._facts())
         condense = self._revise_condensed if self.choice.uses("condensed") else None
         self.tangent = TangentMatrix(evaluation, timer, condense)
-        self._factoriser = partial(self.choice.factoriser, self.unknowns.V)
+        self._factoriser = partial(self.choice.factoriser, self.unknowns.V, self.unknowns.fixed)
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
             if self.unknowns.n_levels:
@@ -49,6 +49,7 @@ class LinearSystem:
         return Facts(
             comm=self.unknowns.comm,
             dofs=self.unknowns.dimension * self.unknowns.V.dofmap.index_map.size_global,
+            dimension=self.unknowns.dimension,
             yields=bulk.plastic,
             friction=self.contact.has_friction,
             finite=bulk.finite,

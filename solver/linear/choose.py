@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from archord.solver.linear import bordered, condensed, lagged, look_ahead, substructured
+from archord.solver.linear import bordered, condensed, lagged, look_ahead, multigrid, substructured
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
 
 # Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit
 # the facts.
-_MODULES = bordered, condensed, substructured, lagged, look_ahead
+_MODULES = bordered, condensed, multigrid, substructured, lagged, look_ahead
 RULES = {module.__name__.rpartition(".")[2]: module.why_not for module in _MODULES}
-INSTEAD = ("condensed", "substructured")  # of MUMPS on the whole matrix: the first that fits
+# of MUMPS on the whole matrix: the first that fits
+INSTEAD = ("condensed", "multigrid", "substructured")
+_WITHOUT = {"condensed": ["lagged", "look_ahead"], "multigrid": ["lagged"]}  # strategies they spare
+_SAID = {
+    "condensed": "condensed",
+    "multigrid": "solved by multigrid",
+    "substructured": "substructured",
+}
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
 
@@ -29,8 +37,11 @@ class Choice:
         """Whether the strategy ``name`` is used."""
         return self.why_not[name] is None
 
-    def factoriser(self, V: fem.FunctionSpace, A: PETSc.Mat) -> Strategy:
-        """The strategy that factorises ``A``, of the displacements ``V``. Collective."""
+    def factoriser(self, V: fem.FunctionSpace, fixed: np.ndarray, A: PETSc.Mat) -> Strategy:
+        """The strategy that solves with ``A``, of the displacements ``V``, of which some are
+        ``fixed`` ``(n_local, d)``. Collective."""
+        if self.uses("multigrid"):
+            return multigrid.Multigrid(A, V, fixed)
         if self.uses("substructured"):
             parts = substructured.substructures(A, V)
             if not isinstance(parts, str):
@@ -54,6 +65,6 @@ def choose(facts: Facts) -> Choice:
     reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
     fitting = [name for name in INSTEAD if reasons[name] is None]
     given_way = fitting[1:]
-    if "condensed" in fitting:
-        given_way += ["lagged", "look_ahead"]
-    return Choice(reasons | {name: f"the system is {fitting[0]}" for name in given_way})
+    if fitting and fitting[0] in _WITHOUT:
+        given_way += _WITHOUT[fitting[0]]
+    return Choice(reasons | {name: f"the system is {_SAID[fitting[0]]}" for name in given_way})

@@ -31,6 +31,8 @@ _LARGE_GAMMA = 5.0  # beyond, the small system is close to singular
 
 def why_not(facts: Facts) -> str | None:
     """Why the systems do not shrink to the contact."""
+    if facts.dimension > 2:
+        return "in space the contact has too many dofs"
     if facts.yields:
         return "bodies can yield"
     if facts.finite:

@@ -6,7 +6,8 @@ generalised equations (Josephy 1979): its iterations are left with what is smoot
 number does not grow with the number of points at the edges of contact and of stick.
 
 A condensed system solves its small system again. All other systems are solved again by FGMRES,
-which the factorisation of the matrix before preconditions, as the change is of low rank.
+which the factorisation of the matrix before preconditions, as the change is of low rank; so does
+multigrid where that solves.
 """
 
 from __future__ import annotations
@@ -86,22 +87,26 @@ class LookAhead:
         self._ksp.setInitialGuessNonzero(True)
         self._ksp.setTolerances(rtol=_TOLERANCE, max_it=self._most_solves)
 
-    def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat) -> None:
+    def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat) -> int:
         """Replace ``x``, the solution of ``A x = r``, by the solution of the revised system;
-        Newton's step is ``-x``."""
+        Newton's step is ``-x``. Returns the number of Krylov iterations."""
         if self.given_up or not np.isfinite(x.norm()):
-            return
+            return 0
+        iterations = 0
         r = r.copy()
         better = x.copy()
 
         def solve_again(change: tuple[PETSc.Mat, Array]) -> Array | None:
+            nonlocal iterations
             matrix, residual = change
             r.array[:] += residual
             self._ksp.setOperators(matrix, A)
             self._ksp.solve(r, better)
+            iterations += self._ksp.getIterationNumber()
             if np.isfinite(better.norm()):
                 better.copy(x)
             self.given_up = self._ksp.getConvergedReason() < 0
             return None if self.given_up else -x.array_r
 
         look_ahead(-x.array_r, self._revise, solve_again)
+        return iterations

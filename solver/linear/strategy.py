@@ -17,6 +17,7 @@ class Facts:
 
     comm : its ranks
     dofs : degrees of freedom on all ranks
+    dimension : components of a displacement
     yields : whether bodies can yield
     friction : whether surfaces have friction
     finite : whether strains are large
@@ -27,6 +28,7 @@ class Facts:
 
     comm: MPI.Comm
     dofs: int
+    dimension: int
     yields: bool
     friction: bool
     finite: bool

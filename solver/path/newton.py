@@ -18,6 +18,7 @@ from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
 from archord.solver.linear.look_ahead import LookAhead
+from archord.solver.linear.multigrid import forcing_term
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still
@@ -40,7 +41,8 @@ class Newton:
 
     Without convergence ``worst`` is the place ``(d,)`` of the largest residual,
     ``plastic_increment`` the largest of PEEQ. ``active_set_changes`` belong to each residual.
-    ``held`` contact points had to stay on their facets.
+    ``held`` contact points had to stay on their facets. ``krylov_iterations`` are of all linear
+    systems that were solved by iterations.
     """
 
     converged: bool
@@ -53,6 +55,7 @@ class Newton:
     held: bool = False
     factorisations: int = 0
     evaluations: int = 0
+    krylov_iterations: int = 0
 
     @staticmethod
     def together(solves: Sequence[Newton]) -> Newton:
@@ -65,6 +68,7 @@ class Newton:
             active_set_changes=[changes for s in solves for changes in s.active_set_changes],
             factorisations=sum(s.factorisations for s in solves),
             evaluations=sum(s.evaluations for s in solves),
+            krylov_iterations=sum(s.krylov_iterations for s in solves),
             held=any(s.held for s in solves),
         )
 
@@ -85,6 +89,9 @@ class NewtonSolver:
         self.max_iterations = equilibrium.problem.max_iterations
         self._system = equilibrium.linear
         choice = self._system.choice
+        self._iterates = choice.uses("multigrid")
+        bulk = equilibrium.bulk
+        self._has_linear_bulk = not (bulk.plastic or bulk.finite)
         self._lagged = Lagged() if choice.uses("lagged") else None
         self._ahead: LookAhead | None = None
         if choice.uses("look_ahead"):
@@ -135,11 +142,20 @@ class NewtonSolver:
 
     def _before_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         ksp.getPC().setReusePreconditioner(self._reuse)
+        if self._iterates:
+            ksp.setTolerances(rtol=self._forcing_term())
+
+    def _forcing_term(self) -> float:
+        result = self._result
+        is_linear = self._has_linear_bulk and not result.active_set_changes[-1]
+        return forcing_term(result.residuals, self._goal, is_linear=is_linear)
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        if ksp.getType() != PETSc.KSP.Type.PREONLY:
+            self._result.krylov_iterations += ksp.getIterationNumber()
         if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
             return
-        self._ahead.improve(b, x, self._strategy.matrix)
+        self._result.krylov_iterations += self._ahead.improve(b, x, self._strategy.matrix)
         if self._system.border:
             self._system.border.singular = None  # vectors that FGMRES tries say nothing of it
 

@@ -13,7 +13,7 @@ from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
 from tests.solver.solving import MUMPS_FROM_C
 
-ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, False, 0.5, lambda: True)
+ELASTIC = Facts(MPI.COMM_SELF, 5000, 2, False, False, False, False, 0.5, lambda: True)
 
 
 @pytest.mark.parametrize(
@@ -31,6 +31,11 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, False, 0.5, lambda: Tr
         ({"gamma_factor": None}, "direct"),
         ({"gamma_factor": 10.0}, "look_ahead + direct"),
         ({"held": lambda: False}, "look_ahead + direct"),
+        ({"dimension": 3, "dofs": 4_000}, "look_ahead + direct"),
+        ({"dimension": 3}, "multigrid + look_ahead"),
+        ({"dimension": 3, "dofs": 50_000}, "multigrid + look_ahead"),
+        ({"dimension": 3, "yields": True}, "multigrid"),
+        ({"dimension": 3, "by_force": True}, "bordered + look_ahead + direct"),
     ],
 )
 def test_what_is_used(change, strategy):

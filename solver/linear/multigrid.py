@@ -1,0 +1,266 @@
+"""GMRES preconditioned by multigrid, for problems in space, whose factors fill up.
+
+The first level below the displacements are the linear displacements on the same mesh (p-multigrid).
+Its matrix is the Galerkin product ``P^T A P`` with the interpolation ``P``. Aggregates of its nodes
+make the levels below, with the rigid motions as near null space (smoothed aggregation; Vanek,
+Mandel and Brezina 1996). Chebyshev polynomials of the diagonal blocks smooth, so that the number of
+iterations grows neither with the mesh nor with the ranks.
+
+Prescribed displacements are rows and columns of the unit matrix. The interpolation leaves them out,
+but for the linear displacement at the same node. So the product has unit rows there, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import basix.ufl
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array, lagrange_element
+from archord.solver.linear.strategy import Facts, Strategy
+
+FEWEST_DOFS = 5_000  # below, a factorisation is quicker
+LEAST_DIMENSION = 3  # factors of plane problems hardly fill up
+_RESTART = 50  # vectors that GMRES keeps
+_MOST_ITERATIONS = 200  # after which Newton's method tries what has been found
+_LOOSEST = 1e-3  # residual of a linear system over its right-hand side
+_SUPERLINEAR = 2.0  # power of the last reduction of the residual of Newton's method
+_MARGIN = 0.1  # of the goal: what the last linear system may leave
+_SMOOTHING = 3  # degree of the polynomials
+_FEWEST_COARSE = 100  # equations that are factorised on the last level
+_WEAK = 0.05  # of the diagonal: couplings that aggregates do not follow
+_ROUND_OFF = 1e-12
+_FINE = "archord_fine_"
+_COARSE = "archord_coarse_"
+_Reason = PETSc.KSP.ConvergedReason
+
+
+def why_not(facts: Facts) -> str | None:
+    """Why the systems are factorised."""
+    if facts.dimension < LEAST_DIMENSION:
+        return "the problem is not in space, where factors fill up"
+    if facts.dofs < FEWEST_DOFS:
+        return f"fewer than {FEWEST_DOFS} dofs"
+    if facts.by_force:
+        return "displacements of drives are unknown, which takes accurate solves"
+    return None
+
+
+def forcing_term(residuals: Sequence[float], goal: float, *, is_linear: bool) -> float:
+    """Residual over right-hand side to which the next linear system is solved, after these
+    ``residuals`` of Newton's method, which is to reach the ``goal``.
+
+    It falls with the residuals, so that Newton's method stays superlinear (Eisenstat and Walker
+    1996, 2.6), and no further than the goal needs. A system that ``is_linear`` goes there at once.
+    """
+    now = residuals[-1]
+    if not now > 0:
+        return _LOOSEST
+    needed = _MARGIN * goal / now
+    wanted = 0.0
+    if not is_linear:
+        reduction = now / residuals[-2] if len(residuals) > 1 else 1.0
+        wanted = reduction**_SUPERLINEAR
+    return min(_LOOSEST, max(needed, wanted))
+
+
+class Multigrid(Strategy):
+    """Python context of the preconditioner of ``A``, a matrix of the displacements ``V``, of which
+    those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix. Collective.
+
+    interpolation : matrix that takes linear displacements to the own ones; None where those are
+        linear
+    coarse : matrix of the linear displacements
+    """
+
+    def __init__(self, A: PETSc.Mat, V: fem.FunctionSpace, fixed: np.ndarray) -> None:
+        self.matrix = A
+        self.interpolation: PETSc.Mat | None = None
+        self.coarse = PETSc.Mat()
+        if V.element.basix_element.degree > 1:
+            V_linear, fixed_linear = _linear(V, fixed)
+            self.interpolation = _interpolation(V, V_linear, fixed, fixed_linear)
+            V = V_linear
+            fixed = fixed_linear
+        self._motions = _free_rigid_motions(V, fixed)
+        self._without_blocks = PETSc.Mat()  # A, as products of matrices need it
+        self._levels = PETSc.PC().create(A.comm)
+        self._right_side = 0.0
+        self._is_ready = False
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` iterate."""
+        super().attach(ksp)
+        ksp.setType("gmres")
+        ksp.setPCSide(PETSc.PC.Side.RIGHT)  # it stops by the residual itself
+        ksp.setGMRESRestart(_RESTART)
+        ksp.setTolerances(rtol=_LOOSEST)
+        ksp.setConvergenceTest(self._test)
+
+    def _test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
+        """Done when the residual is small, or after many iterations: a line search can use what
+        they have found."""
+        if iteration == 0:
+            self._right_side = norm
+        if not np.isfinite(norm):
+            return _Reason.DIVERGED_NANORINF
+        if norm <= ksp.getTolerances()[0] * self._right_side:
+            return _Reason.CONVERGED_RTOL
+        return _Reason.CONVERGED_ITS if iteration >= _MOST_ITERATIONS else _Reason.ITERATING
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Make the levels of the matrix as it is now, called by PETSc."""
+        if self._is_ready:
+            self.matrix.convert("aij", self._without_blocks)
+            if self.interpolation is not None:
+                self._without_blocks.ptap(self.interpolation, self.coarse)
+        else:
+            self._make_matrices()
+            self._make_levels()
+            self._is_ready = True
+        self._levels.setUp()
+
+    def _make_matrices(self) -> None:
+        d = self.matrix.getBlockSize()
+        self._without_blocks = self.matrix.convert("aij", PETSc.Mat())
+        self.coarse = self._without_blocks
+        if self.interpolation is not None:
+            self.coarse = self._without_blocks.ptap(self.interpolation)
+        self.coarse.setBlockSize(d)
+        self.coarse.setNearNullSpace(_near_null_space(self.coarse, self._motions))
+
+    def _make_levels(self) -> None:
+        if self.interpolation is None:
+            self._levels.setOperators(self.coarse)
+            _use_aggregates(self._levels)
+            return
+        self._levels.setOperators(self.matrix)
+        self._levels.setType("mg")
+        self._levels.setMGLevels(2)
+        self._levels.setMGInterpolation(1, self.interpolation)
+        smoother = self._levels.getMGSmoother(1)
+        smoother.setOperators(self.matrix)
+        _use_options(smoother, _FINE, _polynomials("pbjacobi"))
+        below = self._levels.getMGCoarseSolve()
+        below.setType("preonly")
+        below.setOperators(self.coarse)
+        _use_aggregates(below.getPC())
+
+    def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
+        """One cycle, called by PETSc."""
+        self._levels.apply(r, x)
+
+
+def _use_aggregates(pc: PETSc.PC) -> None:
+    """Let ``pc`` be multigrid by smoothed aggregation."""
+    # an aggregate with fewer dofs than rigid motions leaves zeros on the diagonal: no blocks
+    smoother = {f"mg_levels_{name}": value for name, value in _polynomials("jacobi").items()}
+    aggregation = {
+        "pc_type": "gamg",
+        "pc_gamg_threshold": _WEAK,
+        "pc_gamg_coarse_eq_limit": _FEWEST_COARSE,
+        "pc_gamg_reuse_interpolation": True,
+    }
+    _use_options(pc, _COARSE, aggregation | smoother)
+
+
+def _polynomials(diagonal: str) -> dict[str, Any]:
+    return {"ksp_type": "chebyshev", "ksp_max_it": _SMOOTHING, "pc_type": diagonal}
+
+
+def _use_options(solver: PETSc.KSP | PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> None:
+    options = PETSc.Options(prefix)
+    for name, value in wanted.items():
+        options[name] = value
+    solver.setOptionsPrefix(prefix)
+    solver.setFromOptions()
+
+
+def _linear(V: fem.FunctionSpace, fixed: np.ndarray) -> tuple[fem.FunctionSpace, np.ndarray]:
+    """The linear displacements on the mesh of ``V``, and which of them are fixed ``(n_local,
+    d)``."""
+    d = V.dofmap.index_map_bs
+    element = basix.ufl.element("P", V.mesh.basix_cell(), 1, shape=(d,))
+    linear = fem.functionspace(V.mesh, element)
+    at_vertex = _weights(V).argmax(axis=0)
+    index_map = linear.dofmap.index_map
+    found = np.zeros((index_map.size_local + index_map.num_ghosts, d), dtype=bool)
+    found[linear.dofmap.list] = fixed[V.dofmap.list[:, at_vertex]]
+    return linear, found
+
+
+def _weights(V: fem.FunctionSpace) -> Array:
+    """What each node of a cell has of the values at the vertices ``(a, v)``."""
+    element = V.element.basix_element
+    linear = lagrange_element(element.cell_type, 1)
+    weights = linear.tabulate(0, element.points)[0, ..., 0]
+    return np.where(np.abs(weights) > _ROUND_OFF, weights, 0.0)
+
+
+def _interpolation(
+    V: fem.FunctionSpace, linear: fem.FunctionSpace, fixed: np.ndarray, fixed_linear: np.ndarray
+) -> PETSc.Mat:
+    """The matrix of the values of ``linear`` displacements at the nodes of ``V``, without
+    displacements that are fixed, but for themselves at the same node."""
+    d = V.dofmap.index_map_bs
+    n = V.dofmap.index_map.size_local
+    cell, place = _a_cell_of_each_node(V)
+    weight = _weights(V)[place]
+    vertex = linear.dofmap.list[cell]
+    is_same = weight > 1 - _ROUND_OFF
+    either_fixed = fixed[:n, None] | fixed_linear[vertex]
+    is_kept = (weight != 0)[..., None] & (is_same[..., None] | ~either_fixed)
+    # entries in the order of the rows: nodes, then axes
+    node, axis, k = np.nonzero(is_kept.transpose(0, 2, 1))
+    global_vertex = linear.dofmap.index_map.local_to_global(vertex[node, k])
+    offsets = np.searchsorted(d * node + axis, np.arange(d * n + 1)).astype(PETSc.IntType)
+    columns = (d * global_vertex + axis).astype(PETSc.IntType)
+    sizes = (d * n, None), (d * linear.dofmap.index_map.size_local, None)
+    P = PETSc.Mat().createAIJ(sizes, csr=(offsets, columns, weight[node, k]), comm=V.mesh.comm)
+    P.setBlockSizes(d, d)
+    return P
+
+
+def _a_cell_of_each_node(V: fem.FunctionSpace) -> tuple[np.ndarray, np.ndarray]:
+    """A cell ``(n_owned,)`` on which each node of ``V`` lies, and its place among the nodes of that
+    cell."""
+    nodes, first = np.unique(V.dofmap.list, return_index=True)
+    cell, place = np.divmod(first, V.dofmap.list.shape[1])
+    n = V.dofmap.index_map.size_local
+    assert np.array_equal(nodes[:n], np.arange(n))
+    return cell[:n], place[:n]
+
+
+def _free_rigid_motions(V: fem.FunctionSpace, fixed: np.ndarray) -> Array:
+    """The rigid motions ``(k, n_owned, d)`` of the nodes, zero where displacements are fixed."""
+    d = V.dofmap.index_map_bs
+    n = V.dofmap.index_map.size_local
+    x = V.tabulate_dof_coordinates()[:n, :d]
+    turns = list(combinations(range(d), 2))
+    motions = np.zeros((d + len(turns), n, d))
+    for axis in range(d):
+        motions[axis, :, axis] = 1.0
+    for turn, (i, j) in zip(motions[d:], turns, strict=True):
+        turn[:, i] = -x[:, j]
+        turn[:, j] = x[:, i]
+    return np.where(fixed[:n], 0.0, motions)
+
+
+def _near_null_space(A: PETSc.Mat, motions: Array) -> PETSc.NullSpace:
+    """The ``motions`` ``(k, n_owned, d)`` as the near null space of ``A``."""
+    basis: list[PETSc.Vec] = []
+    for motion in motions:
+        vector = A.createVecRight()
+        vector.array[:] = motion.ravel()
+        length = vector.norm()
+        for other in basis:
+            vector.axpy(-vector.dot(other), other)
+        if vector.norm() > _ROUND_OFF * length:
+            vector.normalize()
+            basis.append(vector)
+    return PETSc.NullSpace().create(vectors=basis, comm=A.comm)

@@ -1,0 +1,165 @@
+"""Multigrid: solutions of the whole matrix, iterations that do not grow, and Newton's method as by
+a factorisation."""
+
+import basix.ufl
+import numpy as np
+import pytest
+import ufl
+from basix import LagrangeVariant
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from dolfinx.mesh import CellType, create_unit_cube, create_unit_square
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.benchmarks.case import paper_joint
+from archord.solver.linear import choose
+from archord.solver.linear import multigrid as module
+from archord.solver.linear.multigrid import Multigrid, forcing_term
+from tests.solver.solving import solve
+
+LAME = 0.3 / (1.3 * 0.4), 1 / 2.6  # of E = 1, nu = 0.3
+
+
+def elastic_cube(n, cell=CellType.tetrahedron, degree=2, comm=MPI.COMM_WORLD, skew=0.0):
+    """The displacements, the fixed ones, and the matrix of a cube (a square for triangles) that is
+    held at its bottom and stands on a plane of symmetry; with a term that is not symmetric."""
+    if cell == CellType.triangle:
+        mesh = create_unit_square(comm, n, n)
+    else:
+        mesh = create_unit_cube(comm, n, n, n, cell)
+    d = mesh.geometry.dim
+    element = basix.ufl.element(
+        "P", mesh.basix_cell(), degree, shape=(d,), lagrange_variant=LagrangeVariant.equispaced
+    )
+    V = fem.functionspace(mesh, element)
+    x = V.tabulate_dof_coordinates()
+    fixed = np.zeros((len(x), d), dtype=bool)
+    fixed[np.isclose(x[:, d - 1], 0)] = True
+    fixed[np.isclose(x[:, 0], 0), 0] = True
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    strain = ufl.sym(ufl.grad(u))
+    stress = LAME[0] * ufl.tr(strain) * ufl.Identity(d) + 2 * LAME[1] * strain
+    along = fem.Constant(mesh, np.full(d, skew))
+    form = fem.form((ufl.inner(stress, ufl.grad(v)) + ufl.inner(ufl.grad(u) * along, v)) * ufl.dx)
+    nodes = [np.flatnonzero(fixed[:, axis]).astype(np.int32) for axis in range(d)]
+    bcs = [fem.dirichletbc(0.0, d * nodes[axis] + axis, V.sub(axis)) for axis in range(d)]
+    A = fem_petsc.create_matrix(form, "baij")
+    fem_petsc.assemble_matrix(A, form, bcs=bcs)
+    A.assemble()
+    return V, fixed, A
+
+
+def solver(A, V, fixed, rtol=1e-8):
+    ksp = PETSc.KSP().create(A.comm)
+    Multigrid(A, V, fixed).attach(ksp)
+    ksp.setTolerances(rtol=rtol)
+    return ksp
+
+
+def error(ksp, A):
+    """The relative error of a solution that is known."""
+    x, b = A.createVecs()
+    x.array[:] = np.sin(np.arange(*x.getOwnershipRange()))
+    A.mult(x, b)
+    found = x.duplicate()
+    ksp.solve(b, found)
+    found.axpy(-1.0, x)
+    return found.norm() / x.norm()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("cell", "degree", "skew"),
+    [
+        (CellType.tetrahedron, 2, 0.0),
+        (CellType.tetrahedron, 2, 1.0),
+        (CellType.tetrahedron, 1, 0.0),
+        (CellType.tetrahedron, 3, 0.0),
+        (CellType.hexahedron, 2, 0.0),
+        (CellType.triangle, 2, 0.0),
+    ],
+)
+def test_solutions_are_those_of_the_whole_matrix(cell, degree, skew):
+    """Of the matrix, and of another with the same pattern; with prescribed displacements."""
+    V, fixed, A = elastic_cube(6, cell, degree, skew=skew)
+    ksp = solver(A, V, fixed, rtol=1e-10)
+    assert error(ksp, A) < 1e-7
+    A.shift(0.5)
+    assert error(ksp, A) < 1e-7
+    assert ksp.getIterationNumber() < 30
+
+
+@pytest.mark.mpi
+def test_iterations_do_not_grow_with_the_mesh():
+    counts = []
+    for n in (4, 9, 14):  # 2 000, 21 000 and 73 000 dofs
+        V, fixed, A = elastic_cube(n)
+        ksp = solver(A, V, fixed)
+        error(ksp, A)
+        counts.append(ksp.getIterationNumber())
+    assert max(counts) < 20
+    assert counts[-1] <= counts[0] + 4
+
+
+@pytest.mark.mpi
+def test_linear_displacements_are_interpolated_but_where_they_are_fixed():
+    """All but the fixed ones; a fixed displacement at a vertex is itself alone."""
+    V, fixed, A = elastic_cube(3)
+    ksp = solver(A, V, fixed)
+    ksp.setUp()
+    strategy = ksp.getPC().getPythonContext()
+    n = V.dofmap.index_map.size_local
+    x = V.tabulate_dof_coordinates()[:n]
+    coarse, fine = strategy.interpolation.createVecs()
+    coarse.set(1.0)
+    strategy.interpolation.mult(coarse, fine)
+    ones = fine.array.reshape(-1, 3)
+    beside = (x[:, 2] < 0.3) | (x[:, 0] < 0.3)  # in a cell with fixed displacements
+    assert np.allclose(ones[~beside], 1.0)
+    at_vertex = np.isclose(x * 3, np.round(x * 3)).all(axis=1)
+    assert np.allclose(
+        ones[fixed[:n]], np.broadcast_to(at_vertex[:, None], fixed[:n].shape)[fixed[:n]]
+    )
+    assert strategy.coarse.getDiagonal().min()[1] > 0
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("cell", "motions"), [(CellType.tetrahedron, 6), (CellType.triangle, 3)])
+def test_rigid_motions_are_the_near_null_space(cell, motions):
+    V, fixed, A = elastic_cube(3, cell)
+    ksp = solver(A, V, fixed)
+    ksp.setUp()
+    near = ksp.getPC().getPythonContext().coarse.getNearNullSpace()
+    assert len(near.getVecs()) == motions
+
+
+def test_the_forcing_term_falls_with_the_residual_and_no_further_than_the_goal():
+    residuals = (0.9, 1e-2, 1e-3, 1e-4)
+    terms = [forcing_term([1.0, now], 1e-14, is_linear=False) for now in residuals]
+    assert terms == sorted(terms, reverse=True)
+    assert terms[-1] == pytest.approx(1e-8)  # of quadratic convergence
+    assert forcing_term([1.0, 1e-9], 1e-10, is_linear=False) == module._LOOSEST
+    assert forcing_term([1.0], 1e-10, is_linear=True) == pytest.approx(1e-11)
+    assert forcing_term([0.0], 1e-10, is_linear=True) == module._LOOSEST
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        paper_joint(0.1, 3),
+        paper_joint(0.1, 3, 0.002),
+        paper_joint(0.1, 3, 0.002, analysis={"friction": 0.3}),
+    ],
+)
+def test_newtons_method_needs_hardly_more_iterations(scene, monkeypatch):
+    """Contact included, in a plane."""
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
+    usual = solve(scene)
+    monkeypatch.setattr(module, "LEAST_DIMENSION", 2)
+    monkeypatch.setattr(module, "FEWEST_DOFS", 0)
+    found = solve(scene)
+    assert found.joint.equilibrium.linear.choice.uses("multigrid")
+    before = sum(step.iterations for step in usual.steps)
+    assert sum(step.iterations for step in found.steps) <= 1.1 * before + 1
+    assert found.steps[-1].work == pytest.approx(usual.steps[-1].work, rel=1e-8)
