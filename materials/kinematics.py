@@ -21,6 +21,7 @@ Array = npt.NDArray[np.floating]
 Plane = Literal["strain", "stress", "axisymmetric"]
 
 _PLANE_GRADIENT = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1), "yx": (1, 0)}
+_TURNS = {2: ((0, 1),), 3: ((1, 2), (2, 0), (0, 1))}  # about z; about x, y and z
 _RING_GRADIENT = {"rr": (0, 0), "zz": (1, 1), "rz": (0, 1), "zr": (1, 0), "tt": (0, 2)}
 
 
@@ -117,14 +118,22 @@ class Kinematics:
         """Rigid motions, which make no strain."""
         return 3 if self.is_plane else 1
 
+    @property
+    def turns(self) -> tuple[tuple[int, int], ...]:
+        """Axes ``(i, j)`` of the planes in which bodies can turn rigidly, from i to j."""
+        return _TURNS[self.dimension] if not self.has_hoop else ()
+
     def rigid_motions(self, x: Array) -> Array:
         """Displacements ``(n_rigid, n, d)`` of the rigid motions at the positions ``x`` ``(n, d)``:
         along x, along y and the turn about the origin; around an axis only along it."""
         translations = np.broadcast_to(np.eye(self.dimension)[:, None], (self.dimension, *x.shape))
-        if not self.is_plane:
+        if self.has_hoop:
             return translations[1:].copy()
-        turn = np.stack([-x[:, 1], x[:, 0]], axis=1)
-        return np.concatenate([translations, turn[None]])
+        turns: Array = np.zeros((len(self.turns), *x.shape))
+        for turn, (i, j) in zip(turns, self.turns, strict=True):
+            turn[:, i] = -x[:, j]
+            turn[:, j] = x[:, i]
+        return np.concatenate([translations, turns])
 
     def traction(self, normal: Array, *, large: bool = False) -> Array:
         """Matrices ``(..., d, k)`` that take the working stress to the force on an edge with the

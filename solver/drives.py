@@ -246,17 +246,23 @@ class Drives:
 
     def _anchored(self, places: Array) -> list[tuple[Array, int]]:
         """Places and axes of displacements that rigid motions do not leave all zero: of the first
-        of ``places`` ``(n, d)``, and of the farthest from it, across the way there."""
+        of ``places`` ``(n, d)``, then of the place that the motions which are left move most."""
         first = places[np.lexsort(places.T)[0]]
-        along = [axis for axis in range(self.dimension) if self._translates(axis)]
-        anchors = [(first, axis) for axis in along]
-        if len(anchors) < self.kinematics.n_rigid:
-            farthest = places[np.argmax(np.linalg.norm(places - first, axis=1))]
-            away = np.abs(farthest - first)
-            anchors.append((farthest, int(away[0] > away[1])))
+        motions = self.kinematics.rigid_motions(places - first)
+        along = self.kinematics.rigid_motions(np.zeros((1, self.dimension)))[:, 0]
+        anchors = [(first, axis) for axis in np.flatnonzero(along.any(axis=0))]
+        motions = motions[~along.any(axis=1)]
+        while len(motions):
+            sizes = np.linalg.norm(motions, axis=0)
+            place = int(np.argmax(np.linalg.norm(sizes, axis=1)))
+            axis = int(np.argmax(sizes[place]))
+            anchors.append((places[place], axis))
+            motions = _at_rest(motions, motions[:, place, axis])
         return anchors
 
-    def _translates(self, axis: int) -> bool:
-        """Whether bodies can move rigidly along an ``axis``."""
-        origin = np.zeros((1, self.dimension))
-        return bool(self.kinematics.rigid_motions(origin)[:, 0, axis].any())
+
+def _at_rest(motions: Array, displacements: Array) -> Array:
+    """The combinations ``(k - 1, ...)`` of the ``motions`` ``(k, ...)`` that do not displace what
+    they displace by ``displacements`` ``(k,)``."""
+    others = np.linalg.svd(displacements[None])[2][1:]
+    return np.tensordot(others, motions, 1)

@@ -82,20 +82,46 @@ class Loads:
         """Derivative ``(n_owned, d)`` of the mean motion by the displacements of the nodes. Raises
         ValueError for a rotation of a ring."""
         mesh = self.V.mesh
+        d = self.kinematics.dimension
+        turns = self.kinematics.turns
         v = ufl.TestFunction(self.V)
         ds = self.measure(facets=mean.facets)
         length = self.integral(self.swept(fem.Constant(mesh, 1.0)) * ds)
-        if not self.kinematics.is_plane:
-            if mean.axis == self.kinematics.dimension:
+        if not turns:
+            if mean.axis >= d:
                 raise ValueError(f"the mean {mean.name!r} is a rotation, which no ring has")
             return self._vector(self.swept(v[mean.axis]) * ds) / length
         x = ufl.SpatialCoordinate(mesh)
-        centre = np.array([self.integral(x[i] * ds) for i in (0, 1)]) / length
+        centre = np.array([self.integral(x[i] * ds) for i in range(d)]) / length
         arm = x - fem.Constant(mesh, centre)
-        lever = np.zeros(2) if mean.point is None else np.array(mean.point) - centre
-        by_rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis]
-        inertia = self.integral(ufl.inner(arm, arm) * ds)
-        shift = fem.Constant(mesh, np.eye(3)[mean.axis, :2] / length)
-        turn = fem.Constant(mesh, by_rotation / inertia)
-        moment = arm[0] * v[1] - arm[1] * v[0]
-        return self._vector((ufl.inner(shift, v) + turn * moment) * ds)
+        lever = np.zeros(d) if mean.point is None else np.array(mean.point) - centre
+        by_rotations = self._by_rotations(mean.axis, lever, self._inertia(arm, ds))
+        density = ufl.inner(fem.Constant(mesh, np.eye(d + len(turns))[mean.axis, :d] / length), v)
+        for rotation, (i, j) in zip(by_rotations, turns, strict=True):
+            density += fem.Constant(mesh, rotation) * (arm[i] * v[j] - arm[j] * v[i])
+        return self._vector(density * ds)
+
+    def _inertia(self, arm: Any, ds: Any) -> Array:
+        """Moments of inertia ``(t, t)`` of facets for the turns, by the arms to their centroid."""
+        turns = self.kinematics.turns
+        if len(turns) == 1:
+            return np.array([[self.integral(ufl.inner(arm, arm) * ds)]])
+        d = self.kinematics.dimension
+        second = np.array(
+            [[self.integral(arm[i] * arm[j] * ds) for j in range(d)] for i in range(d)]
+        )
+        return float(np.trace(second)) * np.eye(d) - second
+
+    def _by_rotations(self, axis: int, lever: Array, inertia: Array) -> Array:
+        """What a motion along or about an ``axis`` has of the moments ``(t,)``: of the mean
+        rotations about the centroid, which move the end of the ``lever``."""
+        d = len(lever)
+        rates = np.zeros(len(inertia))
+        for turn, (i, j) in enumerate(self.kinematics.turns):
+            motion = np.zeros(d)
+            motion[i] = -lever[j]
+            motion[j] = lever[i]
+            rates[turn] = float(axis == d + turn) if axis >= d else motion[axis]
+        if len(inertia) == 1:
+            return rates / inertia[0]
+        return np.linalg.solve(inertia, rates)

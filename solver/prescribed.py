@@ -117,7 +117,7 @@ class Prescribed:
         self.rate /= np.maximum(meeting, 1)
 
     def share_of(self, name: str) -> Array:
-        """The part ``(n_local, 2)`` of the reaction at each node that is of the supports ``name``:
+        """The part ``(n_local, d)`` of the reaction at each node that is of the supports ``name``:
         equal parts where several hold a node."""
         if name not in self.names:
             return np.zeros(self.holder.shape)

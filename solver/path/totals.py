@@ -36,15 +36,21 @@ class Totals:
         return self.problem.whole * self.comm.allreduce(forces.sum(axis=0))
 
     def reaction_moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of these forces about ``point``, anticlockwise, on the whole; 0 around an axis."""
-        if not self.problem.kinematics.is_plane:
-            return 0.0
-        force_x, force_y = self.equilibrium.diagnostics.reaction(name).T
-        arm = self.equilibrium.unknowns.V.tabulate_dof_coordinates()[
-            : len(force_x), :2
-        ] - np.asarray(point)
-        moment = float((arm[:, 0] * force_y - arm[:, 1] * force_x).sum())
-        return self.problem.whole * self.comm.allreduce(moment)
+        """Moment of these forces about z at ``point``, anticlockwise, on the whole; 0 around an
+        axis."""
+        moments = self.reaction_moments(name, point)
+        return float(moments[-1]) if len(moments) else 0.0
+
+    def reaction_moments(self, name: str, point: Sequence[float]) -> Array:
+        """Moments ``(t,)`` of these forces at ``point``: about z in a plane, about x, y and z in
+        space, none around an axis."""
+        d = self.problem.kinematics.dimension
+        forces = self.equilibrium.diagnostics.reaction(name)
+        places = self.equilibrium.unknowns.V.tabulate_dof_coordinates()[: len(forces), :d]
+        arm = places - np.asarray(point)
+        turns = self.problem.kinematics.turns
+        here = [(arm[:, i] * forces[:, j] - arm[:, j] * forces[:, i]).sum() for i, j in turns]
+        return self.problem.whole * self.comm.allreduce(np.array(here))
 
     def contact_force(self, name: str = "") -> Array:
         """Force ``(d,)`` of the interaction ``name``, the first without, on its second surface."""
@@ -53,7 +59,7 @@ class Totals:
     def contact_moment(self, name: str, point: Sequence[float]) -> float:
         """Moment of that force about ``point``, anticlockwise, on the deformed whole; 0 around an
         axis."""
-        if not self.problem.kinematics.is_plane:
+        if self.problem.kinematics.has_hoop:
             return 0.0
         return self.problem.whole * self.contact.moment(name, point)
 
