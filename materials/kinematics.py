@@ -130,9 +130,9 @@ class Kinematics:
         if self.has_hoop:
             return translations[1:].copy()
         turns: Array = np.zeros((len(self.turns), *x.shape))
-        for turn, (i, j) in zip(turns, self.turns, strict=True):
-            turn[:, i] = -x[:, j]
-            turn[:, j] = x[:, i]
+        for turn, (i, j) in enumerate(self.turns):
+            turns[turn, :, i] = -x[:, j]
+            turns[turn, :, j] = x[:, i]
         return np.concatenate([translations, turns])
 
     def traction(self, normal: Array, *, large: bool = False) -> Array:
