@@ -1,0 +1,245 @@
+"""Surfaces of curved triangles or quadrilaterals in space, and the closest points on them.
+
+A facet is a polynomial in ``xi`` ``(s, t)`` on the reference triangle or square. Facets that share
+an edge are neighbours; an edge of one facet alone is a free border. The product of the tangents by
+``s`` and ``t`` points out of the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import basix
+import numpy as np
+import numpy.typing as npt
+
+from archord.geometry.basis import Array, lagrange_element
+from archord.geometry.curve import Index, ProjectionError
+from archord.kernels.compiled import library, pointer, structure
+
+_SOURCE = Path(__file__).with_name("patches.c")
+_BORDER_MARGIN = 0.05  # in xi, by which facets are continued beyond a free border
+_CONTINUED = 0.5  # the same of all edges where points are to stay on their facets
+_MOST_FACETS = 64  # on the way from the facet at which a point begins to its partner
+# edges as lines a . xi = b, with a outward: the first leads from the first corner to the second
+_TRIANGLE_EDGES = ((0, -1, 0), (1, 1, 1), (-1, 0, 0))
+_SQUARE_EDGES = ((0, -1, 0), (1, 0, 1), (0, 1, 1), (-1, 0, 0))
+_CORNERS = {basix.CellType.triangle: (0, 1, 2), basix.CellType.quadrilateral: (0, 1, 3, 2)}
+
+
+@dataclass(frozen=True)
+class PatchProjection:
+    """Closest points ``y`` on an opposite surface of ``m`` points ``x``, and what their
+    linearisation needs.
+
+    With ``n`` the outward normal of the opposite surface at ``y``, ``gap = (x - y) . n``: positive
+    when open. A point is not ``found`` if it lies beyond a free border, or faces away. A closest
+    point on an edge moves along it only, and one at a corner stands still: ``along`` takes the
+    variation of ``(x - y) . tangent`` at a fixed ``xi`` to the variation of ``xi``.
+    """
+
+    facet: Index  # (m,) facet of the opposite surface
+    xi: Array  # (m, 2) position on it
+    point: Array  # (m, 3)
+    normal: Array  # (m, 3) unit
+    tangent: Array  # (m, 2, 3) d y / d xi
+    bend: Array  # (m, 2, 2) n . d2y / d xi2
+    shape: Array  # (m, k) shape functions of the nodes that carry y
+    slope: Array  # (m, 2, k) their derivatives in xi
+    along: Array  # (m, 2, 2)
+    found: npt.NDArray[np.bool_]  # (m,)
+    nodes: Index  # (m, k) the nodes that carry y
+
+    @classmethod
+    def empty(cls, m: int, k: int) -> PatchProjection:
+        """Of ``m`` points, to be filled in."""
+        return cls(
+            facet=np.empty(m, dtype=np.int32),
+            xi=np.empty((m, 2)),
+            point=np.empty((m, 3)),
+            normal=np.empty((m, 3)),
+            tangent=np.empty((m, 2, 3)),
+            bend=np.empty((m, 2, 2)),
+            shape=np.empty((m, k)),
+            slope=np.empty((m, 2, k)),
+            along=np.empty((m, 2, 2)),
+            found=np.empty(m, dtype=bool),
+            nodes=np.empty((m, k), dtype=np.int32),
+        )
+
+
+class Patches:
+    """``n_facets`` polynomial facets of the reference ``cell``, triangles or quadrilaterals, of
+    degree 1 to 4.
+
+    Raises ValueError if more than two facets share an edge.
+
+    X : (nodes, 3) the nodes
+    connectivity : (n_facets, k) the nodes of each facet, in the order of basix
+    corners : (n_facets, e) its vertices, counted on, in the order in which its edges follow
+    beyond : (n_facets, e) the facet across each edge, -1 at a free border; the edge leads from the
+        corner of its number to the next one
+    """
+
+    def __init__(self, X: Array, connectivity: Index, cell: basix.CellType, degree: int) -> None:
+        self.X = X
+        self.cell = cell
+        self.degree = degree
+        self.connectivity = connectivity.astype(np.int32)
+        self.n_facets = len(connectivity)
+        vertices = self.connectivity[:, list(_CORNERS[cell])]
+        _, corners = np.unique(vertices, return_inverse=True)
+        self.corners = corners.reshape(vertices.shape).astype(np.int32)
+        self.beyond = self._across_edges()
+        self._exponents, self._coefficients = _monomials(cell, degree)
+        edges = _TRIANGLE_EDGES if cell == basix.CellType.triangle else _SQUARE_EDGES
+        self._lines = np.array(edges, dtype=float)
+        in_turn = np.argsort(self.corners.ravel(), kind="stable")
+        self._around = (in_turn // len(edges)).astype(np.int32)
+        counts = np.bincount(self.corners.ravel())
+        self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+
+    def _across_edges(self) -> Index:
+        """The facets ``(n_facets, e)`` across the edges."""
+        ends = np.stack([self.corners, np.roll(self.corners, -1, axis=1)], axis=-1)
+        ends = np.sort(ends.reshape(-1, 2), axis=1)
+        _, edge, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+        if count.max(initial=0) > 2:
+            raise ValueError("more than two facets share an edge")
+        edge = edge.ravel()
+        in_turn = np.argsort(edge, kind="stable")
+        is_first = np.flatnonzero(np.diff(edge[in_turn]) == 0)
+        one = in_turn[is_first]
+        other = in_turn[is_first + 1]
+        n_edges = self.corners.shape[1]
+        across = np.full(self.corners.size, -1, dtype=np.int32)
+        across[one] = other // n_edges
+        across[other] = one // n_edges
+        return across.reshape(self.corners.shape)
+
+    def shapes(self, xi: Array) -> tuple[Array, Array]:
+        """Shape functions ``(m, k)`` and their derivatives ``(m, 2, k)`` at ``xi`` ``(m, 2)``."""
+        element = lagrange_element(self.cell, self.degree)
+        value, by_s, by_t = element.tabulate(1, np.ascontiguousarray(xi))[..., 0]
+        return value, np.stack([by_s, by_t], axis=1)
+
+    def areas(self) -> Array:
+        """Area ``(n_facets,)`` of each facet."""
+        xi, w = basix.make_quadrature(self.cell, 2 * self.degree)
+        tangent = np.einsum("fai,qca->fqci", self.X[self.connectivity], self.shapes(xi)[1])
+        product = np.cross(tangent[:, :, 0], tangent[:, :, 1])
+        return np.linalg.norm(product, axis=-1) @ w
+
+    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
+        """Places ``(k,)`` in ``facets`` ``(m,)``, and the facets that are at most ``rings`` edges
+        away from each."""
+        place = np.arange(len(facets))
+        near = np.asarray(facets, dtype=np.int64)
+        for _ in range(rings):
+            across = self.beyond[near]
+            row, column = np.nonzero(across >= 0)
+            place = np.concatenate([place, place[row]])
+            near = np.concatenate([near, across[row, column]])
+            place, near = np.divmod(np.unique(place * self.n_facets + near), self.n_facets)
+        return place, near
+
+    def nearest_facet(self, x: Array, displacement: Array) -> Index:
+        """Facet ``(m,)`` of the displaced surface of whose sample points one comes nearest to each
+        of ``x`` ``(m, 3)``."""
+        from scipy.spatial import cKDTree  # a plane problem does not pay for it
+
+        xi, _ = basix.make_quadrature(self.cell, 4)
+        nodes = (self.X + displacement)[self.connectivity]
+        samples = np.einsum("qa,fai->fqi", self.shapes(xi)[0], nodes)
+        _, nearest = cKDTree(samples.reshape(-1, 3)).query(x)
+        return nearest // len(xi)
+
+    def closest_point(
+        self, x: Array, outward: Array, displacement: Array, start: Index | None = None
+    ) -> PatchProjection:
+        """Closest points on the surface displaced by ``displacement`` (as ``X``) of the points
+        ``x`` ``(m, 3)``.
+
+        ``outward`` ``(m, 3)`` is the outward normal of the own body at ``x``; a partner must face
+        it. ``start`` holds a facet for each point near its partner (by default `nearest_facet`, a
+        search without a radius). Newton's method runs on that facet, kept within it; where it ends
+        on an edge or at a corner the facets that meet there follow, as long as they are nearer.
+        Points that have no partner near ``start`` are searched for on the whole surface. Raises
+        `ProjectionError` for a point that found none.
+        """
+        home = self.nearest_facet(x, displacement) if start is None else start
+        margin = np.where(self.beyond < 0, _BORDER_MARGIN, 0.0)
+        partners = self._project(x, outward, displacement, home, margin, _MOST_FACETS)
+        lost = ~partners.found
+        if start is not None and lost.any():
+            elsewhere = self.closest_point(x[lost], outward[lost], displacement)
+            for name, values in vars(partners).items():
+                values[lost] = getattr(elsewhere, name)
+        return partners
+
+    def continued(
+        self, x: Array, outward: Array, displacement: Array, facet: Index
+    ) -> PatchProjection:
+        """As `closest_point`, but on the given facets, each a polynomial continued beyond its
+        edges: smooth in ``x``."""
+        margin = np.full(self.beyond.shape, _CONTINUED)
+        return self._project(x, outward, displacement, facet, margin, others=0)
+
+    def _project(
+        self,
+        x: Array,
+        outward: Array,
+        displacement: Array,
+        home: Index,
+        margin: Array,
+        others: int,
+    ) -> PatchProjection:
+        """Closest points on the facets ``home`` and at most so many ``others`` from there on, each
+        continued by its ``margin``."""
+        partners = PatchProjection.empty(len(x), self.connectivity.shape[1])
+        nodes = (self.X + displacement)[self.connectivity]
+        members: dict[str, int | np.ndarray] = {
+            "k": self.connectivity.shape[1],
+            "n_edges": self.corners.shape[1],
+            "exponents": self._exponents,
+            "coefficients": self._coefficients,
+            "polynomials": np.ascontiguousarray(self._coefficients.T @ nodes),
+            "lines": self._lines,
+            "margin": margin,
+            "beyond": self.beyond,
+            "corners": self.corners,
+            "first": self._first,
+            "around": self._around,
+        }
+        points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
+        start = home.astype(np.int32, copy=False)
+        results: list[np.ndarray] = list(vars(partners).values())
+        on_nodes = results.pop()
+        first_lost = np.zeros(1, dtype=np.int32)
+        n_lost = library(_SOURCE).closest_on_patches(
+            structure(_SOURCE, "Patches", members),
+            len(x),
+            *map(pointer, (*points, start)),
+            others,
+            *map(pointer, (*results, first_lost)),
+        )
+        if n_lost:
+            at = "({:g}, {:g}, {:g})".format(*x[first_lost[0]])
+            raise ProjectionError(
+                f"{n_lost} contact points found no closest point, the first at {at}"
+            )
+        on_nodes[:] = self.connectivity[partners.facet]
+        return partners
+
+
+def _monomials(cell: basix.CellType, degree: int) -> tuple[Index, Array]:
+    """Exponents ``(k, 2)`` of the monomials of a facet, and their coefficients ``(k, k)`` in its
+    shape functions."""
+    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1)]
+    if cell == basix.CellType.triangle:
+        powers = [(i, j) for i, j in powers if i + j <= degree]
+    exponents = np.array(powers, dtype=np.int32)
+    nodes = lagrange_element(cell, degree).points
+    values = np.prod(nodes[:, None] ** exponents, axis=-1)
+    return exponents, np.ascontiguousarray(np.linalg.inv(values).T)
