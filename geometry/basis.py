@@ -1,5 +1,4 @@
-"""Lagrange bases and their physical gradients at points of curved triangles and quadrilaterals, as
-arrays."""
+"""Lagrange bases and their physical gradients at points of curved cells, as arrays."""
 
 from __future__ import annotations
 
@@ -18,8 +17,25 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.floating]
 
 CONTACT_POINTS = 4  # Gauss points a contact facet
-TRIANGLE, QUADRILATERAL = basix.CellType.triangle, basix.CellType.quadrilateral
-_NODES = {TRIANGLE: (3, 6, 10), QUADRILATERAL: (4, 9, 16)}  # of cells of order 1, 2 and 3
+TRIANGLE = basix.CellType.triangle
+QUADRILATERAL = basix.CellType.quadrilateral
+TETRAHEDRON = basix.CellType.tetrahedron
+HEXAHEDRON = basix.CellType.hexahedron
+_NODES = {  # of cells of order 1, 2 and 3
+    TRIANGLE: (3, 6, 10),
+    QUADRILATERAL: (4, 9, 16),
+    TETRAHEDRON: (4, 10, 20),
+    HEXAHEDRON: (8, 27, 64),
+}
+_KNOWN = {  # by the dimension
+    2: "triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16",
+    3: "tetrahedra have 4, 10 or 20, hexahedra 8, 27 or 64",
+}
+
+
+def dimension_of(cell: basix.CellType) -> int:
+    """Dimension of a ``cell``."""
+    return len(basix.topology(cell)) - 1
 
 
 def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.FiniteElement:
@@ -33,10 +49,8 @@ def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.
 def order_of(cell: basix.CellType, nodes: int) -> int:
     """Order of a Lagrange ``cell`` that has so many ``nodes``. Raises ValueError."""
     if nodes not in _NODES[cell]:
-        raise ValueError(
-            f"{cell.name}s of {nodes} nodes are not known: "
-            "triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16"
-        )
+        plural = f"{cell.name}s".replace("hedrons", "hedra")
+        raise ValueError(f"{plural} of {nodes} nodes are not known: {_KNOWN[dimension_of(cell)]}")
     return 1 + _NODES[cell].index(nodes)
 
 
@@ -45,41 +59,58 @@ class CellBasis:
     """A displacement basis at ``q`` points of each of ``n`` cells with ``a`` nodes."""
 
     shape: Array  # (q, a), or (n, q, a) where each cell has points of its own
-    gradient: Array  # (n, q, a, 2) in physical coordinates
-    point: Array  # (n, q, 2)
-    jacobian: Array  # (n, q, 2, 2) d x_i / d X_j
-    determinant: Array  # (n, q) negative where the cell's vertices run clockwise
+    gradient: Array  # (n, q, a, d) in physical coordinates
+    point: Array  # (n, q, d)
+    jacobian: Array  # (n, q, d, d) d x_i / d X_j
+    determinant: Array  # (n, q) negative where the cell is mirrored, its vertices run clockwise
 
     @property
     def measure(self) -> Array:
-        """Area per reference area ``(n, q)``."""
+        """Area per reference area, or volume per reference volume, ``(n, q)``."""
         return np.abs(self.determinant)
 
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
-    """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``, or ``(n,
-    q, 2)`` of each."""
+    """Basis of the given ``degree`` at the reference points ``X`` ``(q, d)`` of ``cells``, or ``(n,
+    q, d)`` of each."""
     geometry = tabulate(mesh.basix_cell(), cell_degree(mesh), X)
     table = tabulate(mesh.basix_cell(), degree, X)
-    nodes = mesh.geometry.x[cell_nodes(mesh)[cells], :2]
+    nodes = mesh.geometry.x[cell_nodes(mesh)[cells], : X.shape[-1]]
     at = "qa" if X.ndim == 2 else "nqa"
     point = np.einsum(f"{at},nai->nqi", geometry[0], nodes)
     J = np.einsum(f"j{at},nai->nqij", geometry[1:], nodes)
-    det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
-    inverse = np.empty_like(J)  # d X_j / d x_i as [j, i]
-    inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1] / det, J[..., 0, 0] / det
-    inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1] / det, -J[..., 1, 0] / det
+    det, inverse = _inverse(J)
     gradient = np.einsum(f"j{at},nqji->nqai", table[1:], inverse)
     return CellBasis(table[0], np.ascontiguousarray(gradient), point, J, det)
 
 
+def _inverse(J: Array) -> tuple[Array, Array]:
+    """Determinant ``(n, q)`` and inverse ``(n, q, d, d)`` of ``J``: d X_j / d x_i as [j, i]."""
+    inverse = np.empty_like(J)
+    if J.shape[-1] == 2:
+        det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+        inverse[..., 0, 0] = J[..., 1, 1]
+        inverse[..., 1, 1] = J[..., 0, 0]
+        inverse[..., 0, 1] = -J[..., 0, 1]
+        inverse[..., 1, 0] = -J[..., 1, 0]
+    else:
+        one, two, three = np.moveaxis(J, -1, 0)
+        inverse[..., 0, :] = np.cross(two, three)
+        inverse[..., 1, :] = np.cross(three, one)
+        inverse[..., 2, :] = np.cross(one, two)
+        det = np.einsum("nqi,nqi->nq", one, inverse[..., 0, :])
+    inverse /= det[..., None, None]
+    return det, inverse
+
+
 def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
-    """Values and two derivatives ``(3, ..., a)`` of the basis at ``X`` ``(..., 2)``."""
+    """Values and derivatives ``(1 + d, ..., a)`` of the basis at ``X`` ``(..., d)``."""
     element = lagrange_element(cell, degree)
+    d = X.shape[-1]
     if not X.size:  # basix ends the process
-        return np.zeros((3, *X.shape[:-1], element.dim))
-    table = element.tabulate(1, X.reshape(-1, 2))[..., 0]
-    return table.reshape(3, *X.shape[:-1], table.shape[-1])
+        return np.zeros((1 + d, *X.shape[:-1], element.dim))
+    table = element.tabulate(1, X.reshape(-1, d))[..., 0]
+    return table.reshape(1 + d, *X.shape[:-1], table.shape[-1])
 
 
 def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
@@ -98,10 +129,13 @@ def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
     across its wall, 0.16 % to 0.57 % with 8, 0.01 % to 0.04 % with 16. Degree 3 carries 0.04 % more
     at most with 4 cells, triangles 0.05 % with 2. On square cells rules of 7 or 8 points change
     nothing. With 4 points deformations have no energy. So users are warned.
+
+    A tetrahedron of degree 2 has 4 points with 6 strains each: as many as its 30 dofs without the 6
+    rigid motions.
     """
-    return 2 * degree - 2 if cell == TRIANGLE else 2 * degree
+    return 2 * degree - 2 if cell in (TRIANGLE, TETRAHEDRON) else 2 * degree
 
 
 def bulk_quadrature(cell: basix.CellType, degree: int) -> tuple[Array, Array]:
-    """Points ``(q, 2)`` and weights ``(q,)`` of the bulk rule on the reference ``cell``."""
+    """Points ``(q, d)`` and weights ``(q,)`` of the bulk rule on the reference ``cell``."""
     return basix.make_quadrature(cell, bulk_quadrature_degree(cell, degree))

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
+from archord.materials.kinematics import PLANE_STRAIN, SPACE, Kinematics, kinematics
 from archord.materials.named import named_material
 from archord.report.errors import InputError, in_sentences
 from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean
@@ -328,6 +328,9 @@ def _require_parts(kind: str, given: Any, classes: tuple[type, ...]) -> None:
 
 def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
     """The kinematics of this name, with the ``thickness``. Raises `InputError`."""
+    if given in ("space", SPACE):
+        said = "problems in space cannot be solved yet; give them in a plane"
+        raise InputError(f"archord.Problem: {said}.")
     if not isinstance(given, Kinematics):
         if given not in _PLANES:
             known = ", ".join(f'"{name}"' for name in _PLANES)

@@ -1,20 +1,27 @@
-"""Bases on curved triangles."""
+"""Bases on curved cells."""
 
 from __future__ import annotations
 
+import basix.ufl
 import numpy as np
 import pytest
+from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import (
+    HEXAHEDRON,
+    QUADRILATERAL,
+    TETRAHEDRON,
     TRIANGLE,
     bulk_quadrature,
     cell_basis,
+    dimension_of,
     lagrange_element,
+    order_of,
 )
 from archord.geometry.shapes.pin_in_block import quarter_joint
 from archord.geometry.strain import PointStrain
-from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN
+from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN, SPACE
 
 
 def mesh_and_basis(X):
@@ -89,3 +96,62 @@ def test_the_hoop_strain_is_the_radial_displacement_over_the_radius():
     gradient = PointStrain(AXISYMMETRIC, basis, dofs, large=True)(nodal)
     np.testing.assert_allclose(gradient[..., [0, 4]], 0.1, atol=1e-12)
     np.testing.assert_allclose(gradient[..., 2], 0.0, atol=1e-12)
+
+
+IN_SPACE = pytest.mark.parametrize("kind", [TETRAHEDRON, HEXAHEDRON], ids=lambda kind: kind.name)
+
+
+def one_cell(kind, degree):
+    """A curved cell in space, and its nodes ``(a, 3)``."""
+    X = lagrange_element(kind, degree).points
+    x = X + 0.05 * np.stack([np.sin(3 * X[:, 1]), X[:, 0] * X[:, 2], np.cos(2 * X[:, 0])], axis=1)
+    element = basix.ufl.element(
+        "P", kind.name, degree, shape=(3,), lagrange_variant=basix.LagrangeVariant.equispaced
+    )
+    mesh = create_mesh(MPI.COMM_SELF, np.arange(len(x), dtype=np.int64)[None], x, element)
+    return mesh, mesh.geometry.x[mesh.geometry.dofmap[0]]
+
+
+@IN_SPACE
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_cells_in_space_have_exact_gradients_of_linear_fields(kind, degree):
+    """The isoparametric basis reproduces a linear displacement, also at points of each cell."""
+    mesh, x = one_cell(kind, degree)
+    X, w = bulk_quadrature(kind, degree)
+    A = np.random.default_rng(0).normal(size=(3, 3))
+    zeroth = np.zeros(1, dtype=np.int32)
+    for at in (X, X[None]):
+        basis = cell_basis(mesh, degree, zeroth, at)
+        gradient = np.einsum("nqaj,ai->nqij", basis.gradient, x @ A.T)
+        np.testing.assert_allclose(gradient, np.broadcast_to(A, gradient.shape), atol=1e-12)
+        strain = PointStrain(SPACE, basis, np.arange(len(x), dtype=np.int32)[None])(x @ A.T)
+        expected = SPACE.small @ [A[i, j] for i, j in SPACE.terms]
+        np.testing.assert_allclose(strain, np.broadcast_to(expected, strain.shape), atol=1e-12)
+        np.testing.assert_allclose(basis.determinant, np.linalg.det(basis.jacobian), rtol=1e-12)
+        unit = np.broadcast_to(np.eye(3), basis.jacobian.shape)
+        inverse = np.linalg.inv(basis.jacobian)
+        np.testing.assert_allclose(inverse @ basis.jacobian, unit, atol=1e-12)
+    assert basis.measure[0] @ w > 0
+
+
+@IN_SPACE
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_bulk_rule_in_space_lets_rigid_motions_alone_be_free(kind, degree):
+    """Strains at its points vanish for six motions of a cell, and for no more."""
+    mesh, x = one_cell(kind, degree)
+    basis = cell_basis(mesh, degree, np.zeros(1, dtype=np.int32), bulk_quadrature(kind, degree)[0])
+    B = PointStrain(SPACE, basis, np.arange(len(x), dtype=np.int32)[None]).matrix()
+    singular = np.linalg.svd(B.reshape(-1, 3 * len(x)), compute_uv=False)
+    assert np.count_nonzero(singular > 1e-10 * singular[0]) == 3 * len(x) - SPACE.n_rigid
+
+
+def test_cells_are_known_by_their_number_of_nodes():
+    cells = [TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON]
+    assert [dimension_of(cell) for cell in cells] == [2, 2, 3, 3]
+    for cell in cells:
+        for degree in (1, 2, 3):
+            assert order_of(cell, lagrange_element(cell, degree).dim) == degree
+    with pytest.raises(ValueError, match=r"tetrahedra of 8 nodes .* have 4, 10 or 20, hexahedra 8"):
+        order_of(TETRAHEDRON, 8)
+    with pytest.raises(ValueError, match=r"triangles of 4 nodes .* have 3, 6 or 10, quadril"):
+        order_of(TRIANGLE, 4)
