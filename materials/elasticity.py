@@ -9,6 +9,10 @@ import numpy as np
 from archord.materials.kinematics import Kinematics, kinematics
 from archord.materials.material import Array, Material, Plane, State
 
+# of stresses in space; those of a plane and around an axis have the first four components
+TRACE = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # engineering strains over tensor strains
+
 
 def contact_modulus(E: float, nu: float, plane: Plane) -> float:
     """Modulus that one body brings to the contact: ``E / (1 - nu^2)``, in plane stress ``E``."""
@@ -16,24 +20,32 @@ def contact_modulus(E: float, nu: float, plane: Plane) -> float:
 
 
 def von_mises(stress: Array) -> Array:
-    """Von Mises stress ``(...,)`` of ``(..., 4)`` stresses."""
-    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
-    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
+    """Von Mises stress ``(...,)`` of stresses ``(..., 4)``, or ``(..., 6)`` in space."""
+    xx, yy, zz, *shears = np.moveaxis(stress, -1, 0)
+    differences = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.sqrt(0.5 * differences + 3 * sum(shear**2 for shear in shears))
 
 
 def mean_stress(stress: Array) -> Array:
-    """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(...,)`` of ``(..., 4)`` stresses, tension
-    positive."""
+    """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(...,)`` of stresses ``(..., 4)``, or ``(..., 6)``
+    in space, tension positive."""
     return stress[..., :3].sum(axis=-1) / 3
 
 
 def principal_stresses(stress: Array) -> tuple[Array, Array]:
-    """Principal stresses ``(..., 3)`` of ``(..., 4)`` stresses, the largest first, and the angle
-    ``(...,)`` from the x axis of the larger one in the plane, in (-pi/2, pi/2]."""
-    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
+    """Principal stresses ``(..., 3)`` of stresses ``(..., 4)``, or ``(..., 6)`` in space, the
+    largest first, and the angle ``(...,)`` from the x axis of the larger one in the plane of x and
+    y, in (-pi/2, pi/2]."""
+    xx, yy, zz, xy, *others = np.moveaxis(stress, -1, 0)
+    angle = np.arctan2(2 * xy, xx - yy) / 2
+    if others:
+        yz, zx = others
+        rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]
+        tensors = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        return np.linalg.eigvalsh(tensors)[..., ::-1], angle
     middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     values = np.sort(np.stack([middle + radius, middle - radius, zz], axis=-1), axis=-1)
-    return values[..., ::-1], np.arctan2(2 * xy, xx - yy) / 2
+    return values[..., ::-1], angle
 
 
 @dataclass(frozen=True)
@@ -46,7 +58,7 @@ class Elastic(Material):
         Young's modulus. It sets the unit of stress.
     nu : float
         Poisson's ratio.
-    plane : {"strain", "stress", "axisymmetric"}
+    plane : {"strain", "stress", "axisymmetric", "space"}
         How displacement becomes strain. The default becomes the problem's kinematics; another
         value must agree with them.
 
@@ -82,11 +94,11 @@ class Elastic(Material):
 
     @property
     def moduli(self) -> Array:
-        """Moduli ``(4, 4)`` of all components of the stress, with engineering shear; in plane
-        stress none out of the plane."""
+        """Moduli ``(n_stress, n_stress)`` of all components of the stress, with engineering shear;
+        in plane stress none out of the plane."""
         lam, mu = self.lame
-        trace = np.array([1.0, 1.0, 1.0, 0.0])
-        shear = np.array([2 * mu, 2 * mu, 2 * mu, mu])
+        trace = TRACE[: self.kinematics.n_stress].copy()
+        shear = 2 * mu / ENGINEERING[: self.kinematics.n_stress]
         if self.kinematics.is_thin:
             lam = self.E * self.nu / (1 - self.nu**2)
             trace[2] = shear[2] = 0.0
@@ -104,7 +116,7 @@ class Elastic(Material):
         return stress, np.broadcast_to(moduli, (len(strain), *moduli.shape)), state
 
     def energy(self, stress: Array) -> Array:
-        """Half the stress times its elastic strain, in three dimensions."""
+        """Half the stress times its elastic strain, of all components."""
         _, mu = self.lame
         bulk = self.E / (3 * (1 - 2 * self.nu))
         mean = mean_stress(stress)

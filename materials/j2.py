@@ -27,7 +27,7 @@ class J2Material(Elastic):
         Young's modulus. It sets the unit of stress.
     nu : float
         Poisson's ratio.
-    plane : {"strain", "stress", "axisymmetric"}
+    plane : {"strain", "stress", "axisymmetric", "space"}
         How displacement becomes strain. The default becomes the problem's kinematics; another
         value must agree with them.
     hardening : LinearHardening, TabularHardening, VoceHardening or SwiftHardening
@@ -56,7 +56,7 @@ class J2Material(Elastic):
 
     def state(self, n: int) -> PlasticState:
         """``n`` points that never yielded."""
-        return PlasticState(np.zeros((n, 4)), np.zeros(n))
+        return PlasticState(np.zeros((n, self.kinematics.n_stress)), np.zeros(n))
 
     def update(self, strain: Array, state: PlasticState) -> tuple[Array, Array, PlasticState]:
         """The return map, in C where it has a closed form."""
@@ -70,7 +70,7 @@ class J2Material(Elastic):
         return new.peeq > old.peeq
 
     def centre(self, state: PlasticState) -> Array | float:
-        """The middle of the elastic range, a deviator ``(n, 4)``."""
+        """The middle of the elastic range, a deviator ``(n, n_stress)``."""
         return 0.0
 
     def stiffening(self, old: PlasticState, new: PlasticState) -> Array | float:

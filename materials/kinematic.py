@@ -7,9 +7,9 @@ stresses, each with ``d a = 2/3 C d eps_p - gamma a d_peeq`` (Armstrong and Fred
 Backward Euler leaves one scalar equation a point for the increment of PEEQ (Kobayashi and Ohno
 2002), which decreases monotonically.
 
-Stresses and strains of this file have four components, ``[xx, yy, zz, xy]``, and products of two of
-them count shear twice. In plane stress the strain out of the plane is found such that the stress
-out of it is zero.
+Stresses and strains of this file have all ``s`` components of the kinematics, ``[xx, yy, zz, xy]``
+and in space ``[xx, yy, zz, xy, yz, zx]``. Products of two of them count shear twice. In plane
+stress the strain out of the plane is found such that the stress out of it is zero.
 """
 
 from __future__ import annotations
@@ -20,25 +20,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from archord.materials.elasticity import ENGINEERING, TRACE
 from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
 from archord.materials.material import Array, State
-from archord.materials.return_map import (
-    ENGINEERING,
-    STEEP,
-    PlasticState,
-    beyond,
-    bracketed_newton,
-)
+from archord.materials.return_map import STEEP, PlasticState, beyond, bracketed_newton
 
 _TWICE = ENGINEERING  # products of tensors count shear twice
-_TRACE = np.array([1.0, 1.0, 1.0, 0.0])
-_DEVIATOR = np.diag([1.0, 1.0, 1.0, 0.5]) - np.outer(_TRACE, _TRACE) / 3  # of engineering strains
+# of engineering strains
+_DEVIATOR = np.diag(1 / ENGINEERING) - np.outer(TRACE, TRACE) / 3
 
 
 @dataclass(frozen=True)
 class KinematicState(PlasticState):
-    """History of ``n`` points, with ``m`` back stresses ``(n, m, 4)`` and the plastic work density
+    """History of ``n`` points, with ``m`` back stresses ``(n, m, s)`` and the plastic work density
     ``(n,)``."""
 
     back_stress: Array
@@ -56,9 +51,9 @@ class _Increment(NamedTuple):
         How fast the difference from the yield condition falls with it.
     theta : array (n, m)
         ``1 / (1 + gamma d_peeq)``.
-    eta : array (n, 4)
+    eta : array (n, s)
         ``trial stress - sum of theta a``.
-    rate : array (n, 4)
+    rate : array (n, s)
         The derivative of ``eta`` by ``d_peeq``.
     """
 
@@ -81,7 +76,7 @@ class KinematicMaterial(J2Material):
         Young's modulus. It sets the unit of stress.
     nu : float
         Poisson's ratio.
-    plane : {"strain", "stress", "axisymmetric"}
+    plane : {"strain", "stress", "axisymmetric", "space"}
         How displacement becomes strain. The default becomes the problem's kinematics; another
         value must agree with them.
     hardening : LinearHardening, TabularHardening, VoceHardening or SwiftHardening
@@ -126,12 +121,13 @@ class KinematicMaterial(J2Material):
 
     def state(self, n: int) -> KinematicState:
         """``n`` points that never yielded."""
-        back = np.zeros((n, len(self.back_stresses), 4))
-        return KinematicState(np.zeros((n, 4)), np.zeros(n), back, np.zeros(n))
+        s = self.kinematics.n_stress
+        back = np.zeros((n, len(self.back_stresses), s))
+        return KinematicState(np.zeros((n, s)), np.zeros(n), back, np.zeros(n))
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, KinematicState]:
         """The return map; in plane stress with the strain out of the plane as one more unknown."""
-        whole = np.zeros((len(strain), 4))
+        whole = np.zeros((len(strain), self.kinematics.n_stress))
         whole[:, self.working] = strain
         if self.kinematics.is_thin:
             stress, tangent, new = self._plane_stress(whole, state)
@@ -158,7 +154,7 @@ class KinematicMaterial(J2Material):
             close = 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains
             return stress[:, 2], tangent[:, 2, 2], close / tangent[:, 2, 2], stress, tangent, new
 
-        elastic = strain - old.plastic_strain * _TWICE
+        elastic = strain - old.plastic_strain * _TWICE[:4]
         in_plane = elastic[:, 0] + elastic[:, 1]
         start = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * in_plane
         far = np.full(len(strain), 1e100)
@@ -166,13 +162,16 @@ class KinematicMaterial(J2Material):
         return tuple(found)
 
     def _return(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
-        """Stress ``(n, 4)``, tangent ``(n, 4, 4)`` and new state at engineering strains ``(n,
-        4)``."""
+        """Stress ``(n, s)``, tangent ``(n, s, s)`` and new state at engineering strains ``(n,
+        s)``."""
         lam, mu = self.lame
         bulk = lam + 2 * mu / 3
-        trial = 2 * mu * (strain - old.plastic_strain * _TWICE) @ _DEVIATOR
-        stress = trial + (bulk * strain @ _TRACE)[:, None] * _TRACE
-        tangent = np.tile(bulk * np.outer(_TRACE, _TRACE) + 2 * mu * _DEVIATOR, (len(strain), 1, 1))
+        s = strain.shape[1]
+        trace = TRACE[:s]
+        deviator = _DEVIATOR[:s, :s]
+        trial = 2 * mu * (strain - old.plastic_strain * _TWICE[:s]) @ deviator
+        stress = trial + (bulk * strain @ trace)[:, None] * trace
+        tangent = np.tile(bulk * np.outer(trace, trace) + 2 * mu * deviator, (len(strain), 1, 1))
         from_centre = trial - old.back_stress.sum(axis=1)
         p = beyond(np.sqrt(1.5) * _norm(from_centre), self.hardening, old.peeq)
         if not len(p):
@@ -187,7 +186,7 @@ class KinematicMaterial(J2Material):
         shrunk = np.sqrt(6) * mu * grown.d_peeq / length
         aside = grown.rate - _dot(grown.rate, n)[:, None] * n
         drift = np.sqrt(6) * mu * n + shrunk[:, None] * aside
-        turned = _DEVIATOR - n[:, :, None] * n[:, None, :]
+        turned = deviator - n[:, :, None] * n[:, None, :]
         stretch = (np.sqrt(6) * mu / grown.fall)[:, None] * drift
         tangent[p] -= shrunk[:, None, None] * 2 * mu * turned
         tangent[p] -= stretch[:, :, None] * n[:, None, :]
@@ -253,7 +252,7 @@ class KinematicMaterial(J2Material):
         return _Increment(d_peeq, fall, theta, eta, rate)
 
     def centre(self, state: State) -> Array:
-        """The sum of the back stresses ``(n, 4)``."""
+        """The sum of the back stresses ``(n, s)``."""
         return state.back_stress.sum(axis=1)
 
     def stiffening(self, old: PlasticState, new: PlasticState) -> Array:
@@ -267,8 +266,8 @@ class KinematicMaterial(J2Material):
 
 
 def _dot(a: Array, b: Array) -> Array:
-    return (a * b) @ _TWICE
+    return (a * b) @ _TWICE[: a.shape[-1]]
 
 
 def _norm(a: Array) -> Array:
-    return np.sqrt((a * a) @ _TWICE)
+    return np.sqrt(_dot(a, a))

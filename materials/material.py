@@ -1,10 +1,11 @@
 """What the solver asks of a material: strain and state in, stress, tangent and state out; and
 points of it, with their history.
 
-Arrays are those of ``n`` points: strains ``(n, 3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering
-shear), stresses ``(n, 4)`` are ``[s_xx, s_yy, s_zz, s_xy]``, tension positive. A state is None (no
-history) or a dataclass of arrays whose first axis are the points, which is how checkpoints
-store it.
+Arrays are those of ``n`` points, with the components of the `Kinematics`. In a plane strains ``(n,
+3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering shear), and stresses ``(n, 4)`` are ``[s_xx,
+s_yy, s_zz, s_xy]``, tension positive. In space both are ``(n, 6)``, ``[xx, yy, zz, xy, yz, zx]``.
+A state is None (no history) or a dataclass of arrays whose first axis are the points, which is how
+checkpoints store it.
 """
 
 from __future__ import annotations
@@ -69,13 +70,13 @@ class Material(Protocol):
 
     @property
     def elastic_tangent(self) -> Array:
-        """The elastic moduli ``(3, 3)``, symmetric, from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx,
-        s_yy, s_xy]``."""
+        """The elastic moduli ``(k, k)``, symmetric, of the ``k`` components that do work: in a
+        plane ``(3, 3)``, from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``."""
         ...
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n,
-        3)`` from ``state``.
+        3)`` from ``state``; in space ``(n, 6)``, ``(n, 6, 6)`` and ``(n, 6)``.
 
         The tangent is the `elastic_tangent` at points that `flows` leaves out; it may be a view,
         not to be written to. If it is not symmetric, `TangentMatrix.border` takes it as such
@@ -90,7 +91,7 @@ class Material(Protocol):
         return True
 
     def energy(self, stress: Array) -> Array:
-        """Elastic energy density ``(n,)`` of stresses ``(n, 4)``."""
+        """Elastic energy density ``(n,)`` of stresses ``(n, n_stress)``."""
         ...
 
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
@@ -99,7 +100,7 @@ class Material(Protocol):
         return self.energy(stress)
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
-        """Cauchy's stress ``(n, 4)`` after an update to ``stress`` and ``state``."""
+        """Cauchy's stress ``(n, n_stress)`` after an update to ``stress`` and ``state``."""
         return stress
 
     def elastic(self) -> Material:
@@ -149,8 +150,8 @@ class Points:
         self.yields = bool(getattr(material, "yields", False))
 
     def update(self, *strain: Array) -> tuple[Array, Array]:
-        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the
-        committed state."""
+        """Stress ``(n, n_stress)`` and consistent tangent ``(n, k, k)`` at ``strain`` ``(n, k)``,
+        from the committed state."""
         stress, tangent, self.trial = self.acting.update(*strain, self.state)
         return stress, tangent
 

@@ -2,7 +2,7 @@
 points.
 
 Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity,
-1998, Boxes 3.2 and 3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P``
+1998, Boxes 3.2 and 3.3). Of the components that there are, ``C`` are the elastic moduli and ``P``
 takes a stress to its deviator (as a strain), so that the von Mises stress is ``q^2 = 1.5 sigma . P
 sigma``. The plastic strain grows by ``zeta P sigma``, ``zeta = 1.5 d_peeq / q``, and the stress is
 ``(C^-1 + zeta P)^-1`` times the elastic trial strain. ``C`` and ``P`` share their eigenvectors:
@@ -16,14 +16,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from archord.kernels.compiled import library, pointer
-from archord.materials.elasticity import Elastic
+from archord.materials.elasticity import ENGINEERING, Elastic
 from archord.materials.hardening import Hardening
+from archord.materials.kinematics import Kinematics
 from archord.materials.material import Array
 
 _ITERATIONS = 60
@@ -31,50 +33,49 @@ _ITERATIONS = 60
 STEEP = 1e3
 _NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
 _STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
-# by whether there is a stress out of the plane (plane stress has none): the components of stresses
-# (n, 4) on which the map works, and the eigenvectors and eigenvalues of P on them
-_EIGENSYSTEM = {
-    False: (
-        [0, 1, 3],
-        np.array([[1, 1, 0], [-1, 1, 0], [0, 0, 1]]) / np.sqrt([[2], [2], [1]]),
-        np.array([1 / 3, 1.0, 2.0]),
-    ),
-    True: (
-        [0, 1, 2, 3],
-        np.array([[1, 1, 1, 0], [-1, 1, 0, 0], [1, 1, -2, 0], [0, 0, 0, 1]])
-        / np.sqrt([[3], [2], [6], [1]]),
-        np.array([0.0, 1.0, 1.0, 2.0]),
-    ),
-}
-
-ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0])  # engineering strains over tensor strains
+# eigenvectors and eigenvalues of P on normal stresses, in plane stress and else
+_IN_PLANE = np.array([[1, 1], [-1, 1]]) / np.sqrt([[2], [2]]), [1 / 3, 1.0]
+_NORMAL = np.array([[1, 1, 1], [-1, 1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]]), [0.0, 1.0, 1.0]
 
 
 @dataclass(frozen=True)
 class PlasticState:
-    """History of ``n`` points: plastic strain ``(n, 4)``, ``[xx, yy, zz, xy]`` (tensor shear), and
-    PEEQ ``(n,)``."""
+    """History of ``n`` points: plastic strain ``(n, n_stress)``, with the components of the stress
+    (tensor shear), and PEEQ ``(n,)``."""
 
     plastic_strain: Array
     peeq: Array
 
 
+@cache
+def _eigensystem(kinematics: Kinematics) -> tuple[list[int], Array, Array]:
+    """The components of a stress on which the map works, and the eigenvectors and eigenvalues of P
+    on them."""
+    normal, deviator = _IN_PLANE if kinematics.is_thin else _NORMAL
+    shears = list(range(3, kinematics.n_stress))
+    parts = [*range(len(deviator)), *shears]
+    Q = np.eye(len(parts))
+    Q[: len(deviator), : len(deviator)] = normal
+    return parts, Q, np.array([*deviator, *[2.0] * len(shears)])
+
+
 def return_map(
     strain: Array, old: PlasticState, m: Elastic, hardening: Hardening
 ) -> tuple[Array, Array, PlasticState]:
-    """Stress ``(n, 4)``, tangent ``(n, k, k)`` and new state at ``strain`` ``(n, k)`` from the
-    ``old`` state, with the elasticity of ``m``."""
-    is_thin = m.kinematics.is_thin
-    parts, Q, deviator = _EIGENSYSTEM[not is_thin]
+    """Stress ``(n, n_stress)``, tangent ``(n, k, k)`` and new state at ``strain`` ``(n, k)`` from
+    the ``old`` state, with the elasticity of ``m``."""
+    n_stress = m.kinematics.n_stress
+    parts, Q, deviator = _eigensystem(m.kinematics)
     lam, mu = m.lame
-    first = m.E / (1 - m.nu) if is_thin else 3 * lam + 2 * mu
-    moduli = np.array([first, *[2 * mu] * (len(parts) - 2), mu])
+    moduli = 2 * mu / np.maximum(deviator, 1.0)
+    moduli[0] = m.E / (1 - m.nu) if m.kinematics.is_thin else 3 * lam + 2 * mu
     compliance = moduli * deviator
     C = Q.T * moduli @ Q
     P = Q.T * deviator @ Q
-    elastic = -old.plastic_strain * ENGINEERING
+    engineering = ENGINEERING[:n_stress]
+    elastic = -old.plastic_strain * engineering
     elastic[:, m.working] += strain
-    stress = np.zeros((len(strain), 4))
+    stress = np.zeros((len(strain), n_stress))
     stress[:, parts] = elastic[:, parts] @ C
     tangent = np.tile(m.elastic_tangent, (len(strain), 1, 1))
     trial = stress[:, parts] @ Q.T
@@ -90,7 +91,7 @@ def return_map(
     flow = sigma @ P
     xx = flow[:, 0]
     yy = flow[:, 1]
-    grown = np.stack([xx, yy, -xx - yy, flow[:, -1]], axis=1) / ENGINEERING
+    grown = np.stack([xx, yy, -xx - yy, *flow.T[3 - n_stress :]], axis=1) / engineering
     plastic_strain = old.plastic_strain.copy()
     plastic_strain[p] += zeta[:, None] * grown
     peeq = old.peeq.copy()
@@ -185,12 +186,13 @@ def radial_return(
     / (3 mu + H)``."""
     n, k = strain.shape
     places = np.array(m.working, dtype=np.int32)
-    stress = np.empty((n, 4))
+    n_stress = m.kinematics.n_stress
+    stress = np.empty((n, n_stress))
     tangent = np.empty((n, k, k))
-    new = PlasticState(np.empty((n, 4)), np.empty(n))
+    new = PlasticState(np.empty((n, n_stress)), np.empty(n))
     given = places, np.ascontiguousarray(strain, dtype=float), old.plastic_strain, old.peeq
     found = stress, tangent, new.plastic_strain, new.peeq
     kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
     constants = *m.lame, yield_stress, modulus, pointer(m.elastic_tangent)
-    yielding = kernel(n, k, *map(pointer, given), *constants, *map(pointer, found))
+    yielding = kernel(n, n_stress, k, *map(pointer, given), *constants, *map(pointer, found))
     return stress, tangent, new if yielding else old
