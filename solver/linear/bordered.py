@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
-from archord.solver.linear.strategy import Facts, Strategy
+from archord.solver.linear.strategy import Facts, Strategy, krylov_iterations
 
 # stiffness against a motion over ``stiffness`` below which nothing resists the force
 _SINGULAR = 1e-9
@@ -80,6 +80,7 @@ class Bordered(Strategy):
     The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance;
     ``factoriser`` gives the strategy for ``A``. ``last`` is the border as it was updated last.
     ``singular`` numbers the level that a force moves most which nothing resists, or None.
+    ``krylov_iterations`` are of all solves with ``A``, 0 of factorisations.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class Bordered(Strategy):
     ) -> None:
         self.comm = A.comm.tompi4py()
         self.singular: int | None = None
+        self.krylov_iterations = 0
         self._stiffness = stiffness
         self._factoriser = factoriser
         zero: Array = np.zeros((A.getLocalSize()[0], m))
@@ -122,6 +124,7 @@ class Bordered(Strategy):
     def _solve(self, r: Array) -> Array:
         self._x.array[:] = r
         self._ksp.solve(self._x, self._y)
+        self.krylov_iterations += krylov_iterations(self._ksp)
         return self._y.array_r.copy()
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:

@@ -41,7 +41,8 @@ class Choice:
         """The strategy that solves with ``A``, of the displacements ``V``, of which some are
         ``fixed`` ``(n_local, d)``. Collective."""
         if self.uses("multigrid"):
-            return multigrid.Multigrid(A, V, fixed)
+            accuracy = {"tolerance": multigrid.ACCURATE} if self.uses("bordered") else {}
+            return multigrid.Multigrid(A, V, fixed, **accuracy)
         if self.uses("substructured"):
             parts = substructured.substructures(A, V)
             if not isinstance(parts, str):
@@ -67,4 +68,6 @@ def choose(facts: Facts) -> Choice:
     given_way = fitting[1:]
     if fitting and fitting[0] in _WITHOUT:
         given_way += _WITHOUT[fitting[0]]
+        if facts.by_force:  # its preconditioner solves by iterations
+            given_way.append("look_ahead")
     return Choice(reasons | {name: f"the system is {_SAID[fitting[0]]}" for name in given_way})

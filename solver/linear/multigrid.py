@@ -30,6 +30,7 @@ _RESTART = 50  # vectors that GMRES keeps
 _MOST_ITERATIONS = 200  # after which Newton's method tries what has been found
 _LOOSEST = 1e-3  # residual of a linear system over its right-hand side
 _SUPERLINEAR = 2.0  # power of the last reduction of the residual of Newton's method
+ACCURATE = 1e-10  # the same, where a solve stands for a factorisation
 _MARGIN = 0.1  # of the goal: what the last linear system may leave
 _SMOOTHING = 3  # degree of the polynomials
 _FEWEST_COARSE = 100  # equations that are factorised on the last level
@@ -46,8 +47,6 @@ def why_not(facts: Facts) -> str | None:
         return "the problem is not in space, where factors fill up"
     if facts.dofs < FEWEST_DOFS:
         return f"fewer than {FEWEST_DOFS} dofs"
-    if facts.by_force:
-        return "displacements of drives are unknown, which takes accurate solves"
     return None
 
 
@@ -71,15 +70,19 @@ def forcing_term(residuals: Sequence[float], goal: float, *, is_linear: bool) ->
 
 class Multigrid(Strategy):
     """Python context of the preconditioner of ``A``, a matrix of the displacements ``V``, of which
-    those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix. Collective.
+    those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix; it solves to the
+    ``tolerance``. Collective.
 
     interpolation : matrix that takes linear displacements to the own ones; None where those are
         linear
     coarse : matrix of the linear displacements
     """
 
-    def __init__(self, A: PETSc.Mat, V: fem.FunctionSpace, fixed: np.ndarray) -> None:
+    def __init__(
+        self, A: PETSc.Mat, V: fem.FunctionSpace, fixed: np.ndarray, tolerance: float = _LOOSEST
+    ) -> None:
         self.matrix = A
+        self._tolerance = tolerance
         self.interpolation: PETSc.Mat | None = None
         self.coarse = PETSc.Mat()
         if V.element.basix_element.degree > 1:
@@ -99,7 +102,7 @@ class Multigrid(Strategy):
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)  # it stops by the residual itself
         ksp.setGMRESRestart(_RESTART)
-        ksp.setTolerances(rtol=_LOOSEST)
+        ksp.setTolerances(rtol=self._tolerance)
         ksp.setConvergenceTest(self._test)
 
     def _test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:

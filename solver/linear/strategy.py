@@ -53,6 +53,11 @@ class Strategy:
         ksp.getPC().setPythonContext(self)
 
 
+def krylov_iterations(ksp: PETSc.KSP) -> int:
+    """Iterations of the last solve by ``ksp``; 0 if that only preconditions."""
+    return 0 if ksp.getType() == PETSc.KSP.Type.PREONLY else ksp.getIterationNumber()
+
+
 class Product:
     """Python context of the matrix that a ``strategy`` with a method `mult` makes. It does not keep
     the strategy alive, which holds the matrix: what PETSc refers to Python cannot collect."""

@@ -19,6 +19,7 @@ from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
 from archord.solver.linear.look_ahead import LookAhead
 from archord.solver.linear.multigrid import forcing_term
+from archord.solver.linear.strategy import krylov_iterations
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still
@@ -89,7 +90,7 @@ class NewtonSolver:
         self.max_iterations = equilibrium.problem.max_iterations
         self._system = equilibrium.linear
         choice = self._system.choice
-        self._iterates = choice.uses("multigrid")
+        self._iterates = choice.uses("multigrid") and self._system.border is None
         bulk = equilibrium.bulk
         self._has_linear_bulk = not (bulk.plastic or bulk.finite)
         self._lagged = Lagged() if choice.uses("lagged") else None
@@ -151,8 +152,7 @@ class NewtonSolver:
         return forcing_term(result.residuals, self._goal, is_linear=is_linear)
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        if ksp.getType() != PETSc.KSP.Type.PREONLY:
-            self._result.krylov_iterations += ksp.getIterationNumber()
+        self._result.krylov_iterations += krylov_iterations(ksp)
         if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
             return
         self._result.krylov_iterations += self._ahead.improve(b, x, self._strategy.matrix)
@@ -214,6 +214,7 @@ class NewtonSolver:
         self._reuse = False
         if self._system.border:
             self._system.border.singular = None
+            self._system.border.krylov_iterations = 0
         if self._ahead is not None:
             self._ahead.given_up = False
 
@@ -224,6 +225,8 @@ class NewtonSolver:
     def _ended(self, snes: PETSc.SNES) -> Newton:
         """The result of a solve, with diagnostics where it failed."""
         result = self._result
+        if self._system.border:
+            result.krylov_iterations += self._system.border.krylov_iterations
         code = snes.getConvergedReason()
         result.iterations = snes.getIterationNumber()
         result.converged = code > 0

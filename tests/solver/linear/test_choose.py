@@ -35,7 +35,7 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, 2, False, False, False, False, 0.5, lambda:
         ({"dimension": 3}, "multigrid + look_ahead"),
         ({"dimension": 3, "dofs": 50_000}, "multigrid + look_ahead"),
         ({"dimension": 3, "yields": True}, "multigrid"),
-        ({"dimension": 3, "by_force": True}, "bordered + look_ahead + direct"),
+        ({"dimension": 3, "by_force": True}, "bordered + multigrid"),
     ],
 )
 def test_what_is_used(change, strategy):
