@@ -13,7 +13,6 @@ but for the linear displacement at the same node. So the product has unit rows t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
 from typing import Any
 
 import basix.ufl
@@ -22,6 +21,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, lagrange_element
+from archord.materials.kinematics import kinematics
 from archord.solver.linear.strategy import Facts, Strategy
 
 FEWEST_DOFS = 5_000  # below, a factorisation is quicker
@@ -156,6 +156,8 @@ class Multigrid(Strategy):
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """One cycle, called by PETSc."""
+        if not self._is_ready:  # put in the place of another one
+            self.setUp(pc)
         self._levels.apply(r, x)
 
 
@@ -244,13 +246,7 @@ def _free_rigid_motions(V: fem.FunctionSpace, fixed: np.ndarray) -> Array:
     d = V.dofmap.index_map_bs
     n = V.dofmap.index_map.size_local
     x = V.tabulate_dof_coordinates()[:n, :d]
-    turns = list(combinations(range(d), 2))
-    motions = np.zeros((d + len(turns), n, d))
-    for axis in range(d):
-        motions[axis, :, axis] = 1.0
-    for turn, (i, j) in zip(motions[d:], turns, strict=True):
-        turn[:, i] = -x[:, j]
-        turn[:, j] = x[:, i]
+    motions = kinematics("space" if d == 3 else "strain").rigid_motions(x)
     return np.where(fixed[:n], 0.0, motions)
 
 
