@@ -105,6 +105,8 @@ class LargeStrain(Material):
 
     def under(self, kinematics: Kinematics) -> LargeStrain:
         """The inner material in a problem of these ``kinematics``, at large strain."""
+        if kinematics.dimension == 3:
+            raise ValueError("large strain in space cannot be solved yet")
         return replace(self, inner=self.inner.under(kinematics))
 
     def state(self, n: int) -> State:

@@ -18,9 +18,9 @@ class PointFields(NamedTuple):
 
     - ``cells`` ``(n,)``: local numbers
     - ``coordinates`` ``(n, q, d)``
-    - ``weight`` ``(n, q)``: area of a plane, volume of a ring
-    - ``stress`` ``(n, q, 4)``: Cauchy's
-    - ``plastic_strain`` ``(n, q, 4)``
+    - ``weight`` ``(n, q)``: area of a plane, volume of a ring or in space
+    - ``stress`` ``(n, q, n_stress)``: Cauchy's
+    - ``plastic_strain`` ``(n, q, n_stress)``
     - ``peeq`` ``(n, q)``
     - ``material``, and ``state``: its history at these ``n q`` points
     """
@@ -41,10 +41,10 @@ class BodyPoints:
 
     - ``cells`` ``(n,)``: local numbers
     - ``point`` ``(n, q, d)``: coordinates
-    - ``weight`` ``(n, q)``: area of a plane, volume of a ring
+    - ``weight`` ``(n, q)``: area of a plane, volume of a ring or in space
     - ``elastic`` ``(k, k)``: the elastic tangent
     - ``strain`` ``(n q, k)``: at the last update; a displacement gradient at large strain
-    - ``stress`` ``(n q, 4)``: at the last update; nominal ``(n q, k)`` at large strain
+    - ``stress`` ``(n q, n_stress)``: at the last update; nominal ``(n q, k)`` at large strain
     - ``flows`` ``(n,)``: whether a point of the cell has left its elastic tangent
     """
 
@@ -65,7 +65,7 @@ class BodyPoints:
             self.elastic = kinematics.small.T @ self.elastic @ kinematics.small
         self._working = slice(None) if large else list(kinematics.working)
         self.strain: Array = np.zeros((self.weight.size, self.measure.k))
-        self.stress: Array = np.zeros((self.weight.size, 4))
+        self.stress: Array = np.zeros((self.weight.size, kinematics.n_stress))
         self.flows: np.ndarray = np.zeros(len(cells), dtype=bool)
 
     @property

@@ -253,7 +253,8 @@ def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:
         raise ValueError("elastic_tangent of a material must be symmetric")
     if material.yields:
         return
-    probe = 1e-3 * np.array([[3.0, -1.0, 4.0, 2.0], [-20.0, 5.0, 7.0, 10.0]])[:, working]
+    strains = [[3.0, -1.0, 4.0, 2.0, -3.0, 1.0], [-20.0, 5.0, 7.0, 10.0, 8.0, -6.0]]
+    probe = 1e-3 * np.array(strains)[:, working]
     expected = probe @ C
     found = material.update(probe, material.state(2))[0][:, working]
     if np.abs(found - expected).max() > 1e-9 * np.abs(expected).max():

@@ -11,7 +11,7 @@ from dolfinx import fem
 
 from archord.geometry.basis import Array, cell_basis
 from archord.geometry.strain import PointStrain
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import SPACE, Kinematics
 
 
 class Distortion(NamedTuple):
@@ -43,8 +43,9 @@ class DistortionMeter:
     def __call__(self, u: Array) -> Distortion:
         """The distortion of this rank's cells at the nodal displacements ``u`` ``(n_nodes, d)``."""
         worst = Distortion()
+        distortion = _in_space if self.kinematics.dimension == 3 else _in_plane
         for tag in self.cells:
-            worst = worst.joined(_distortion(tag, self._gradient(tag)(u)))
+            worst = worst.joined(distortion(tag, self._gradient(tag)(u)))
         return worst
 
     def _gradient(self, tag: int) -> PointStrain:
@@ -59,9 +60,9 @@ class DistortionMeter:
         return self._gradients[tag]
 
 
-def _distortion(tag: int, gradient: Array) -> Distortion:
-    """The distortion at displacement gradients ``(n, 1 + corners, k)``, whose hoop strain, if there
-    is one, comes behind the four in the plane."""
+def _in_plane(tag: int, gradient: Array) -> Distortion:
+    """The distortion in a plane or around an axis at displacement gradients ``(n, 1 + corners,
+    k)``, whose hoop strain, if there is one, comes behind the four in the plane."""
     xx, yy, xy, yx = np.moveaxis(gradient[..., :4], -1, 0)
     hoop = gradient[..., 4:]
     inside_out = ((1 + xx) * (1 + yy) <= xy * yx) | (hoop <= -1).any(axis=-1)
@@ -72,5 +73,23 @@ def _distortion(tag: int, gradient: Array) -> Distortion:
         strain=float(principal[:, 0].max(initial=0.0)),
         tag=tag,
         angle=float(turned[:, 0].max(initial=0.0)),
+        inside_out=int(inside_out.any(axis=1).sum()),
+    )
+
+
+def _in_space(tag: int, gradient: Array) -> Distortion:
+    """The distortion in space at displacement gradients ``(n, 1 + corners, 9)``."""
+    H = np.zeros((*gradient.shape[:2], 3, 3))
+    for k, (component, derivative) in enumerate(SPACE.terms):
+        H[..., component, derivative] = gradient[..., k]
+    at_middle = H[:, 0]
+    transposed = np.swapaxes(at_middle, 1, 2)
+    principal = np.linalg.eigvalsh((at_middle + transposed) / 2)
+    turned = np.linalg.norm(at_middle - transposed, axis=(1, 2)) / np.sqrt(8)
+    inside_out = np.linalg.det(np.eye(3) + H) <= 0
+    return Distortion(
+        strain=float(np.abs(principal).max(initial=0.0)),
+        tag=tag,
+        angle=float(turned.max(initial=0.0)),
         inside_out=int(inside_out.any(axis=1).sum()),
     )

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.materials.kinematics import PLANE_STRAIN, SPACE, Kinematics, kinematics
+from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
 from archord.materials.named import named_material
 from archord.report.errors import InputError, in_sentences
 from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean
@@ -27,7 +27,7 @@ __all__ = ["Body", "Coupling", "DeadLoad", "Dirichlet", "Drive", "Guess", "Inter
 __all__ += ["Mean", "Problem", "Rigid", "Support"]
 
 Parts = Sequence[Any]
-_PLANES = ("plane strain", "plane stress", "axisymmetric")
+_KINEMATICS = ("plane strain", "plane stress", "axisymmetric", "space")
 _PARTS = {
     "bodies": (Body,),
     "interactions": (Interaction,),
@@ -66,10 +66,10 @@ class Problem:
         Output steps of each stage of the path: one number for all stages, or a number for each.
     fit_steps : int
         Output steps of the stage before, in which interferences arise.
-    kinematics : {"plane strain", "plane stress", "axisymmetric"}
+    kinematics : {"plane strain", "plane stress", "axisymmetric", "space"}
         The kinematics of strain: how displacement becomes strain, in all bodies. Axisymmetric
-        problems have the coordinates x = r and y = z, and forces of the whole ring. The kinematics
-        of an `Interaction` are of contact.
+        problems have the coordinates x = r and y = z, and forces of the whole ring. Problems in
+        space have no contact yet. The kinematics of an `Interaction` are of contact.
     thickness : float
         The thickness; forces and energies are per unit thickness without it.
     strain : {"small", "large"}
@@ -164,6 +164,7 @@ class Problem:
         object.__setattr__(self, "kinematics", kinematics)
         if kinematics.is_plane and kinematics.thickness != 1:
             object.__setattr__(self, "thickness", kinematics.thickness)
+        self._require_fitting_mesh()
         bodies = [replace(body, material=self._live(body)) for body in self.bodies]
         object.__setattr__(self, "bodies", bodies)
         for kind in _DIFFERENT:
@@ -175,6 +176,17 @@ class Problem:
                 load.check()
         if not self.is_stated:
             self._require_drives()
+
+    def _require_fitting_mesh(self) -> None:
+        """Raise `InputError` for a mesh of other kinematics, and for contact in space."""
+        d = self.kinematics.dimension
+        if d == 3 and self.interactions:
+            raise InputError("archord.Problem: contact in space cannot be solved yet.")
+        if isinstance(self.mesh, TaggedMesh) and self.mesh.dimension != d:
+            cells = self.mesh.mesh.basix_cell().name
+            words = next(word for word in _KINEMATICS if self.kinematics.name in word.split())
+            said = f'kinematics = "{words}" do not fit a mesh whose cells are of the kind {cells}'
+            raise InputError(f"archord.Problem: {said}.")
 
     def _require_drives(self) -> None:
         """Raise ValueError for drives that are missing, idle, or used in two ways."""
@@ -328,12 +340,9 @@ def _require_parts(kind: str, given: Any, classes: tuple[type, ...]) -> None:
 
 def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
     """The kinematics of this name, with the ``thickness``. Raises `InputError`."""
-    if given in ("space", SPACE):
-        said = "problems in space cannot be solved yet; give them in a plane"
-        raise InputError(f"archord.Problem: {said}.")
     if not isinstance(given, Kinematics):
-        if given not in _PLANES:
-            known = ", ".join(f'"{name}"' for name in _PLANES)
+        if given not in _KINEMATICS:
+            known = ", ".join(f'"{name}"' for name in _KINEMATICS)
             raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
         given = kinematics(given.removeprefix("plane "))
     if thickness is None:

@@ -7,6 +7,8 @@ problem of each contact cell is solved, with its curved geometry and its elastic
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from archord.geometry.basis import Array
@@ -22,21 +24,22 @@ def trace_constants(
     outward: Array,
 ) -> tuple[Array, Array]:
     """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its
-    cell``, any ``v``; and the same of the shear. Unit: stress / length.
+    cell``, any ``v``; and the same of the shear, whose components in space count together. Unit:
+    stress / length.
 
-    Strains come with the weights ``(n, q)`` of their points; ``outward`` ``(n, q, 2)`` are the
+    Strains come with the weights ``(n, q)`` of their points; ``outward`` ``(n, q, d)`` are the
     normals on the facet.
     """
     strain, weight = in_cell
     B = strain.matrix()
     energy = np.einsum("nq,nqia,ij,nqjb->nab", weight, B, moduli, B, optimize=True)
 
-    force = kinematics.traction(outward)  # (n, q, 2, k)
-    force_x = force[..., 0, :]
-    force_y = force[..., 1, :]
-    n_x = outward[..., 0, None]
-    n_y = outward[..., 1, None]
-    of_strain = np.stack([n_x * force_x + n_y * force_y, n_x * force_y - n_y * force_x])
+    force = np.moveaxis(kinematics.traction(outward), 2, 0)  # (d, n, q, k)
+    n = np.moveaxis(outward, -1, 0)[..., None]
+    axes = range(kinematics.dimension)
+    normal = sum(n[i] * force[i] for i in axes)
+    shears = [n[i] * force[j] - n[j] * force[i] for i, j in combinations(axes, 2)]
+    of_strain = np.stack([normal, *shears])
     strain, weight = on_facet
     of_nodes = np.einsum("inqk,nqka->inqa", of_strain @ moduli, strain.matrix())
     traces = np.einsum("nq,inqa,inqb->inab", weight, of_nodes, of_nodes)
@@ -44,5 +47,6 @@ def trace_constants(
     value, vector = np.linalg.eigh(energy)
     rigid = kinematics.n_rigid
     scaled = vector[..., rigid:] / np.sqrt(value[:, None, rigid:])
+    traces = np.stack([traces[0], traces[1:].sum(axis=0)])
     of_normal, of_shear = np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ traces @ scaled)[..., -1]
     return of_normal, of_shear

@@ -1,0 +1,182 @@
+"""Bodies in space: closed forms of a stretched box, plane strain, turned axes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dolfinx.mesh import CellType, create_rectangle, locate_entities_boundary, meshtags
+from scipy.optimize import brentq
+
+import archord
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.materials.elasticity import von_mises
+from archord.materials.material import Material
+from archord.solver.conditions import Dirichlet
+from archord.solver.path.stepping import StepRules
+from archord.solver.path.system import System
+from archord.solver.problem import Body, Interaction, Problem
+from tests.materials.test_space import ASKEW
+from tests.solver.space import KINDS, MATERIALS, NU, E, box, every_material
+
+SIZE = (1.0, 2.0, 1.5)
+
+
+def held(*axes: int) -> list[Dirichlet]:
+    """Sides at the beginning of these axes, which do not move along them."""
+    return [Dirichlet(f"{'xyz'[axis]}0", f"{'xyz'[axis]}0", axis) for axis in axes]
+
+
+def pulled(mesh: TaggedMesh, material: Material, supports, kinematics="space") -> System:
+    """The problem of the body "box" on these ``supports``, moved by the load factor in two
+    steps."""
+    bodies = [Body("box", material)]
+    problem = Problem(mesh, bodies, supports=supports, kinematics=kinematics, tolerance=1e-12)
+    system = System(problem)
+    system.solve([0.3, 1.0], StepRules(minimum=1.0))
+    return system
+
+
+def strength(material: Material, peeq: float) -> float:
+    """The stress in tension at a ``peeq``, with linear back stresses."""
+    back = sum(modulus for modulus, _ in getattr(material, "back_stresses", ()))
+    return float(material.hardening.stress(np.array(peeq)) + back * peeq)
+
+
+@pytest.mark.mpi
+@KINDS
+@every_material
+def test_tension_of_a_box(material, kind, comm):
+    """Of a stress s at the PEEQ p the strain is s/E + p along it, and -nu s/E - p/2 across; the
+    work is stored or dissipated."""
+    strain = 0.01
+    supports = [*held(0, 1, 2), Dirichlet("pull", "y1", 1, strain * SIZE[1])]
+    system = pulled(box(comm, (2, 2, 1), SIZE, kind), material, supports)
+    peeq = 0.0
+    if material.yields:
+        peeq = brentq(lambda p: strength(material, p) / E + p - strain, 0, strain, xtol=1e-16)
+    stress = E * (strain - peeq)
+    across = -NU * stress / E - peeq / 2
+    area = SIZE[0] * SIZE[2]
+    volume = area * SIZE[1]
+    reaction = system.reaction("pull")
+    np.testing.assert_allclose(reaction, [0, stress * area, 0], rtol=0, atol=1e-9 * stress)
+    displacement, force = system.driven()
+    assert displacement * force == pytest.approx(stress * area * strain * SIZE[1], rel=1e-9)
+    u = system.equilibrium.displacement()
+    x = system.V.tabulate_dof_coordinates()
+    np.testing.assert_allclose(u, x * [across, strain, across], rtol=0, atol=1e-12)
+    for part in system.bulk.at_points(u):
+        expected = np.broadcast_to([0, stress, 0, 0, 0, 0], part.stress.shape)
+        np.testing.assert_allclose(part.stress, expected, rtol=0, atol=1e-8 * stress)
+        assert part.weight.sum() <= volume * (1 + 1e-12)
+    assert system.peeq() == pytest.approx((peeq, peeq * volume), abs=1e-12)
+    assert system.energies()[0] == pytest.approx(stress**2 / (2 * E) * volume, rel=1e-9)
+    assert (system.energies()[1] > 0) == material.yields
+    assert system.force_balance() < 1e-9
+    assert system.distortion().strain == pytest.approx(strain)
+    assert system.distortion().inside_out == 0
+
+
+def rectangle(comm, cells, size) -> TaggedMesh:
+    """The body "box" of quadrilaterals from the origin, with its sides."""
+    mesh = create_rectangle(comm, [np.zeros(2), np.array(size)], cells, CellType.quadrilateral)
+    index_map = mesh.topology.index_map(2)
+    every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    sides = [
+        locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at))
+        for at in (0, size[0])
+    ]
+    facets = np.concatenate(sides)
+    tags = np.repeat(np.array([1, 2], dtype=np.int32), [len(side) for side in sides])
+    order = np.argsort(facets)
+    of_facets = meshtags(mesh, 1, facets[order], tags[order])
+    of_cells = meshtags(mesh, 2, every, np.ones_like(every))
+    return TaggedMesh(mesh, of_cells, of_facets, {"box": (1,)}, {"x0": (1,), "x1": (2,)})
+
+
+@pytest.mark.mpi
+@every_material
+def test_a_layer_between_held_faces_is_plane_strain(material, comm):
+    """A cantilever of hexahedra and of quadrilaterals: they have the same displacements, stresses
+    and forces."""
+    bent = [Dirichlet("tip", "x1", 1, 0.02), Dirichlet("tip", "x1", 0)]
+    clamped = [Dirichlet("root", "x0", 0), Dirichlet("root", "x0", 1)]
+    flat = [Dirichlet("faces", side, 2) for side in ("z0", "z1")]
+    depth = 0.4
+    plane = pulled(rectangle(comm, (4, 2), (2.0, 1.0)), material, clamped + bent, "plane strain")
+    mesh = box(comm, (4, 2, 1), (2.0, 1.0, depth), CellType.hexahedron)
+    layer = pulled(mesh, material, clamped + bent + flat)
+    expected = depth * plane.reaction("tip")
+    found = layer.reaction("tip")
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found[:2], expected, rtol=0, atol=1e-10 * size)
+    assert np.array(layer.peeq()) == pytest.approx(np.array(plane.peeq()) * [1, depth], rel=1e-9)
+    u = layer.equilibrium.displacement()
+    assert np.abs(u[:, 2]).max(initial=0) < 1e-12
+    largest = [
+        max(comm.allgather(max(float(von_mises(part.stress).max(initial=0.0)) for part in parts)))
+        for parts in (
+            list(layer.bulk.at_points(u)),
+            list(plane.bulk.at_points(plane.equilibrium.displacement())),
+        )
+    ]
+    assert largest[0] == pytest.approx(largest[1], rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["elastic", "linear", "back stress"])
+def test_tetrahedra_between_held_faces_have_the_stress_of_plane_strain(name, comm):
+    """In tension beyond yield, with the stress out of the plane."""
+    material = MATERIALS[name]
+    strain = 0.01
+    supports = [*held(0, 1, 2), Dirichlet("back", "z1", 2), Dirichlet("pull", "y1", 1, 2 * strain)]
+    system = pulled(box(comm, (1, 2, 1), SIZE), material, supports)
+    state = material.state(1)
+    for at in (0.3 * strain, strain):
+
+        def transverse(across, at=at, state=state):
+            return material.update(np.array([[across, at, 0.0]]), state)
+
+        across = brentq(lambda e: transverse(e)[0][0, 0], -strain, 0, xtol=1e-18)
+        stress, _, state = transverse(across)
+    for part in system.bulk.at_points(system.equilibrium.displacement()):
+        found = part.stress.reshape(-1, 6)
+        expected = np.broadcast_to([*stress[0], 0.0, 0.0], found.shape)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * stress.max())
+
+
+@pytest.mark.parametrize("name", ["elastic", "Voce"])
+def test_a_turned_body_has_turned_forces(name, comm):
+    """By 37 degrees about (1, 2, 3); PEEQ is the same."""
+    move = np.array([0.004, 0.01, -0.006])
+    systems = []
+    for Q in (np.eye(3), ASKEW):
+        mesh = box(comm, (2, 2, 1), SIZE)
+        mesh.mesh.geometry.x[:] = mesh.mesh.geometry.x @ Q.T
+        fixed = [Dirichlet("root", "y0", axis) for axis in range(3)]
+        moved = [Dirichlet("end", "y1", axis, float((Q @ move)[axis])) for axis in range(3)]
+        systems.append(pulled(mesh, MATERIALS[name], fixed + moved))
+    straight, askew = systems
+    force = straight.reaction("end")
+    largest = np.abs(force).max()
+    np.testing.assert_allclose(askew.reaction("end"), ASKEW @ force, rtol=0, atol=1e-9 * largest)
+    assert askew.peeq() == pytest.approx(straight.peeq(), rel=1e-9)
+    assert askew.energies() == pytest.approx(straight.energies(), rel=1e-9)
+    assert askew.distortion().strain == pytest.approx(straight.distortion().strain, rel=1e-9)
+    assert askew.distortion().angle == pytest.approx(straight.distortion().angle, rel=1e-9)
+
+
+def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
+    """Contact, large strain, and a mesh of another dimension."""
+    bodies = [Body("box", MATERIALS["elastic"])]
+    with pytest.raises(archord.InputError, match=r'"plane strain" do not fit .* kind tetrahedron'):
+        Problem(box(comm), bodies)
+    with pytest.raises(archord.InputError, match=r'"space" do not fit .* kind quadrilateral'):
+        Problem(rectangle(comm, (1, 1), (1.0, 1.0)), bodies, kinematics="space")
+    contact = Interaction("contact", ("x0", "x1"))
+    with pytest.raises(archord.InputError, match="contact in space cannot be solved yet"):
+        Problem(box(comm), bodies, [contact], kinematics="space")
+    large = [Body("box", archord.LargeStrain(MATERIALS["elastic"]))]
+    with pytest.raises(archord.InputError, match='body "box": large strain in space cannot be'):
+        Problem(box(comm), large, kinematics="space")
+    with pytest.raises(archord.InputError, match=r"thickness = 2: .* bodies in space are drawn"):
+        Problem(box(comm), bodies, kinematics="space", thickness=2.0)
