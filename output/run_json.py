@@ -148,6 +148,7 @@ class Report:
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
             "factorisations": factorisations + before.get("factorisations", 0),
+            "krylov_iterations": sum(s.get("krylov_iterations", 0) for s in self.content["steps"]),
             "residual_evaluations": evaluations + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.steps),
         }

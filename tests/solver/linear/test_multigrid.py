@@ -16,7 +16,11 @@ from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose
 from archord.solver.linear import multigrid as module
 from archord.solver.linear.multigrid import Multigrid, forcing_term
+from archord.solver.path.stepping import march
+from archord.solver.path.system import System
+from archord.solver.problem import Body, Dirichlet, Problem
 from tests.solver.solving import solve
+from tests.solver.space import MATERIALS, box
 
 FORCE = {"displacement": None, "relative_force": 0.01}
 LAME = 0.3 / (1.3 * 0.4), 1 / 2.6  # of E = 1, nu = 0.3
@@ -165,3 +169,21 @@ def test_newtons_method_needs_hardly_more_iterations(scene, by, monkeypatch):
     before = sum(step.iterations for step in usual.steps)
     assert sum(step.iterations for step in found.steps) <= 1.1 * before + 1
     assert found.steps[-1].work == pytest.approx(usual.steps[-1].work, rel=1e-8)
+
+
+def test_a_body_in_space_yields_in_hardly_more_iterations(monkeypatch):
+    def solved() -> tuple[int, float]:
+        pull = [Dirichlet(side, side, axis) for side in ("z0", "z1") for axis in (0, 1)]
+        pull += [Dirichlet("z0", "z0", 2), Dirichlet("z1", "z1", 2, 0.006)]
+        mesh = box(MPI.COMM_SELF, (6, 6, 6))
+        bodies = [Body("box", MATERIALS["linear"])]
+        system = System(Problem(mesh, bodies, supports=pull, kinematics="space"))
+        counts = []
+        march(system.load_path(), [0.5, 1.0], attempted=lambda load, n: counts.append(n))
+        return sum(counts), system.reaction("z1")[2]
+
+    iterations, force = solved()
+    monkeypatch.setattr(choose, "LEFT_OUT", {"multigrid"})
+    usual, expected = solved()
+    assert iterations <= usual + 1
+    assert force == pytest.approx(expected, rel=1e-8)
