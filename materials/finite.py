@@ -9,8 +9,9 @@ logarithm. J2 materials yield by Cauchy's von Mises stress: their yield stress t
 elasticity alone changes, is Kirchhoff's. Back stresses are Kirchhoff's.
 
 Gradients ``(n, k)`` of the displacement and nominal stresses have the components of the kinematics:
-``[xx, yy, xy, yx]``, P_xy a force along x on a face that was normal to y, and around an axis ``[rr,
-zz, rz, zr, tt]``. In plane stress forces are per undeformed thickness, and the thickness follows.
+in a plane ``[xx, yy, xy, yx]``, P_xy a force along x on a face that was normal to y, around an axis
+``[rr, zz, rz, zr, tt]``, and in space ``[xx, yy, zz, xy, yx, yz, zy, zx, xz]``. In plane stress
+forces are per undeformed thickness, and the thickness follows.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
+from archord.materials.elasticity import TRACE
 from archord.materials.hardening import Scaled
 from archord.materials.j2 import J2Material
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import SPACE, Kinematics
 from archord.materials.material import Array, Material, State
 from archord.materials.return_map import PlasticState
+from archord.materials.spatial_logarithm import SpatialLogarithm
 
 _NEAR = 0.05  # relative distance of eigenvalues below which divided differences are series
 _RATIO = [1 / (k + 1) if k % 2 == 0 else 0.0 for k in range(15)]  # artanh(x)/x
@@ -60,7 +63,8 @@ class LargeStrain(Material):
     Attributes
     ----------
     finite : bool
-        True: it gets displacement gradients, in a plane ``[xx, yy, xy, yx]``.
+        True: it gets displacement gradients, in a plane ``[xx, yy, xy, yx]``, in space ``[xx, yy,
+        zz, xy, yx, yz, zy, zx, xz]``.
 
     Examples
     --------
@@ -105,8 +109,6 @@ class LargeStrain(Material):
 
     def under(self, kinematics: Kinematics) -> LargeStrain:
         """The inner material in a problem of these ``kinematics``, at large strain."""
-        if kinematics.dimension == 3:
-            raise ValueError("large strain in space cannot be solved yet")
         return replace(self, inner=self.inner.under(kinematics))
 
     def state(self, n: int) -> State:
@@ -128,7 +130,7 @@ class LargeStrain(Material):
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """Nominal stress ``(n, k)``, its derivative ``(n, k, k)`` and the new state at displacement
         gradients ``(n, k)``; not a number at points that are turned inside out."""
-        logarithm = Logarithm(strain)
+        logarithm = _logarithm(strain)
         T, moduli, new = self._logarithmic(logarithm.strain, state)
         stress, tangent = logarithm.nominal(T[:, logarithm.working], moduli)
         return stress, tangent, new
@@ -155,7 +157,7 @@ class LargeStrain(Material):
             return stress, moduli, new
         # a yield stress that grows makes the deviator grow with it
         mean = stress[:, :3].mean(axis=1)
-        deviator = stress - mean[:, None] * [1.0, 1.0, 1.0, 0.0] - m.centre(new)
+        deviator = stress - mean[:, None] * TRACE[: stress.shape[1]] - m.centre(new)
         slope = scaled.hardening.slope(new.peeq) + m.stiffening(state, new)
         _, mu = m.lame
         grown = m.flows(state, new) / (1 + slope / (3 * mu))
@@ -163,28 +165,28 @@ class LargeStrain(Material):
         return stress, moduli + by_volume[:, :, None] * normal, new
 
     def energy(self, stress: Array) -> Array:
-        """Elastic energy density ``(n,)`` of stresses ``(n, 4)`` that do work on logarithmic
+        """Elastic energy density ``(n,)`` of stresses ``(n, n_stress)`` that do work on logarithmic
         strains."""
         return self.inner.energy(stress)
 
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
         """Elastic energy per undeformed volume ``(n,)`` after an update to the gradients ``strain``
         and ``state``."""
-        return self.energy(self._logarithmic(Logarithm(strain).strain, state)[0])
+        return self.energy(self._logarithmic(_logarithm(strain).strain, state)[0])
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
-        """Cauchy's stress ``(n, 4)`` after an update to the gradients ``strain``, the nominal
-        ``stress`` and ``state``."""
-        T = self._logarithmic(Logarithm(strain).strain, state)[0]
+        """Cauchy's stress ``(n, n_stress)`` after an update to the gradients ``strain``, the
+        nominal ``stress`` and ``state``."""
+        logarithm = _logarithm(strain)
+        T = self._logarithmic(logarithm.strain, state)[0]
         J = np.exp((1 - 2 * self.inner.nu) / self.inner.E * T[:, :3].sum(axis=1))
-        F_xx, F_xy, F_yx, F_yy = _deformation(strain)
-        P_xx, P_yy, P_xy, P_yx = stress.T[:4]
-        kirchhoff = np.empty((len(strain), 4))
-        kirchhoff[:, 0] = P_xx * F_xx + P_xy * F_xy
-        kirchhoff[:, 1] = P_yx * F_yx + P_yy * F_yy
-        kirchhoff[:, 2] = T[:, 2]
-        kirchhoff[:, 3] = P_xx * F_yx + P_xy * F_yy
-        return kirchhoff / J[:, None]
+        return logarithm.kirchhoff(stress, T) / J[:, None]
+
+
+def _logarithm(gradient: Array) -> Logarithm | SpatialLogarithm:
+    """The logarithmic strain of displacement gradients ``(n, k)``, which are nine in space."""
+    in_space = gradient.shape[1] == len(SPACE.gradient)
+    return SpatialLogarithm(gradient) if in_space else Logarithm(gradient)
 
 
 def _deformation(gradient: Array) -> tuple[Array, Array, Array, Array]:
@@ -204,7 +206,8 @@ def _table(rows: list[list[Array]]) -> Array:
 
 
 class Logarithm:
-    """The logarithmic strain of displacement gradients ``(n, k_gradient)``, with its derivatives.
+    """The logarithmic strain of displacement gradients ``(n, k_gradient)`` in a plane or around an
+    axis, with its derivatives.
 
     With ``g = 1/2 ln`` of the eigenvalues of C and its divided differences, ``dE_ij = g[i, j]
     dC_ij`` and ``d2E_ij = sum over k of g[i, k, j] (A_ik B_kj + B_ik A_kj)`` along the principal
@@ -283,6 +286,18 @@ class Logarithm:
         if T.shape[1] == 3:
             return stress, tangent
         return self._with_hoop(stress, tangent, slope, T, moduli)
+
+    def kirchhoff(self, stress: Array, T: Array) -> Array:
+        """Kirchhoff's stress ``(n, 4)`` of nominal ones ``(n, k_gradient)``; ``T`` ``(n, 4)`` has
+        its component out of the plane."""
+        F_xx, F_xy, F_yx, F_yy = _deformation(self._gradient)
+        P_xx, P_yy, P_xy, P_yx = stress.T[:4]
+        kirchhoff = np.empty((len(stress), 4))
+        kirchhoff[:, 0] = P_xx * F_xx + P_xy * F_xy
+        kirchhoff[:, 1] = P_yx * F_yx + P_yy * F_yy
+        kirchhoff[:, 2] = T[:, 2]
+        kirchhoff[:, 3] = P_xx * F_yx + P_xy * F_yy
+        return kirchhoff
 
     def _metric(self) -> Array:
         """``dC/dF`` ``(n, 3, 4)``, of [C_xx, C_yy, C_xy]."""

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import Elastic
+from archord.materials.finite import LargeStrain
 from archord.materials.hardening import LinearHardening, VoceHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
@@ -27,6 +28,10 @@ MATERIALS = {
 }
 KINDS = pytest.mark.parametrize(
     "kind", [CellType.tetrahedron, CellType.hexahedron], ids=["tetrahedra", "hexahedra"]
+)
+LARGE = {f"{name}, large": LargeStrain(material) for name, material in MATERIALS.items()}
+small_and_large = pytest.mark.parametrize(
+    "material", [*MATERIALS.values(), *LARGE.values()], ids=[*MATERIALS, *LARGE]
 )
 every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
 SIDES = ("x0", "x1", "y0", "y1", "z0", "z1")  # of a box, by the axis, at its beginning and its end
