@@ -55,6 +55,11 @@ class Projection:
     found: npt.NDArray[np.bool_]  # (m,)
     nodes: Index  # (m, k) the nodes that carry y
 
+    @property
+    def slopes(self) -> tuple[Array, ...]:
+        """The derivatives of the shape functions by each coordinate of the facet, here one."""
+        return (self.slope,)
+
     @classmethod
     def empty(cls, m: int, k: int) -> Projection:
         """Of ``m`` points, to be filled in."""

@@ -51,6 +51,11 @@ class PatchProjection:
     found: npt.NDArray[np.bool_]  # (m,)
     nodes: Index  # (m, k) the nodes that carry y
 
+    @property
+    def slopes(self) -> tuple[Array, ...]:
+        """The derivatives of the shape functions by each coordinate of the facet."""
+        return self.slope[:, 0], self.slope[:, 1]
+
     @classmethod
     def empty(cls, m: int, k: int) -> PatchProjection:
         """Of ``m`` points, to be filled in."""

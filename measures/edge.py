@@ -114,7 +114,7 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
     u, found = system.equilibrium.displacement(), {}
     for name, side in system.sides.items():
         pair = system.contact.pair_of(side)
-        if pair is None:  # it is not integrated
+        if pair is None or side.in_space:  # it is not integrated, or no edge
             continue
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
         local = np.zeros((side.n_facets, side.weight.shape[1], 10))
@@ -128,7 +128,7 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)
         weight, raw, gap, slip, *of_friction = np.moveaxis(whole[..., :6], -1, 0)
-        coordinates, X, s = whole[..., 6:8], whole[..., 8:], side.curve.arc_length(side.curve_xi)
+        coordinates, X, s = whole[..., 6:8], whole[..., 8:], side.arc_length(side.curve_xi)
         more = (
             dict(zip(OF_FRICTION, of_friction, strict=True)) if system.contact.has_friction else {}
         )

@@ -66,12 +66,12 @@ class Contact:
             interface.fit(fitted)
 
     def begin(self, u: Array) -> None:
-        """Begin a step at this rank's accepted displacements ``u`` ``(n, 2)``. Collective."""
+        """Begin a step at this rank's accepted displacements ``u`` ``(n, d)``. Collective."""
         for pair in self._slipping:
             pair.begin(u, pair.opposite.curve_displacement(u))
 
     def touch_down(self, u: Array, levels: Array) -> None:
-        """Count slip from this rank's displacements ``u`` ``(n, 2)`` and the drives' ``levels``
+        """Count slip from this rank's displacements ``u`` ``(n, d)`` and the drives' ``levels``
         ``(d,)`` on, at points that did not touch in the accepted state: bodies came there without
         load. Collective."""
         self.move(levels)
@@ -90,7 +90,7 @@ class Contact:
                 pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
     def evaluate(self, u: Array, dt: float = 0.0, *, reach: bool = True) -> bool:
-        """Openings, tractions and trial history at this rank's displacements ``u`` ``(n, 2)``, in a
+        """Openings, tractions and trial history at this rank's displacements ``u`` ``(n, d)``, in a
         step of the length ``dt``.
 
         Returns whether the pattern had to grow; without ``reach`` it does not. Collective; raises
@@ -113,7 +113,7 @@ class Contact:
         return any(grew)
 
     def anticipate(self, u: Array, levels: Array) -> bool:
-        """Let points go over to the branches to which increments ``u`` ``(n, 2)``, and increments
+        """Let points go over to the branches to which increments ``u`` ``(n, d)``, and increments
         of the drives' ``levels`` ``(d,)``, would bring them, to first order, with the partners they
         have; returns whether any does.
 
@@ -134,7 +134,7 @@ class Contact:
         return float(2 * np.finfo(float).eps * np.sqrt(squares))
 
     def add_force(self, force: Array) -> None:
-        """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)``
+        """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, d)``
         of owned nodes."""
         on = {
             id(surface): np.zeros((len(surface.curve_dofs), force.shape[1]))
@@ -160,13 +160,14 @@ class Contact:
         return next(i for i in self.interfaces if name in ("", i.interaction.name))
 
     def resultant(self, name: str = "") -> Array:
-        """Force ``(2,)`` on the second surface of the interaction ``name``, the first without, over
+        """Force ``(d,)`` on the second surface of the interaction ``name``, the first without, over
         all ranks."""
         return self.interface(name).resultant()
 
-    def moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of this force about ``point``, anticlockwise, over all ranks."""
-        return self.interface(name).moment(np.asarray(point))
+    def moments(self, name: str, point: Sequence[float]) -> Array:
+        """Moments ``(t,)`` of this force about ``point``, over all ranks: anticlockwise in a plane,
+        about x, y and z in space, none around an axis."""
+        return self.interface(name).moments(np.asarray(point))
 
     def largest_pressed(self) -> float:
         """Sum of the sizes of the points' forces of the interaction where it is largest, over all

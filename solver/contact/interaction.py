@@ -26,7 +26,6 @@ from archord.report.errors import in_sentences, require_of
 from archord.solver.contact.law import ContactLaw
 from archord.solver.contact.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
-from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.surface import RigidSurface, Surface
 
 Vector = tuple[float, float]
@@ -150,12 +149,14 @@ class Interface:
         integrated = self._integrated()
         if integrated[0].kinematics.has_hoop:
             self._require_on_axis()
+        if integrated[0].in_space:
+            self._refuse_in_space(law)
         self.pairs: list[Pair] = []
         with on_every_rank(integrated[0].comm):
             for own, share in zip(integrated, _shares(integrated), strict=True):
                 opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
                 if isinstance(opposite, Surface):
-                    own.place_points(*segment_rule(own.curve, opposite.curve))
+                    own.face(opposite)
                 self.pairs.append(Pair(own, opposite, law, share, moves=moves))
         if not moves and isinstance(surfaces[1], Surface) and integrated[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
@@ -186,6 +187,15 @@ class Interface:
             if any(rate[0] for rate in given.moved_by().values()):
                 raise ValueError(f"{sphere} must move along the axis")
 
+    def _refuse_in_space(self, law: ContactLaw) -> None:
+        """Raise ValueError for what contact in space cannot do yet."""
+        if isinstance(self.surfaces[0], RigidSurface):
+            raise ValueError(
+                f"{self.interaction.name!r} has a rigid disc, which problems in space cannot have"
+            )
+        if law.counts_slip or law.has_friction:
+            raise ValueError(f"{self.interaction.name!r} has friction, which space lacks yet")
+
     def fit(self, part: float) -> None:
         """Let interferences be there by this ``part``."""
         overlap_left = self.interaction.overlap * (1 - part)
@@ -193,17 +203,22 @@ class Interface:
             pair.offset = overlap_left - self.interaction.interference * part
 
     def resultant(self) -> Array:
-        """Contact force ``(2,)`` on the second surface, over all ranks."""
+        """Contact force ``(d,)`` on the second surface, over all ranks."""
         return self._summed([pair.forces for pair in self.pairs])
 
-    def moment(self, point: Array) -> float:
-        """Moment of this force about ``point`` ``(2,)``, anticlockwise, over all ranks."""
+    def moments(self, point: Array) -> Array:
+        """Moments ``(t,)`` of this force about ``point`` ``(d,)``, over all ranks, in the turns of
+        the kinematics: anticlockwise in a plane."""
+        turns = self.pairs[0].surface.kinematics.turns
         moments = []
         for pair in self.pairs:
             arm = pair.place - point
             force = pair.forces
-            moments.append(arm[:, :1] * force[:, 1:] - arm[:, 1:] * force[:, :1])
-        return float(self._summed(moments)[0])
+            of_points = np.zeros((len(arm), len(turns)))
+            for turn, (i, j) in enumerate(turns):
+                of_points[:, turn] = arm[:, i] * force[:, j] - arm[:, j] * force[:, i]
+            moments.append(of_points)
+        return self._summed(moments)
 
     def pressed(self) -> float:
         """Sum of the sizes of the contact forces of all points, over all ranks: what a fit presses

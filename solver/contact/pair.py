@@ -10,6 +10,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.materials.material import Points
+from archord.solver.contact.frame import askew, frames
 from archord.solver.contact.law import OPEN, STICK, Branches, ContactLaw
 from archord.solver.contact.slip import SlipOrigin
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -28,15 +29,15 @@ class Pair:
     Arrays, of the last evaluation, in the order in which they come to be; ``d`` is the number of
     components of a displacement; the frame's normal is first:
 
-    gamma : (m, 2) Nitsche's stiffness of gap and slip
+    gamma : (m, d) Nitsche's stiffness of gap and slip, of the slips along both tangents in space
     stress_vector : (m, d) force of the own body's stress per area
     moduli : (m, d, g) its derivative by the displacement gradient
     projection : the partners
     separation : (m, d) from the partner to the point
-    frame : (m, d, d) normal and tangent of the opposite surface
+    frame : (m, d, d) normal and tangents of the opposite surface
     opening : (m, d) gap and slip
-    strayed : (m, 2) motion of the step along the normal, and growth of the opposite's part of the
-        slip along its facet; zero unless slip is counted
+    strayed : (m, 1 + (d - 1)^2) motion of the step along the normal, and growth of the opposite's
+        part of the slips along each coordinate of its facet; zero unless slip is counted
     trial : (m, d) Nitsche's traction of points that touch and stick
     traction : (m, d) answer of the law
     by_trial, by_opening : (m, d, d) derivatives of the traction; the second is None without
@@ -66,10 +67,12 @@ class Pair:
         x = _flat(surface.point)
         at_rest = np.zeros_like(opposite.curve.X)
         self._outward = _flat(surface.outward)
+        self._towards = askew(self._outward)
         self.projection = opposite.curve.closest_point(x, self._outward, at_rest)
         self.separation = x - self.projection.point
         self.points = Points(law, len(x))
-        self.strayed: Array = np.zeros((len(x), 2))
+        n_tangents = x.shape[1] - 1
+        self.strayed: Array = np.zeros((len(x), 1 + n_tangents**2))
         self.traction: Array = np.zeros_like(x)
         self.branch: Branches = np.full(len(x), OPEN)
         self.active: np.ndarray = np.zeros(len(x), dtype=bool)
@@ -80,7 +83,8 @@ class Pair:
         """Let Nitsche's gamma be ``factor`` times the share and the trace constants of the point's
         cell."""
         surface = self.surface
-        of_facets = np.stack([surface.gamma, surface.gamma_shear], axis=1)
+        n_tangents = self.traction.shape[1] - 1
+        of_facets = np.stack([surface.gamma, *[surface.gamma_shear] * n_tangents], axis=1)
         points_per_facet = surface.weight.shape[1]
         self.gamma = factor * self.share * np.repeat(of_facets, points_per_facet, axis=0)
 
@@ -107,8 +111,7 @@ class Pair:
         self.moduli = own.moduli
         if self.moves:
             self._find_partners(own.displacement, motion)
-        normal = self.projection.normal
-        self.frame = np.stack([normal, _turned(normal)], axis=1)
+        self.frame = frames(self.projection.normal, self._towards)
         self.opening = self._opening()
         self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
         if self.counts_slip:  # what has no partner has no history
@@ -139,15 +142,25 @@ class Pair:
             partners = self.projection
             own, nodes = self._origin.moved(*self._moved, partners)
             of_step = own - np.einsum("ma,mai->mi", partners.shape, nodes)
-            rise, slip = self._in_frame(of_step).T
-            opening[:, 1] = slip
-            drift = self._in_frame(np.einsum("ma,mai->mi", partners.slope, nodes))[:, 1]
-            self.strayed = np.stack([rise, drift], axis=1)
+            moved = self._in_frame(of_step)
+            opening[:, 1:] = moved[:, 1:]
+            drifts = [
+                self._in_frame(np.einsum("ma,mai->mi", slope, nodes))[:, 1:]
+                for slope in partners.slopes
+            ]
+            self.strayed = np.concatenate([moved[:, :1], *drifts], axis=1)
         return opening
 
     def _in_frame(self, vectors: Array) -> Array:
-        """Components ``(m, d)`` along normal and tangent."""
+        """Components ``(m, d)`` along normal and tangents."""
         return np.einsum("mij,mj->mi", self.frame, vectors)
+
+    @property
+    def spin(self) -> Array:
+        """Turn ``(m,)`` of the frame in space about its normal as the normal turns towards the
+        second tangent."""
+        along_normal, along_tangent, _ = self._in_frame(self._towards).T
+        return -along_normal / along_tangent
 
     def _moved_apart(self) -> Array:
         """Displacement ``(m, d)`` of the points relative to their partners."""
@@ -199,8 +212,10 @@ class Pair:
     @property
     def slip(self) -> Array:
         """Displacement ``(n, q)`` of the points relative to the opposite surface, along the tangent
-        of the frame."""
-        return self._by_facets((self.frame[:, 1] * self._moved_apart()).sum(axis=1))
+        of the frame; its size in space."""
+        apart = self._moved_apart()
+        slips = [(tangent * apart).sum(axis=1) for tangent in self.frame.swapaxes(0, 1)[1:]]
+        return self._by_facets(_along_surface(slips))
 
     @property
     def pressure(self) -> Array:
@@ -209,8 +224,9 @@ class Pair:
 
     @property
     def shear(self) -> Array:
-        """Shear ``(n, q)`` on the own surface, positive along the tangent of the frame."""
-        return self._by_facets(self.traction[:, 1])
+        """Shear ``(n, q)`` on the own surface, positive along the tangent of the frame; its size in
+        space."""
+        return self._by_facets(_along_surface(list(self.traction[:, 1:].T)))
 
     def _by_facets(self, values: Array) -> Array:
         """Values ``(m,)`` of the points as those ``(n, q)`` of facets."""
@@ -267,6 +283,6 @@ def _flat(at_facets: Array) -> Array:
     return at_facets.reshape(-1, at_facets.shape[-1])
 
 
-def _turned(normal: Array) -> Array:
-    """The tangents ``(m, 2)``: normals turned by a quarter anticlockwise."""
-    return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+def _along_surface(components: list[Array]) -> Array:
+    """The one component ``(m,)`` along a curve, or the size of two along a surface in space."""
+    return components[0] if len(components) == 1 else np.hypot(*components)

@@ -6,6 +6,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import Projection
+from archord.geometry.patches import PatchProjection
 
 
 class SlipOrigin:
@@ -31,7 +32,9 @@ class SlipOrigin:
         self.own_down = own
         self.opposite_down = opposite
 
-    def moved(self, own: Array, opposite: Array, partners: Projection) -> tuple[Array, Array]:
+    def moved(
+        self, own: Array, opposite: Array, partners: Projection | PatchProjection
+    ) -> tuple[Array, Array]:
         """How far points ``(m, d)`` and the nodes of their partners ``(m, k, d)`` have moved since
         slip counts."""
         nodes = partners.nodes

@@ -1,8 +1,8 @@
-"""One side of a contact: the facets of a body's contact edge on this rank, and the whole edge as a
-curve on every rank.
+"""One side of a contact: the facets of a body's contact surface on this rank, and the whole surface
+on every rank: as a curve in a plane, as patches in space.
 
-The curve is small (it grows with the square root of the mesh), so every rank holds all of it and
-exchanges its displacement; each rank integrates the facets of the cells it owns.
+The whole surface is small beside the mesh (a curve grows with its square root), so every rank holds
+all of it and exchanges its displacement; each rank integrates the facets of the cells it owns.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dolfinx import fem
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis
 from archord.geometry.curve import Curve, RigidCircle, in_pieces
+from archord.geometry.patches import Patches
 from archord.geometry.strain import PointStrain
 from archord.kernels.compat import cell_degree
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
@@ -23,8 +24,11 @@ from archord.materials.material import Material, Points
 from archord.solver.contact.facets import (
     BoundaryFacets,
     boundary_facets,
+    facet_kind,
     refuse_all_but_a_boundary,
+    refuse_branches,
 )
+from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.trace_inequality import trace_constants
 
 # a direction in which no two nodes of a closed piece should be equally far
@@ -45,23 +49,23 @@ class Surface:
 
     Collective; raises ValueError for facets that are no boundary of the body, or branch.
 
-    Of the whole curve, on every rank:
+    Of the whole surface, on every rank:
 
     curve_dofs : (nodes,) global block dofs of its nodes
-    curve : the curve, of ``n_facets`` facets
-    curve_xi : (n_facets, q) places of the points on the facets
+    curve : the curve, or the patches, of ``n_facets`` facets
+    curve_xi : (n_facets, q) places of the points on the facets, in space (n_facets, q, 2)
 
-    Of this rank's ``n`` facets, in the order in which the curve runs:
+    Of this rank's ``n`` facets, in the order of the whole surface:
 
-    facet : (n,) their numbers along the curve
+    facet : (n,) their numbers in the whole surface
     cells : (n,) the cells behind them
     cell_dofs, cell_global : (n, a) block dofs of the cells' nodes on this rank, and of all ranks
-    trace : (n, k) nodes along the facet within the cell
+    trace : (n, k) nodes on the facet within the cell
     point, outward : (n, q, d) the points, and the outward normals there
-    weight : (n, q) measure of the curved edge, around an axis of the whole ring
+    weight : (n, q) measure of the curved facet, around an axis of the whole ring
     shape : (n, q, a) the cell's basis at the points
     trace_shape : (n, q, k) the same of the nodes on the facet
-    derivative : (n, q, a, 2 or 3) the basis by the axes, and around an axis over the radius
+    derivative : (n, q, a, m) the basis by the axes, and around an axis over the radius
     terms : (g, 2) see `Kinematics.terms`
     small_strain : the small strain at the points
     gamma, gamma_shear : (n,) constants of the trace inequality, in stress per length
@@ -86,12 +90,18 @@ class Surface:
         is_owned = (owned >= 0) & (owned < V.dofmap.index_map.size_local)
         self._owned = np.flatnonzero(is_owned)
         self._owned_local = owned[self._owned]
-        xi, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
-        self.place_points(np.tile(xi[:, 0], (self.n_facets, 1)), np.tile(w, (self.n_facets, 1)))
+        xi, w = _facet_rule(facet_kind(V.mesh.basix_cell()))
+        xi = xi[:, 0] if xi.shape[1] == 1 else xi
+        self.place_points(np.stack([xi] * self.n_facets), np.tile(w, (self.n_facets, 1)))
         self.gamma, self.gamma_shear = self._trace_constants()
 
+    @property
+    def in_space(self) -> bool:
+        """Whether facets are patches in space, not pieces of a curve."""
+        return self.kinematics.dimension == 3
+
     def _join(self, found: BoundaryFacets) -> None:
-        """Join the facets of all ranks to the curve, and order this rank's along it."""
+        """Join the facets of all ranks, and order this rank's as in the whole."""
         index_map = self.V.dofmap.index_map
         cell_dofs = self.V.dofmap.list[found.cells]
         cell_global = index_map.local_to_global(cell_dofs.ravel()).reshape(cell_dofs.shape)
@@ -101,13 +111,12 @@ class Surface:
 
         of_ranks = self.comm.allgather((own_dofs, own_x, found.within))
         dofs, x, within = (np.concatenate(parts) for parts in zip(*of_ranks, strict=True))
-        refuse_all_but_a_boundary(self.name, dofs, x, within)
-        order = in_pieces(dofs[:, 0], dofs[:, -1], x[:, 0] @ _ASKEW)
+        order = self._ordered(dofs, x, within)
         unique, first, node = np.unique(dofs[order], return_index=True, return_inverse=True)
-        along = np.argsort(first)  # the nodes in the order in which the curve runs
+        along = np.argsort(first)  # the nodes in the order of the facets
         self.curve_dofs = unique[along]
         X = x[order].reshape(-1, x.shape[-1])[first[along]]
-        self.curve = Curve(X, self.degree, np.argsort(along)[node].reshape(dofs.shape))
+        self.curve = self._shape(X, np.argsort(along)[node].reshape(dofs.shape))
         self.n_facets = len(order)
 
         start = sum(len(part[0]) for part in of_ranks[: self.comm.rank])
@@ -120,31 +129,64 @@ class Surface:
         self.cell_global = cell_global[sort]
         self.trace = found.trace.astype(np.int32)
         self._nodes = nodes[self.cell_dofs]
-        self._ends = found.ends
+        self._origin = found.origin
+        self._axes = found.axes
+
+    def _ordered(self, dofs: np.ndarray, x: Array, within: np.ndarray) -> np.ndarray:
+        """The order of the facets with nodes ``dofs`` ``(n, k)`` at ``x`` ``(n, k, d)``: along
+        curves, as they come in space. Raises ValueError for what is no boundary."""
+        kind = facet_kind(self.V.mesh.basix_cell())
+        if kind != basix.CellType.interval:
+            n_corners = len(basix.geometry(kind))
+            middle = x[:, :n_corners].mean(axis=1)
+            refuse_all_but_a_boundary(self.name, dofs[:, :n_corners], middle, within)
+            return np.arange(len(dofs))
+        refuse_all_but_a_boundary(self.name, dofs[:, [0, -1]], x.mean(axis=1), within)
+        refuse_branches(self.name, dofs, x)
+        return in_pieces(dofs[:, 0], dofs[:, -1], x[:, 0] @ _ASKEW)
+
+    def _shape(self, X: Array, connectivity: np.ndarray) -> Curve | Patches:
+        """The whole surface. Raises ValueError if it branches."""
+        kind = facet_kind(self.V.mesh.basix_cell())
+        if kind == basix.CellType.interval:
+            return Curve(X, self.degree, connectivity)
+        try:
+            return Patches(X, connectivity, kind, self.degree)
+        except ValueError as error:
+            raise ValueError(f"the contact surface {self.name!r} branches: {error}") from None
 
     def facet_lengths(self) -> Array:
-        """Arc length ``(n_facets,)`` of every facet, over all ranks."""
-        return np.diff(self.curve.arc_length(np.array([0.0, 1.0])))[:, 0]
+        """Size ``(n_facets,)`` of every facet, over all ranks: its arc length, or the root of its
+        area."""
+        if isinstance(self.curve, Patches):
+            return np.sqrt(self.curve.areas())
+        return np.diff(self.arc_length(np.array([0.0, 1.0])))[:, 0]
+
+    def face(self, opposite: Surface) -> None:
+        """Place the points so that forces go to the ``opposite`` surface exactly: in a plane; no
+        history. In space they stay where they are."""
+        if isinstance(self.curve, Curve) and isinstance(opposite.curve, Curve):
+            self.place_points(*segment_rule(self.curve, opposite.curve))
 
     def place_points(self, xi: Array, w: Array) -> None:
-        """Put the contact points at ``xi`` ``(n_facets, q)`` in (0, 1) with weights ``w``; no
-        history."""
+        """Put the contact points at ``xi`` ``(n_facets, q)`` in (0, 1), in space ``(n_facets, q,
+        2)``, with weights ``w``; no history."""
         self.curve_xi = xi
-        start = self._ends[:, 0]
-        along = self._ends[:, 1] - start
-        X = start[:, None] + xi[self.facet][..., None] * along[:, None]
+        on_facet = xi[self.facet].reshape(*w[self.facet].shape, self._axes.shape[1])
+        X = self._origin[:, None] + on_facet @ self._axes
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
-        tangent = np.einsum("nqij,nj->nqi", basis.jacobian, along)
-        length = np.linalg.norm(tangent, axis=-1)
-        self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
+        axes = self._axes.swapaxes(0, 1)
+        normal = _normal([np.einsum("nqij,nj->nqi", basis.jacobian, axis) for axis in axes])
+        length = np.linalg.norm(normal, axis=-1)
+        self.outward = normal / length[..., None]
         self.shape = np.ascontiguousarray(basis.shape)
         self.point = basis.point
         if cell_degree(self.V.mesh) > self.degree:
             self.point = self.shape @ self._nodes  # on the curve
         self.weight = length * w[self.facet] * self.kinematics.measure(self.point)
         n, q = self.weight.shape
-        on_facet = np.broadcast_to(self.trace[:, None, :], (n, q, self.trace.shape[1]))
-        self.trace_shape = np.take_along_axis(self.shape, on_facet, axis=2)
+        nodes = np.broadcast_to(self.trace[:, None, :], (n, q, self.trace.shape[1]))
+        self.trace_shape = np.take_along_axis(self.shape, nodes, axis=2)
 
         self.points = Points(self.material, n * q)
         large = self.material.finite
@@ -153,7 +195,7 @@ class Surface:
         self.derivative = self._strain.derivative
         self.terms = np.array(self.kinematics.terms, dtype=np.int32)
         outward = self.outward.reshape(n * q, self.outward.shape[-1])
-        # takes a stress to the force on the edge
+        # takes a stress to the force on the facet
         self._cut = np.ascontiguousarray(self.kinematics.traction(outward, large=large))
 
     def _trace_constants(self) -> tuple[Array, Array]:
@@ -167,14 +209,22 @@ class Surface:
         moduli = self.material.elastic_tangent
         return trace_constants(moduli, self.kinematics, in_cell, on_facet, self.outward)
 
+    def arc_length(self, xi: Array) -> Array:
+        """Length ``(n_facets, m)`` along the curve, see `Curve.arc_length`. Raises ValueError in
+        space."""
+        if isinstance(self.curve, Patches):
+            raise ValueError("surfaces in space have no arc length")
+        return self.curve.arc_length(xi)
+
     def arc_position(self, origin: Array) -> Array:
         """Arc length ``(n_facets, q)`` of all points, from the end of an open curve nearest to
         ``origin`` ``(2,)``; on closed curves, and on each of several pieces, from where it
         starts."""
-        s = self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
+        s = self.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
         ends = self.curve.connectivity[[0, -1], [0, -1]]
         first, last = np.linalg.norm(self.curve.X[ends] - origin, axis=1)
-        if last < first and self.curve.n_pieces == 1:
+        one_piece = isinstance(self.curve, Curve) and self.curve.n_pieces == 1
+        if last < first and one_piece:
             return s[-1, -1] - s[:, :-1]
         return s[:, :-1]
 
@@ -214,6 +264,24 @@ class Surface:
     def displacement(self, u: Array) -> Array:
         """Own displacement ``(m, d)`` at the contact points."""
         return (self.shape @ u[self.cell_dofs]).reshape(-1, u.shape[1])
+
+
+def _facet_rule(kind: basix.CellType) -> tuple[Array, Array]:
+    """Points ``(q, d - 1)`` and weights ``(q,)`` on the reference facet: exact for the pressures of
+    quadratic displacements on quadratic shape functions, and two degrees more."""
+    degree = 2 * CONTACT_POINTS - 1
+    if kind == basix.CellType.triangle:
+        degree -= 1
+    return basix.make_quadrature(kind, degree)
+
+
+def _normal(tangents: list[Array]) -> Array:
+    """Outward normals ``(..., d)`` of the length of the one of the ``tangents``, or in space of the
+    area that both span."""
+    if len(tangents) == 1:
+        tangent = tangents[0]
+        return np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1)
+    return np.cross(tangents[0], tangents[1])
 
 
 class RigidSurface:

@@ -1,7 +1,7 @@
 """The consistent tangent of the contact forces as blocks of a matrix, each place once.
 
-The kernel in C (contact_tangent.c has the formulas) adds up points in slots found once for facets
-that may meet.
+The kernels in C add up points in slots found once for facets that may meet. Their formulas are in
+contact_tangent.c for curves in a plane, in space_tangent.c for surfaces in space.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.geometry.patches import PatchProjection
 from archord.kernels.compiled import library, pointer, structure
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import Surface
 
-_SOURCE = Path(__file__).with_name("contact_tangent.c")
+_SOURCES = {  # by the dimension
+    2: Path(__file__).with_name("contact_tangent.c"),
+    3: Path(__file__).with_name("space_tangent.c"),
+}
 
 
 class ContactTangent:
@@ -31,7 +35,7 @@ class ContactTangent:
     def __init__(self, reaches: list[Reach], block_size: int) -> None:
         self._reaches = reaches
         self._block_size = block_size
-        self._kernels = library(_SOURCE)
+        self._kernels = library(_SOURCES[block_size])
         meetings = [reach.meetings() for reach in reaches]
         size = 1 + max((m.largest_dof() for m in meetings), default=0)
         places = [m.rows[:, :, None] * size + m.columns[:, None, :] for m in meetings]
@@ -68,7 +72,7 @@ def point_rates(pair: Pair, u: Array, levels: Array) -> tuple[Array, Array]:
     trial = np.empty_like(pair.trial)
     opening = np.empty_like(pair.trial)
     arrays = own, partner, trial, opening
-    library(_SOURCE).point_rates(_side(pair), *map(pointer, arrays))
+    library(_SOURCES[u.shape[1]]).point_rates(_side(pair), *map(pointer, arrays))
     return trial, opening
 
 
@@ -104,9 +108,16 @@ def _side(pair: Pair) -> Any:
         "strayed": pair.strayed,
         "partner_shape": partners.shape,
         "partner_slope": partners.slope,
-        "normal": partners.normal,
         "tangent": partners.tangent,
         "bend": partners.bend,
-        "slides": partners.slides,
     }
-    return structure(_SOURCE, "Side", members)
+    if isinstance(partners, PatchProjection):
+        members |= {
+            "frame": pair.frame,
+            "spin": pair.spin,
+            "opening": pair.opening,
+            "along": partners.along,
+        }
+    else:
+        members |= {"normal": partners.normal, "slides": partners.slides}
+    return structure(_SOURCES[pair.trial.shape[1]], "Side", members)

@@ -57,11 +57,15 @@ class Totals:
         return self.problem.whole * self.contact.resultant(name)
 
     def contact_moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of that force about ``point``, anticlockwise, on the deformed whole; 0 around an
-        axis."""
-        if self.problem.kinematics.has_hoop:
-            return 0.0
-        return self.problem.whole * self.contact.moment(name, point)
+        """Moment of that force about z at ``point``, anticlockwise, on the deformed whole; 0 around
+        an axis."""
+        moments = self.contact_moments(name, point)
+        return float(moments[-1]) if len(moments) else 0.0
+
+    def contact_moments(self, name: str, point: Sequence[float]) -> Array:
+        """Moments ``(t,)`` of that force at ``point``, on the deformed whole: about z in a plane,
+        about x, y and z in space, none around an axis."""
+        return self.problem.whole * self.contact.moments(name, point)
 
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces ``(l,)`` of the ``drive_names`` on the whole, which do the work:

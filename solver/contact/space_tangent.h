@@ -1,0 +1,41 @@
+#include <stdint.h>
+
+/* One side of a contact in space: n facets of q points, with the arrays of the points in contiguous memory. a nodes a
+ * cell, k of them on the facet (trace), o nodes of the opposite facet, m derivatives of a basis function, g components of
+ * the displacement gradient. */
+typedef struct {
+    int32_t moves, n, q, a, k, o, m, g;
+    const double *shape;      /* (n, q, a) basis functions of the own cell */
+    const double *derivative; /* (n, q, a, m) */
+    const int32_t *terms;     /* (g, 2) a component of the displacement and its derivative */
+    const int32_t *trace;     /* (n, k) nodes of the facet within the cell */
+    const double *weight;     /* (n, q) */
+    double share;
+    const double *gamma;         /* (n q, 3) of gap and slips */
+    const uint8_t *active;       /* (n q) the point carries something */
+    const double *traction;      /* (n q, 3) pressure and shears */
+    const double *by_trial;      /* (n q, 3, 3) derivative of the traction by the trial traction */
+    int32_t has_by_opening;
+    const double *by_opening;    /* (n q, 3, 3) derivative by gap and slips, if there is one */
+    const double *stress_vector; /* (n q, 3) of the own body's stress */
+    const double *moduli;        /* (n q, 3, g) its derivative by the displacement gradient */
+    const double *opening;       /* (n q, 3) gap and slips */
+    const double *separation;    /* (n q, 3) from the partner to the point */
+    const double *strayed;       /* (n q, 5) see Pair */
+    const double *frame;         /* (n q, 3, 3) normal and tangents */
+    const double *spin;          /* (n q) turn of the frame about the normal as that turns to the first tangent's side */
+    const double *partner_shape; /* (n q, o) basis functions of the opposite facet at the partner */
+    const double *partner_slope; /* (n q, 2, o) their derivatives along the facet */
+    const double *tangent;       /* (n q, 2, 3) of the opposite facet */
+    const double *bend;          /* (n q, 2, 2) */
+    const double *along;         /* (n q, 2, 2) how the partner moves, see PatchProjection */
+} Side;
+
+/* Add the derivative of the residual to values. Nodes are counted: own cell's (columns) or own facet's (rows) first, then
+ * the opposite's. slots (pairs, k + o, a + o) are the places of the blocks of a facet and an opposite facet, place (n q)
+ * the pairs that the points belong to. */
+void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, double *values);
+
+/* What displacements of the own cells' nodes (n, a, 3) and of the opposite's nodes at each point (n q, o, 3) add to the
+ * trial tractions and to gap and slips, (n q, 3) each. */
+void point_rates(const Side *s, const double *own, const double *opposite, double *trial, double *opening);

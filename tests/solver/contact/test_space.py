@@ -1,0 +1,132 @@
+"""Contact of bodies in space: its surfaces, forces and tangent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from dolfinx.mesh import CellType
+from mpi4py import MPI
+
+from tests.solver.contact.blocks_in_space import Box, E, bodies, flat
+
+DEPTH = 0.02
+every_kind = pytest.mark.parametrize(
+    "kind", [CellType.tetrahedron, CellType.hexahedron], ids=lambda kind: kind.name
+)
+LAWS = {
+    "frictionless": {},
+    "reference": {"kinematics": "reference"},
+    "tied": {"law": "tied"},
+    "one side": {"integrated": "upper"},
+}
+every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+INSET = Box((0.13, 0.08, 0.0), (0.87, 0.91, 1.0), (2, 2, 1))
+
+
+def bump(x):
+    """Bends the plane z = 0 into a saddle, and both blocks with it."""
+    bent = x.copy()
+    bent[:, 2] += 0.15 * (x[:, 0] - 0.4) ** 2 - 0.1 * (x[:, 1] - 0.6) ** 2
+    return bent
+
+
+def mirrored(x):
+    return bump(x) * [-1.0, 1.0, 1.0]
+
+
+def matrix(contact, n):
+    """The tangent over all dofs."""
+    rows = contact.tangent.rows
+    columns = contact.tangent.columns
+    values = contact.tangent.blocks()
+    K = sp.csr_matrix((n, n))
+    for i, j in np.ndindex(3, 3):
+        K += sp.coo_matrix((values[:, i, j], (3 * rows + i, 3 * columns + j)), shape=(n, n)).tocsr()
+    return K
+
+
+def pressed(blocks, depth, seed=2):
+    """The upper block moved down, both bent a little, and noise at every node."""
+    x = blocks.V.tabulate_dof_coordinates()
+    u = (
+        0.2
+        * depth
+        * np.stack(
+            [np.sin(2 * x[:, 0] + x[:, 1]), np.cos(x[:, 2] - x[:, 0]), np.sin(3 * x[:, 1])], axis=1
+        )
+    )
+    u[blocks.nodes("upper"), 2] -= depth
+    return u + 0.005 * depth * np.random.default_rng(seed).normal(size=u.shape)
+
+
+def contact_force(contact, u):
+    contact.evaluate(u)
+    force = np.zeros_like(u)
+    contact.add_force(force)
+    return force
+
+
+def branches(contact):
+    """What decides on the branch of every point."""
+    flags = []
+    for pair in contact.pairs:
+        P = pair.projection
+        flags += [pair.active, P.found, P.facet, (P.along != 0).reshape(len(P.facet), -1).sum(1)]
+    return np.concatenate(flags)
+
+
+@every_kind
+def test_points_lie_on_the_surface(kind):
+    """Points, normals and areas of the surface z = bump, whichever way cells are oriented."""
+    for bend, sign in ((flat, 1), (bump, 1), (mirrored, -1)):
+        blocks = bodies(MPI.COMM_SELF, kind=kind, bend=bend)
+        contact = blocks.contact()
+        for surface, up in zip(contact.surfaces, (-1, 1), strict=True):
+            x = surface.point.reshape(-1, 3) * [sign, 1, 1]
+            z = 0 if bend is flat else bump(x * [1, 1, 0])[:, 2]
+            np.testing.assert_allclose(x[:, 2], z, atol=1e-8)  # as nodes are rounded
+            area = surface.weight.sum()
+            assert area == pytest.approx(surface.curve.areas().sum(), rel=1e-6)
+            outward = surface.outward.reshape(-1, 3)
+            np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1.0, rtol=1e-14)
+            assert (up * outward[:, 2] > 0.8).all()
+            if bend is flat:
+                assert area == pytest.approx(1.0, rel=1e-13)
+                of_facet = 1 / surface.n_facets
+                np.testing.assert_allclose(surface.facet_lengths() ** 2, of_facet, rtol=1e-8)
+
+
+@every_kind
+@every_law
+def test_tangent_is_the_derivative_of_the_force(kind, law):
+    """Central differences in random directions, on curved surfaces that do not match."""
+    blocks = bodies(MPI.COMM_SELF, upper=INSET, kind=kind, bend=bump)
+    contact = blocks.contact(**law)
+    u = pressed(blocks, DEPTH)
+    force = contact_force(contact, u)
+    assert np.abs(force).max() > 1e-3 * DEPTH * E
+    K = matrix(contact, u.size)
+    at = branches(contact)
+    rng = np.random.default_rng(7)
+    h = 1e-6 * DEPTH
+    for _ in range(3):
+        d = rng.normal(size=u.shape)
+        sides = []
+        for sign in (1, -1):
+            sides.append(contact_force(contact, u + sign * h * d).ravel())
+            np.testing.assert_array_equal(branches(contact), at)
+        difference = (sides[0] - sides[1]) / (2 * h)
+        assert np.linalg.norm(K @ d.ravel() - difference) < 1e-6 * np.linalg.norm(difference)
+
+
+@every_law
+def test_forces_of_both_surfaces_balance(law):
+    """Their sum is zero, and the resultant is what acts on the second surface."""
+    blocks = bodies(MPI.COMM_SELF, upper=INSET, bend=bump)
+    contact = blocks.contact(**law)
+    force = contact_force(contact, pressed(blocks, DEPTH))
+    np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-14)
+    on_lower = -force[blocks.nodes("lower")].sum(axis=0)
+    np.testing.assert_allclose(contact.resultant(), on_lower, atol=1e-14)
+    assert on_lower[2] < -0.1 * DEPTH
