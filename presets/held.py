@@ -45,7 +45,7 @@ def check(problem: Problem) -> list[str]:
     failure = ""
     doubts = list[str]()
     if whole is not None:
-        around_axis = not problem.kinematics.is_plane
+        around_axis = problem.kinematics.has_hoop
         faults = chain(
             beyond_axis(whole.x) if around_axis else [],
             _shared(problem, whole),
@@ -198,7 +198,7 @@ def _loose(
                 held[owner[names[0]]].append((middle, direction))
             else:
                 links.append((owner[names[0]], owner[names[1]], middle, direction))
-    possible = PLANE if problem.kinematics.is_plane else AXISYMMETRIC
+    possible = AXISYMMETRIC if problem.kinematics.has_hoop else PLANE
     moves = free_motions(held, links, possible)
     touching = set(owner.values())
     for body, motions in moves.items():

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 import archord
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import von_mises
+from archord.materials.j2 import J2Material
 from archord.materials.material import Material
 from archord.solver.conditions import Dirichlet
 from archord.solver.path.stepping import StepRules
@@ -182,6 +183,40 @@ def test_a_turned_body_has_turned_forces(material, comm):
     assert askew.energies() == pytest.approx(straight.energies(), rel=1e-9)
     assert askew.distortion().strain == pytest.approx(straight.distortion().strain, rel=1e-9)
     assert askew.distortion().angle == pytest.approx(straight.distortion().angle, rel=1e-9)
+
+
+class Spring(Material):
+    """A material of one's own: every component of the stress is a modulus times its strain."""
+
+    E = 10.0
+    yields = True
+
+    @property
+    def elastic_tangent(self):
+        return self.E * np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+
+    def update(self, strain, state):
+        tangent = np.tile(self.elastic_tangent, (len(strain), 1, 1))
+        return strain @ self.elastic_tangent, tangent, state
+
+    def energy(self, stress):
+        return (stress**2 @ [0.5, 0.5, 0.5, 1.0, 1.0, 1.0]) / self.E
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_a_material_of_ones_own_has_six_components(large, comm):
+    """Without contraction across; at large strain of the logarithm of the stretch."""
+    spring = archord.LargeStrain(Spring()) if large else Spring()
+    supports = [*held(0, 1, 2), Dirichlet("pull", "z1", 2, 0.5 * SIZE[2])]
+    system = pulled(box(comm, (1, 1, 1), SIZE), spring, supports)
+    strain = np.log(1.5) if large else 0.5
+    force = Spring.E * strain / (1.5 if large else 1.0) * SIZE[0] * SIZE[1]
+    np.testing.assert_allclose(system.reaction("pull"), [0, 0, force], rtol=0, atol=1e-9 * force)
+    energy = Spring.E * strain**2 / 2 * np.prod(SIZE)
+    assert system.energies()[0] == pytest.approx(energy, rel=1e-9)
+    plane = J2Material(E, NU, "stress")
+    with pytest.raises(archord.InputError, match=r"'stress' does not fit .* are 'space'"):
+        pulled(box(comm), plane, supports)
 
 
 def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
