@@ -68,8 +68,9 @@ class Problem:
         Output steps of the stage before, in which interferences arise.
     kinematics : {"plane strain", "plane stress", "axisymmetric", "space"}
         The kinematics of strain: how displacement becomes strain, in all bodies. Axisymmetric
-        problems have the coordinates x = r and y = z, and forces of the whole ring. Problems in
-        space have no contact yet. The kinematics of an `Interaction` are of contact.
+        problems have the coordinates x = r and y = z, and forces of the whole ring. Contact in
+        space knows no friction and no rigid discs yet. The kinematics of an `Interaction` are of
+        contact.
     thickness : float
         The thickness; forces and energies are per unit thickness without it.
     strain : {"small", "large"}
@@ -178,10 +179,13 @@ class Problem:
             self._require_drives()
 
     def _require_fitting_mesh(self) -> None:
-        """Raise `InputError` for a mesh of other kinematics, and for contact in space."""
+        """Raise `InputError` for a mesh of other kinematics, and for contact that space lacks."""
         d = self.kinematics.dimension
-        if d == 3 and self.interactions:
-            raise InputError("archord.Problem: contact in space cannot be solved yet.")
+        for interaction in self.interactions:
+            lacking = interaction.lacking_in_space()
+            if d == 3 and lacking:
+                said = f'interaction "{interaction.name}" has {lacking}'
+                raise InputError(f"archord.Problem: {said}: space does not know it yet.")
         if isinstance(self.mesh, TaggedMesh) and self.mesh.dimension != d:
             cells = self.mesh.mesh.basix_cell().name
             words = next(word for word in _KINEMATICS if self.kinematics.name in word.split())

@@ -123,6 +123,13 @@ class Interaction:
         require_of(self, self.interference >= 0, "interference", "must not be negative")
         require_of(self, self.overlap >= 0, "overlap", "must not be negative")
 
+    def lacking_in_space(self) -> str:
+        """What problems in space cannot do yet of this interaction; empty if there is nothing."""
+        if not isinstance(self.surfaces[0], str):
+            return "a rigid disc"
+        law = contact_law(self.law, self.friction)
+        return "a law of slip" if law.has_friction or law.counts_slip else ""
+
 
 class Interface:
     """The ``interaction`` of two ``surfaces`` as ``pairs`` of them, one for each surface that is
@@ -149,8 +156,6 @@ class Interface:
         integrated = self._integrated()
         if integrated[0].kinematics.has_hoop:
             self._require_on_axis()
-        if integrated[0].in_space:
-            self._refuse_in_space(law)
         self.pairs: list[Pair] = []
         with on_every_rank(integrated[0].comm):
             for own, share in zip(integrated, _shares(integrated), strict=True):
@@ -186,15 +191,6 @@ class Interface:
                 raise ValueError(f"{sphere} must have its centre on the axis")
             if any(rate[0] for rate in given.moved_by().values()):
                 raise ValueError(f"{sphere} must move along the axis")
-
-    def _refuse_in_space(self, law: ContactLaw) -> None:
-        """Raise ValueError for what contact in space cannot do yet."""
-        if isinstance(self.surfaces[0], RigidSurface):
-            raise ValueError(
-                f"{self.interaction.name!r} has a rigid disc, which problems in space cannot have"
-            )
-        if law.counts_slip or law.has_friction:
-            raise ValueError(f"{self.interaction.name!r} has friction, which space lacks yet")
 
     def fit(self, part: float) -> None:
         """Let interferences be there by this ``part``."""

@@ -226,8 +226,10 @@ def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
         Problem(box(comm), bodies)
     with pytest.raises(archord.InputError, match=r'"space" do not fit .* kind quadrilateral'):
         Problem(rectangle(comm, (1, 1), (1.0, 1.0)), bodies, kinematics="space")
-    contact = Interaction("contact", ("x0", "x1"))
-    with pytest.raises(archord.InputError, match="contact in space cannot be solved yet"):
-        Problem(box(comm), bodies, [contact], kinematics="space")
+    rubbing = Interaction("joint", ("x0", "x1"), friction=0.1)
+    on_disc = Interaction("joint", (archord.RigidCircle((0.0, 0.0), 1.0), "x1"))
+    for interaction, lacking in ((rubbing, "a law of slip"), (on_disc, "a rigid disc")):
+        with pytest.raises(archord.InputError, match=f'interaction "joint" has {lacking}: space'):
+            Problem(box(comm), bodies, [interaction], kinematics="space")
     with pytest.raises(archord.InputError, match=r"thickness = 2: .* bodies in space are drawn"):
         Problem(box(comm), bodies, kinematics="space", thickness=2.0)

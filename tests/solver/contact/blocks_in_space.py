@@ -8,9 +8,17 @@ from itertools import permutations
 import basix.ufl
 import numpy as np
 from dolfinx import fem
-from dolfinx.mesh import CellType, Mesh, compute_midpoints, create_mesh, exterior_facet_indices
+from dolfinx.mesh import (
+    CellType,
+    Mesh,
+    compute_midpoints,
+    create_mesh,
+    exterior_facet_indices,
+    meshtags,
+)
 
 from archord.geometry.basis import lagrange_element
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import Elastic
 from archord.materials.kinematics import SPACE
 from archord.solver.contact.contact import Contact
@@ -75,6 +83,26 @@ class Blocks:
         surfaces = [Surface(self.V, self.facets[n], material, n, SPACE) for n in order]
         interaction = Interaction("joint", order, **options)
         return Contact(self.V, [Interface(interaction, surfaces)])
+
+
+def tagged(blocks: Blocks) -> TaggedMesh:
+    """The mesh of the blocks, with the sets "base", "lid", "left" (x = 0), "front" (y = 0)."""
+    mesh = blocks.V.mesh
+    exterior = exterior_facet_indices(mesh.topology)
+    middle = compute_midpoints(mesh, 2, exterior)
+    of_planes = {"base": (2, -1.0), "lid": (2, 1.0), "left": (0, 0.0), "front": (1, 0.0)}
+    sets = dict(blocks.facets)
+    for name, (axis, at) in of_planes.items():
+        sets[name] = exterior[np.abs(middle[:, axis] - at) < 1e-9]
+    facets = np.concatenate(list(sets.values()))
+    tags = np.repeat(np.arange(1, 1 + len(sets), dtype=np.int32), [len(f) for f in sets.values()])
+    order = np.argsort(facets)
+    of_facets = meshtags(mesh, 2, facets[order].astype(np.int32), tags[order])
+    is_upper = np.zeros(sum(map(len, blocks.cells.values())), dtype=np.int32)
+    is_upper[blocks.cells["upper"]] = 1
+    of_cells = meshtags(mesh, 3, np.arange(len(is_upper), dtype=np.int32), 1 + is_upper)
+    names = {name: (k,) for k, name in enumerate(sets, 1)}
+    return TaggedMesh(mesh, of_cells, of_facets, {"lower": (1,), "upper": (2,)}, names)
 
 
 def bodies(comm, lower=LOWER, upper=UPPER, kind=CellType.tetrahedron, bend=flat) -> Blocks:
