@@ -43,7 +43,8 @@ def principal_stresses(stress: Array) -> tuple[Array, Array]:
         rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]
         tensors = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
         return np.linalg.eigvalsh(tensors)[..., ::-1], angle
-    middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    middle = (xx + yy) / 2
+    radius = np.hypot((xx - yy) / 2, xy)
     values = np.sort(np.stack([middle + radius, middle - radius, zz], axis=-1), axis=-1)
     return values[..., ::-1], angle
 
