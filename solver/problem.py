@@ -69,8 +69,7 @@ class Problem:
     kinematics : {"plane strain", "plane stress", "axisymmetric", "space"}
         The kinematics of strain: how displacement becomes strain, in all bodies. Axisymmetric
         problems have the coordinates x = r and y = z, and forces of the whole ring. Contact in
-        space knows no friction and no rigid discs yet. The kinematics of an `Interaction` are of
-        contact.
+        space knows no rigid discs yet. The kinematics of an `Interaction` are of contact.
     thickness : float
         The thickness; forces and energies are per unit thickness without it.
     strain : {"small", "large"}

@@ -15,7 +15,9 @@ from archord.solver.contact.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLa
 class FrictionState:
     """History of ``m`` points."""
 
-    elastic_slip: Array  # (m,) gamma times it is what the shear is below the own stress's
+    elastic_slip: (
+        Array  # (m,), in space (m, 2): gamma times it is what the shear is below the own stress's
+    )
     pressure: Array  # (m,)
     dissipated: Array  # (m,) energy per area
 
@@ -129,3 +131,66 @@ class Coulomb(ContactLaw):
     def dissipation(self, state: FrictionState) -> Array:
         """Work done against friction so far per area ``(m,)``."""
         return state.dissipated
+
+    def in_space(self) -> CoulombInSpace:
+        """The law with two components of slip and shear."""
+        return CoulombInSpace(**vars(self))
+
+
+@dataclass(frozen=True)
+class CoulombInSpace(Coulomb):
+    """Coulomb's friction with two components of slip and shear: the shear is returned to the cone
+    along itself.
+
+    The elastic slip ``(m, 2)`` is kept along the tangents of the frame, which follow the normal.
+    """
+
+    def state(self, n: int) -> FrictionState:
+        """Points at rest."""
+        return FrictionState(np.zeros((n, 2)), np.zeros(n), np.zeros(n))
+
+    def respond(
+        self, opening: Array, trial: Array, gamma: Array, state: FrictionState, dt: float
+    ) -> Response:
+        """Pressure as without friction, and the shear returned to the cone."""
+        slip = opening[:, 1:]
+        shear_stiffness = gamma[:, 1:]
+        touches = ~(trial[:, 0] <= 0)
+        touched = state.pressure > 0
+        friction = np.where(touched, self.friction, 0.0) if self.held else self.friction
+
+        pressure = np.where(touches, trial[:, 0], 0.0)
+        limit = friction * pressure
+        trial_shear = trial[:, 1:] - shear_stiffness * state.elastic_slip
+        sticking = np.where(touches[:, None], trial_shear, 0.0)
+        size = np.linalg.norm(sticking, axis=1)
+        direction = sticking / np.where(size > 0, size, 1.0)[:, None]
+        slides = size > limit
+        if self.held:
+            slides &= ~touched
+        sticks = touches & ~slides
+        over = np.where(slides, size - limit, 0.0)
+        shear = sticking - over[:, None] * direction
+        slid = over[:, None] * direction / shear_stiffness
+
+        by_trial = np.zeros((len(trial), 3, 3))
+        by_trial[:, 0, 0] = touches
+        across = np.where(slides, limit / np.where(slides, size, 1.0), sticks)
+        by_trial[:, 1:, 1:] = across[:, None, None] * np.eye(2)
+        if not self.secant:
+            along = np.where(slides, across, 0.0)[:, None, None]
+            by_trial[:, 1:, 1:] -= along * direction[:, :, None] * direction[:, None]
+            by_trial[:, 1:, 0] = np.where(slides, friction, 0.0)[:, None] * direction
+
+        branch = np.where(touches, np.where(sticks, STICK, SLIDE), OPEN)
+        way = np.linalg.norm(slid, axis=1)
+        lost = 0.5 * friction * (state.pressure + pressure) * way
+        moved = state.elastic_slip + slip + slid
+        elastic_slip = np.where(touches[:, None], moved, 0.0)
+        new = FrictionState(elastic_slip, pressure, state.dissipated + lost)
+        traction = np.column_stack([pressure, shear])
+        return Response(traction, by_trial, None, branch, new)
+
+    def in_space(self) -> CoulombInSpace:
+        """The law itself."""
+        return self

@@ -127,8 +127,8 @@ class Interaction:
         """What problems in space cannot do yet of this interaction; empty if there is nothing."""
         if not isinstance(self.surfaces[0], str):
             return "a rigid disc"
-        law = contact_law(self.law, self.friction)
-        return "a law of slip" if law.has_friction or law.counts_slip else ""
+        law = contact_law(self.law, self.friction).in_space()
+        return "a law of slip for planes" if law is None else ""
 
 
 class Interface:
@@ -146,6 +146,8 @@ class Interface:
         self.interaction = interaction
         self.surfaces = list(surfaces)
         law = contact_law(interaction.law, interaction.friction)
+        if any(isinstance(surface, Surface) and surface.in_space for surface in surfaces):
+            law = law.in_space() or law
         moves = law.slides and interaction.kinematics == "current"
         self.slide = interaction.slide if moves else 0.0
         if not law.slides and (interaction.interference or interaction.overlap):

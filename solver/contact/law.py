@@ -2,9 +2,10 @@
 their partners.
 
 All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` first,
-then its tangent, which in a plane is ``n`` turned by a quarter anticlockwise. There are as many
-components ``d`` as displacements have. A traction ``(m, d)`` is a pressure, positive in
-compression, and a shear. An opening ``(m, d)`` is a gap, positive when open, and a slip.
+then its tangent, which in a plane is ``n`` turned by a quarter anticlockwise, or its two tangents
+in space. There are as many components ``d`` as displacements have. A traction ``(m, d)`` is a
+pressure, positive in compression, and a shear. An opening ``(m, d)`` is a gap, positive when open,
+and a slip.
 """
 
 from __future__ import annotations
@@ -139,7 +140,7 @@ class ContactLaw(Protocol):
         trial : (m, d) array
             Nitsche's traction of points that touch and stick: the traction of the own body's
             stress, less ``gamma`` times the opening.
-        gamma : (m, 2) array
+        gamma : (m, d) array
             Nitsche's stiffness of the gap and of the slip, in stress per length.
         state
             What `state` or an accepted answer returned.
@@ -175,6 +176,10 @@ class ContactLaw(Protocol):
         """The law itself, with a derivative that leaves no point without stiffness along the
         surface."""
         return self
+
+    def in_space(self) -> ContactLaw | None:
+        """The law with two components of slip and shear; None if a law of slip has none."""
+        return None if self.has_friction or self.counts_slip else self
 
     def dissipation(self, state: State) -> Array | float:
         """Energy dissipated so far per area ``(m,)``."""

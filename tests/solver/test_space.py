@@ -219,6 +219,12 @@ def test_a_material_of_ones_own_has_six_components(large, comm):
         pulled(box(comm), plane, supports)
 
 
+class OwnFriction(archord.ContactLaw):
+    """A law that was made for a plane."""
+
+    has_friction = True
+
+
 def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
     """Contact; and a mesh of another dimension, or a thickness, does not fit."""
     bodies = [Body("box", MATERIALS["elastic"])]
@@ -226,9 +232,9 @@ def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
         Problem(box(comm), bodies)
     with pytest.raises(archord.InputError, match=r'"space" do not fit .* kind quadrilateral'):
         Problem(rectangle(comm, (1, 1), (1.0, 1.0)), bodies, kinematics="space")
-    rubbing = Interaction("joint", ("x0", "x1"), friction=0.1)
+    rubbing = Interaction("joint", ("x0", "x1"), OwnFriction())
     on_disc = Interaction("joint", (archord.RigidCircle((0.0, 0.0), 1.0), "x1"))
-    for interaction, lacking in ((rubbing, "a law of slip"), (on_disc, "a rigid disc")):
+    for interaction, lacking in ((rubbing, "a law of slip for planes"), (on_disc, "a rigid disc")):
         with pytest.raises(archord.InputError, match=f'interaction "joint" has {lacking}: space'):
             Problem(box(comm), bodies, [interaction], kinematics="space")
     with pytest.raises(archord.InputError, match=r"thickness = 2: .* bodies in space are drawn"):

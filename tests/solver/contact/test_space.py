@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from dolfinx.mesh import CellType
 from mpi4py import MPI
 
-from archord.solver.conditions import Dirichlet
+from archord.solver.conditions import Dirichlet, Drive
+from archord.solver.contact.coulomb import Coulomb, FrictionState
 from archord.solver.contact.interaction import Interaction
+from archord.solver.contact.law import SLIDE, STICK
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Problem
 from tests.solver.contact.blocks_in_space import (
@@ -23,6 +27,7 @@ from tests.solver.contact.blocks_in_space import (
     flat,
     tagged,
 )
+from tests.solver.parts import commit
 
 DEPTH = 0.02
 every_kind = pytest.mark.parametrize(
@@ -33,6 +38,8 @@ LAWS = {
     "reference": {"kinematics": "reference"},
     "tied": {"law": "tied"},
     "one side": {"integrated": "upper"},
+    "rubbing": {"friction": 0.1},
+    "rubbing, reference": {"friction": 0.1, "kinematics": "reference"},
 }
 every_way = pytest.mark.parametrize(
     "law", [LAWS["frictionless"], LAWS["tied"]], ids=["frictionless", "tied"]
@@ -89,7 +96,7 @@ def branches(contact):
     flags = []
     for pair in contact.pairs:
         P = pair.projection
-        flags += [pair.active, P.found, P.facet, (P.along != 0).reshape(len(P.facet), -1).sum(1)]
+        flags += [pair.branch, P.found, P.facet, (P.along != 0).reshape(len(P.facet), -1).sum(1)]
     return np.concatenate(flags)
 
 
@@ -120,8 +127,15 @@ def test_tangent_is_the_derivative_of_the_force(kind, law):
     """Central differences in random directions, on curved surfaces that do not match."""
     blocks = bodies(MPI.COMM_SELF, upper=INSET, kind=kind, bend=bump)
     contact = blocks.contact(**law)
+    contact_force(contact, pressed(blocks, 0.7 * DEPTH, seed=1))
+    commit(contact)
+    contact.begin(pressed(blocks, 0.7 * DEPTH, seed=1))
     u = pressed(blocks, DEPTH)
+    u[blocks.nodes("upper"), :2] += [0.2 * DEPTH, -0.1 * DEPTH]
     force = contact_force(contact, u)
+    if "friction" in law:
+        branch = np.concatenate([pair.branch for pair in contact.pairs])
+        assert {STICK, SLIDE} <= set(branch)
     assert np.abs(force).max() > 1e-3 * DEPTH * E
     K = matrix(contact, u.size)
     at = branches(contact)
@@ -194,3 +208,68 @@ def test_blocks_that_do_not_match_carry_the_force(kind, law, comm):
         mean = (weight * pair.pressure).sum(axis=1) / weight.sum(axis=1)
         np.testing.assert_allclose(mean, pressure, rtol=0.02)
     assert -system.reaction("lid")[2] == pytest.approx(pressure, rel=3e-3)
+
+
+LAWS_OF_SLIP = {
+    "cone": Coulomb(0.3),
+    "held": Coulomb(0.3).elastic(),
+    "secant": Coulomb(0.3).by_secants(),
+    "none": Coulomb(0.3).frictionless(),
+}
+
+
+@pytest.mark.parametrize("law", LAWS_OF_SLIP.values(), ids=LAWS_OF_SLIP)
+def test_friction_along_one_direction_is_friction_in_a_plane(law):
+    """Of points open, sticking and sliding both ways, with a history, whatever the direction."""
+    rng = np.random.default_rng(4)
+    n = 200
+    state = FrictionState(*rng.uniform(-1, 1, (2, n)), np.zeros(n))
+    opening, trial = rng.uniform(-1, 1, (2, n, 2))
+    gamma = np.tile([2.0, 3.0], (n, 1))
+    wanted = law.respond(opening, trial, gamma, state, 1.0)
+    angle = rng.uniform(0, 2 * np.pi, n)
+    way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def in_space(values):
+        return np.column_stack([values[:, 0], values[:, 1:] * way])
+
+    before = replace(state, elastic_slip=state.elastic_slip[:, None] * way)
+    gamma = np.tile([2.0, 3.0, 3.0], (n, 1))
+    found = law.in_space().respond(in_space(opening), in_space(trial), gamma, before, 1.0)
+    np.testing.assert_allclose(found.traction, in_space(wanted.traction), atol=1e-15)
+    elastic_slip = wanted.state.elastic_slip[:, None] * way
+    np.testing.assert_allclose(found.state.elastic_slip, elastic_slip, atol=1e-15)
+    np.testing.assert_allclose(found.state.dissipated, wanted.state.dissipated, atol=1e-15)
+    np.testing.assert_array_equal(found.branch, np.minimum(wanted.branch, SLIDE))
+    along = np.einsum("mi,mij,mj->m", way, found.by_trial[:, 1:, 1:], way)
+    np.testing.assert_allclose(along, wanted.by_trial[:, 1, 1], atol=1e-15)
+    by_pressure = wanted.by_trial[:, 1, :1] * way
+    np.testing.assert_allclose(found.by_trial[:, 1:, 0], by_pressure, atol=1e-15)
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.0], ids=["friction", "none"])
+def test_a_block_that_slides_carries_the_friction(friction):
+    """Pressed down and then pushed askew, the shear is friction times the pressure at every point,
+    and on the lower block along the push."""
+    blocks = bodies(MPI.COMM_SELF, upper=Box(UPPER.low, UPPER.high, LOWER.cubes))
+    joint = Interaction("joint", ("upper", "lower"), friction=friction, kinematics="reference")
+    push = np.array([3.0, -4.0]) * DEPTH
+    supports = [Dirichlet(f"base {axis}", "base", axis) for axis in range(3)]
+    supports.append(Dirichlet("lid", "lid", 2, -DEPTH, "press"))
+    supports += [Dirichlet(f"push {axis}", "lid", axis, push[axis], "push") for axis in (0, 1)]
+    drives = [Drive("press", (0.0, 1.0)), Drive("push", (0.0, 0.0, 1.0))]
+    problem = Problem(
+        tagged(blocks),
+        [Body(name, IN_SPACE) for name in ("lower", "upper")],
+        [joint],
+        supports,
+        drives=drives,
+        kinematics="space",
+    )
+    system = System(problem)
+    system.solve([1.0, 1.5, 2.0])
+    for pair in system.contact.pairs:
+        np.testing.assert_allclose(pair.shear, friction * pair.pressure, atol=1e-12)
+    force = system.contact_force("joint")
+    expected = friction * -force[2] * np.array([0.6, -0.8])
+    np.testing.assert_allclose(force[:2], expected, atol=(0.01 * friction + 1e-9) * -force[2])
