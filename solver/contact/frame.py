@@ -7,24 +7,39 @@ import numpy as np
 from archord.geometry.basis import Array
 
 
-def frames(normal: Array, towards: Array) -> Array:
-    """Frames ``(m, d, d)`` of points with the unit ``normal`` ``(m, d)``, row by row.
+def plane_frames(normal: Array) -> Array:
+    """Frames ``(m, 2, 2)`` of points with the unit ``normal`` ``(m, 2)``, row by row: the tangent
+    is the normal turned by a quarter anticlockwise."""
+    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    return np.stack([normal, tangent], axis=1)
 
-    In a plane the tangent is the normal turned by a quarter anticlockwise. In space the first
-    tangent leads ``towards`` a vector ``(m, 3)`` as far as it may, and the second is the product of
-    normal and first.
-    """
-    if normal.shape[-1] == 2:
-        return np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)
-    along_normal = np.einsum("mi,mi->m", towards, normal)
-    tangent = towards - along_normal[:, None] * normal
+
+def frames_at_rest(normal: Array) -> Array:
+    """Frames ``(m, 3, 3)`` of points in space with the unit ``normal`` ``(m, 3)``: the first
+    tangent leads along the coordinate axis that is least along the normal, as far as it may."""
+    axis = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    along_normal = np.einsum("mi,mi->m", axis, normal)
+    tangent = axis - along_normal[:, None] * normal
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
     return np.stack([normal, tangent, np.cross(normal, tangent)], axis=1)
 
 
-def askew(outward: Array) -> Array:
-    """Unit vectors ``(m, d)`` at right angles to the ``outward`` normals ``(m, d)``: the way of the
-    coordinate axis along which they point least."""
-    axis = np.eye(outward.shape[1])[np.abs(outward).argmin(axis=1)]
-    across = axis - np.einsum("mi,mi->m", axis, outward)[:, None] * outward
-    return across / np.linalg.norm(across, axis=1)[:, None]
+class TurningFrames:
+    """Frames of points in space that turn from the frame ``at_rest`` ``(m, 3, 3)`` to the unit
+    ``normal`` ``(m, 3)`` on the shortest way: components along the tangents then mean the same
+    whatever tangents are chosen at rest.
+
+    A body that turns about the normal does not take the tangents with it.
+
+    frame : (m, 3, 3) normal and tangents, row by row
+    spin : (m, 2) turn of the frame about its normal, as that turns towards each tangent
+    """
+
+    def __init__(self, at_rest: Array, normal: Array) -> None:
+        along_normal = np.einsum("mij,mj->mi", at_rest, normal)
+        start, first, second = along_normal.T
+        tilt = along_normal[:, 1:] / (1 + start)[:, None]
+        halfway = at_rest[:, 0] + normal
+        tangents = at_rest[:, 1:] - tilt[:, :, None] * halfway[:, None]
+        self.frame = np.concatenate([normal[:, None], tangents], axis=1)
+        self.spin = np.stack([second, -first], axis=1) / (1 + start)[:, None]

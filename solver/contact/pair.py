@@ -10,7 +10,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.materials.material import Points
-from archord.solver.contact.frame import askew, frames
+from archord.solver.contact.frame import TurningFrames, frames_at_rest, plane_frames
 from archord.solver.contact.law import OPEN, STICK, Branches, ContactLaw
 from archord.solver.contact.slip import SlipOrigin
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -35,6 +35,7 @@ class Pair:
     projection : the partners
     separation : (m, d) from the partner to the point
     frame : (m, d, d) normal and tangents of the opposite surface
+    spin : (m, 2) of frames in space, see `TurningFrames`
     opening : (m, d) gap and slip
     strayed : (m, 1 + (d - 1)^2) motion of the step along the normal, and growth of the opposite's
         part of the slips along each coordinate of its facet; zero unless slip is counted
@@ -67,7 +68,7 @@ class Pair:
         x = _flat(surface.point)
         at_rest = np.zeros_like(opposite.curve.X)
         self._outward = _flat(surface.outward)
-        self._towards = askew(self._outward)
+        self._at_rest = frames_at_rest(-self._outward) if surface.in_space else None
         self.projection = opposite.curve.closest_point(x, self._outward, at_rest)
         self.separation = x - self.projection.point
         self.points = Points(law, len(x))
@@ -111,12 +112,22 @@ class Pair:
         self.moduli = own.moduli
         if self.moves:
             self._find_partners(own.displacement, motion)
-        self.frame = frames(self.projection.normal, self._towards)
+        self._turn_frames()
         self.opening = self._opening()
         self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
         if self.counts_slip:  # what has no partner has no history
             self.trial[~self.projection.found, 0] = -1.0
         self._answer(self.opening, self.trial)
+
+    def _turn_frames(self) -> None:
+        """The frames at the normals of the partners."""
+        normal = self.projection.normal
+        if self._at_rest is None:
+            self.frame = plane_frames(normal)
+            return
+        turned = TurningFrames(self._at_rest, normal)
+        self.frame = turned.frame
+        self.spin = turned.spin
 
     def _find_partners(self, displacement: Array, motion: Array) -> None:
         """The closest points of the deformed surfaces."""
@@ -154,13 +165,6 @@ class Pair:
     def _in_frame(self, vectors: Array) -> Array:
         """Components ``(m, d)`` along normal and tangents."""
         return np.einsum("mij,mj->mi", self.frame, vectors)
-
-    @property
-    def spin(self) -> Array:
-        """Turn ``(m,)`` of the frame in space about its normal as the normal turns towards the
-        second tangent."""
-        along_normal, along_tangent, _ = self._in_frame(self._towards).T
-        return -along_normal / along_tangent
 
     def _moved_apart(self) -> Array:
         """Displacement ``(m, d)`` of the points relative to their partners."""

@@ -5,7 +5,7 @@
  * tau are the opposite facet's tangents and A is the inverse of tau . tau - d . y'', kept on the edge or at the corner
  * where the closest point lies. The normal turns by d n = -tau^c w_c, w_c = v'_c(y) . n + b_cd d xi_d, with b = n . y''
  * and tau^c dual to tau_c. Its components along the tangents t of the frame are turn_k = d n . t_k; d t_1 = -turn_1 n +
- * about t_2 and d t_2 = -turn_2 n - about t_1, where the frame turns about its normal by about = spin turn_2. The variation
+ * about t_2 and d t_2 = -turn_2 n - about t_1, where the frame turns about its normal by about = spin . turn. The variation
  * of the gap d . n is jump . n + d . d n; the variation of the step's slip (u(x) - u(y)) . t_k is jump . t_k +
  * (u(x) - u(y)) . d t_k - u'(y) . t_k d xi. The trial traction is the own stress's in the turning frame, less gamma times
  * gap and slips. The law's derivatives take both variations to the variation of pressure and shears. */
@@ -64,7 +64,7 @@ static void follow(const Side *s, int32_t i, const double *jump, const double sl
     const double(*bend)[P] = (const double(*)[P])(s->bend + P * P * (int64_t)i);
     const double(*along)[P] = (const double(*)[P])(s->along + P * P * (int64_t)i);
     const double *opening = s->opening + D * (int64_t)i, *strayed = s->strayed + (1 + P * P) * (int64_t)i;
-    const double rise = strayed[0], *drift = strayed + 1, spin = s->spin[i];
+    const double rise = strayed[0], *drift = strayed + 1, *spin = s->spin + P * (int64_t)i;
     double dual[P][P], own[D], aside[P];
     dual_components(tau, frame, dual);
     for (int r = 0; r < D; r++) own[r] = dot(frame + D * r, stress);
@@ -77,7 +77,7 @@ static void follow(const Side *s, int32_t i, const double *jump, const double sl
             for (int e = 0; e < P; e++)
                 w[e] = slope[e][c] * n[j] + bend[e][0] * d->xi[0][c][j] + bend[e][1] * d->xi[1][c][j];
             for (int k = 0; k < P; k++) d->turn[k][c][j] = -(dual[0][k] * w[0] + dual[1][k] * w[1]);
-            const double turn[P] = {d->turn[0][c][j], d->turn[1][c][j]}, about = spin * turn[1];
+            const double turn[P] = {d->turn[0][c][j], d->turn[1][c][j]}, about = spin[0] * turn[0] + spin[1] * turn[1];
             const double gap = aside[0] * turn[0] + aside[1] * turn[1];
             const double across[P] = {about * own[T2], -about * own[T1]};
             const double slid[P] = {about * opening[T2], -about * opening[T1]};
@@ -123,6 +123,7 @@ static void linearise(const Side *s, int32_t i, Rates *d)
 static void force_rate(const Side *s, int32_t i, const Rates *d, int c, double force[D][D])
 {
     const double *frame = s->frame + D * D * (int64_t)i, *f = s->traction + D * (int64_t)i;
+    const double *spin = s->spin + P * (int64_t)i;
     const double *A = s->by_trial + D * D * (int64_t)i, *B = s->by_opening + D * D * (int64_t)i;
     for (int j = 0; j < D; j++) {
         double rate[D];
@@ -132,7 +133,7 @@ static void force_rate(const Side *s, int32_t i, const Rates *d, int c, double f
             if (!s->has_by_opening) continue;
             for (int q = 0; q < D; q++) rate[r] += B[D * r + q] * d->opening[q][c][j];
         }
-        const double turn[P] = {d->turn[0][c][j], d->turn[1][c][j]}, about = s->spin[i] * turn[1];
+        const double turn[P] = {d->turn[0][c][j], d->turn[1][c][j]}, about = spin[0] * turn[0] + spin[1] * turn[1];
         rate[N] -= f[T1] * turn[0] + f[T2] * turn[1];
         rate[T1] += f[N] * turn[0] - about * f[T2];
         rate[T2] += f[N] * turn[1] + about * f[T1];

@@ -23,7 +23,7 @@ typedef struct {
     const double *separation;    /* (n q, 3) from the partner to the point */
     const double *strayed;       /* (n q, 5) see Pair */
     const double *frame;         /* (n q, 3, 3) normal and tangents */
-    const double *spin;          /* (n q) turn of the frame about the normal as that turns to the first tangent's side */
+    const double *spin;          /* (n q, 2) turn of the frame about the normal as that turns to each tangent */
     const double *partner_shape; /* (n q, o) basis functions of the opposite facet at the partner */
     const double *partner_slope; /* (n q, 2, o) their derivatives along the facet */
     const double *tangent;       /* (n q, 2, 3) of the opposite facet */
