@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from archord.postprocess.pictures.pictures import draw_run
     from archord.scene.presets.joint import Scene
     from archord.scene.problem import ProblemScene
-    from archord.solver.contact.coulomb import Coulomb
-    from archord.solver.contact.exponential import Exponential
-    from archord.solver.contact.law import ContactLaw, Quantity, Response
+    from archord.solver.contact.laws.coulomb import Coulomb
+    from archord.solver.contact.laws.exponential import Exponential
+    from archord.solver.contact.laws.law import ContactLaw, Quantity, Response
     from archord.solver.path.system import System
     from archord.solver.problem import Body, Coupling, Interaction, Load, Problem, Support
 
@@ -99,9 +99,9 @@ _HOME = {
     "archord.postprocess.pictures.pictures": ["draw_run"],
     "archord.scene.problem": ["ProblemScene"],
     "archord.scene.presets.joint": ["Scene"],
-    "archord.solver.contact.coulomb": ["Coulomb"],
-    "archord.solver.contact.exponential": ["Exponential"],
-    "archord.solver.contact.law": ["ContactLaw", "Quantity", "Response"],
+    "archord.solver.contact.laws.coulomb": ["Coulomb"],
+    "archord.solver.contact.laws.exponential": ["Exponential"],
+    "archord.solver.contact.laws.law": ["ContactLaw", "Quantity", "Response"],
     "archord.solver.path.system": ["System"],
     "archord.solver.problem": ["Body", "Coupling", "Interaction", "Load", "Problem", "Support"],
 }

@@ -19,7 +19,7 @@ from archord.materials.kinematics import kinematics
 from archord.report.errors import InputError
 from archord.scene import parts
 from archord.scene.problem import ProblemScene
-from archord.solver.contact.named import LAWS
+from archord.solver.contact.laws.named import LAWS
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.path.system import displacement_space
 from archord.solver.problem import Interaction, Problem

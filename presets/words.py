@@ -17,9 +17,9 @@ from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.contact import CONTACT_LAWS
 from archord.scene.sections.plasticity import parameters_of
-from archord.solver.contact.coulomb import Coulomb
 from archord.solver.contact.interaction import Interaction
-from archord.solver.contact.named import LAWS
+from archord.solver.contact.laws.coulomb import Coulomb
+from archord.solver.contact.laws.named import LAWS
 from archord.solver.expansion import disc_of
 from archord.solver.parts import Body, Load, Support
 from archord.solver.problem import Problem

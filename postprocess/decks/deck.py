@@ -31,8 +31,8 @@ from archord.postprocess.decks.mesh import DeckMesh, Ints, deck_mesh, label, sur
 from archord.presets.account import account_of
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
-from archord.solver.contact.coulomb import Coulomb
-from archord.solver.contact.named import Frictionless, Tied, contact_law
+from archord.solver.contact.laws.coulomb import Coulomb
+from archord.solver.contact.laws.named import Frictionless, Tied, contact_law
 from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Problem, Rigid
 

@@ -23,8 +23,8 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError, RigidCircle
 from archord.report.errors import in_sentences, require_of
-from archord.solver.contact.law import ContactLaw
-from archord.solver.contact.named import NAMES, contact_law
+from archord.solver.contact.laws.law import ContactLaw
+from archord.solver.contact.laws.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.surface import RigidSurface, Surface
 
@@ -61,7 +61,7 @@ class Interaction:
         Two facet sets, of one body each. The first may be a rigid disc, a `RigidCircle`.
     law : str or ContactLaw
         The contact law: a name, "frictionless", "tied" or "coulomb", or an object that keeps the
-        protocol of `archord.solver.contact.law.ContactLaw`.
+        protocol of `archord.solver.contact.laws.law.ContactLaw`.
     friction : float
         Coulomb's coefficient of friction, of the laws "frictionless" and "coulomb".
     kinematics : {"current", "reference"}

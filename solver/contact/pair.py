@@ -11,7 +11,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.materials.material import Points
 from archord.solver.contact.frame import TurningFrames, frames_at_rest, plane_frames
-from archord.solver.contact.law import OPEN, STICK, Branches, ContactLaw
+from archord.solver.contact.laws.law import OPEN, STICK, Branches, ContactLaw
 from archord.solver.contact.slip import SlipOrigin
 from archord.solver.contact.surface import RigidSurface, Surface
 

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from archord.benchmarks.stability.cases import cases
 from archord.output.history import read_history
 from archord.presets.account import account_of
-from archord.solver.contact.coulomb import Coulomb, FrictionState
+from archord.solver.contact.laws.coulomb import Coulomb, FrictionState
 from archord.solver.path.stepping import StepRules, march
 from archord.solver.path.system import System
 from tests.output.test_restart import go_on, run

@@ -11,7 +11,7 @@ from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
 from archord.presets.arc import arc_profiles
 from archord.scene.presets.joint import Scene
-from archord.solver.contact.named import LAWS, contact_law
+from archord.solver.contact.laws.named import LAWS, contact_law
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
 from tests.solver.parts import blocks, solve

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from archord.solver.contact.law import STICK
+from archord.solver.contact.laws.law import STICK
 from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import (
     DR,

@@ -11,7 +11,7 @@ from archord.geometry.curve import RigidCircle
 from archord.materials.elasticity import contact_modulus
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface
-from archord.solver.contact.law import STICK, ContactLaw, Response
+from archord.solver.contact.laws.law import STICK, ContactLaw, Response
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Body, Dirichlet, Interaction, Problem
 from tests.geometry.shapes.measures import Facets

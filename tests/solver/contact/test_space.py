@@ -11,9 +11,9 @@ from dolfinx.mesh import CellType
 from mpi4py import MPI
 
 from archord.solver.conditions import Dirichlet, Drive
-from archord.solver.contact.coulomb import Coulomb, FrictionState
 from archord.solver.contact.interaction import Interaction
-from archord.solver.contact.law import SLIDE, STICK
+from archord.solver.contact.laws.coulomb import Coulomb, FrictionState
+from archord.solver.contact.laws.law import SLIDE, STICK
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Problem
 from tests.materials.test_space import ASKEW

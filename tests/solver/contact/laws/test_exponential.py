@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 import archord
 from archord.cli import run as command
 from archord.scene.sections.contact import CONTACT_LAWS
-from archord.solver.contact.exponential import Exponential
-from archord.solver.contact.named import LAWS
+from archord.solver.contact.laws.exponential import Exponential
+from archord.solver.contact.laws.named import LAWS
 
 LAW = Exponential(pressure=50.0, clearance=0.01)
 E = 1000.0  # without contraction: the strips are bars

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
-from archord.solver.contact.law import (
+from archord.solver.contact.laws.law import (
     OPEN,
     SLIDE,
     SLIDE_BACK,

@@ -8,7 +8,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.report.errors import in_sentences, require_of
-from archord.solver.contact.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLaw, Response
+from archord.solver.contact.laws.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLaw, Response
 
 
 @dataclass(frozen=True)

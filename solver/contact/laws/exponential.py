@@ -8,7 +8,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.report.errors import in_sentences, require_of
-from archord.solver.contact.law import OPEN, SLIDE, ContactLaw, Response, State
+from archord.solver.contact.laws.law import OPEN, SLIDE, ContactLaw, Response, State
 
 
 @in_sentences

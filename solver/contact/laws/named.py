@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.solver.contact.coulomb import Coulomb
-from archord.solver.contact.exponential import Exponential
-from archord.solver.contact.law import OPEN, SLIDE, STICK, ContactLaw, Response, State
+from archord.solver.contact.laws.coulomb import Coulomb
+from archord.solver.contact.laws.exponential import Exponential
+from archord.solver.contact.laws.law import OPEN, SLIDE, STICK, ContactLaw, Response, State
 
 
 class Frictionless(ContactLaw):
