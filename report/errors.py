@@ -20,10 +20,10 @@ class InputError(ValueError):
     --------
     >>> import archord
     >>> try:
-    ...     archord.Support("clamp", fixed="z")
+    ...     archord.Coupling("crank", kind="stiff")
     ... except archord.InputError as error:
     ...     print(error)
-    archord.Support: support "clamp".fixed = "z" must be directions among x, y and rotation.
+    archord.Coupling: coupling "crank".kind = "stiff" must be "rigid" or "distributing".
     """
 
 

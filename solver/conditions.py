@@ -11,7 +11,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 
-Vector = tuple[float, float]
+Vector = Sequence[float] | Array  # (d,)
 Control = Literal["displacement", "force"]
 
 
@@ -45,7 +45,7 @@ class Dirichlet:
     """A Dirichlet condition: one component of the displacement of a facet set is prescribed.
 
     The component ``axis`` is ``rate`` times the displacement of the ``drive``. ``rate`` is a
-    number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``. Conditions of
+    number, or a function of the nodes' positions ``(n, d)`` that returns ``(n,)``. Conditions of
     one ``name`` have one reaction, and the drives of conditions on one set add up. Drives "x", "y",
     "turn" of one name, at rates 1, 1, ``(Y - y, x - X)``, are a rigid reference point (X, Y).
 
@@ -95,8 +95,8 @@ class DeadLoad:
 
 @dataclass(frozen=True)
 class Mean:
-    """The mean motion of a facet set: the motion of a reference ``point`` along ``axis`` 0 or 1, or
-    its rotation, 2.
+    """The mean motion of a facet set: the motion of a reference ``point`` along an ``axis``, or its
+    rotation behind the axes: 2 in a plane; 3, 4 and 5 about x, y and z in space.
 
     With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x -
     c|^2`` about the centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive``

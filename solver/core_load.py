@@ -28,7 +28,7 @@ def require_core(
     """Raise ValueError, which names the ``key`` of the radius, where the circle has so few
     integration points of these ``cells`` that the force on it is not what `core_density` says.
     Collective."""
-    owned = mesh.mesh.topology.index_map(2).size_local
+    owned = mesh.mesh.topology.index_map(mesh.dimension).size_local
     inside = np.unique(mesh.cells_in(cells))
     X, _ = basix.make_quadrature(mesh.mesh.basix_cell(), LOAD_DEGREE)
     place = cell_basis(mesh.mesh, 1, inside[inside < owned], X).point

@@ -3,7 +3,7 @@ loads, couplings and moved discs become Dirichlet conditions, dead loads, means 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,15 +13,15 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import unknown
+from archord.materials.kinematics import PLANE_STRAIN, SPACE
 from archord.solver.conditions import Control, DeadLoad, Dirichlet, Drive, Guess, Mean
 from archord.solver.contact.interaction import Interaction, Rigid
 from archord.solver.core_load import core_density, require_core
-from archord.solver.parts import Coupling, Load, Support
+from archord.solver.parts import Coupling, Load, Support, freedoms
 from archord.solver.problem import Problem
 
 _STRETCHED = 10.0  # sizes of the mesh that large strain may displace by
-_AXES = {"x": 0, "y": 1, "rotation": 2}
-_ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+_TURNS = {2: PLANE_STRAIN.turns, 3: SPACE.turns}  # of a coupling, which turns a ring like a plane
 Rate = float | Callable[[Array], Array]
 
 
@@ -34,6 +34,7 @@ def expanded(problem: Problem) -> Problem:
 class _Expansion:
     """The conditions of a ``problem``, by the names of sets of its mesh, of couplings and of discs.
 
+    freedoms: the directions by their names, and their numbers
     loaded: the name of the load of each place and direction
     held: the places and directions that supports fix
     drives, supports, means, loads: the conditions, those that the problem states itself first
@@ -42,6 +43,8 @@ class _Expansion:
     def __init__(self, problem: Problem) -> None:
         self.stated = problem
         self.mesh = problem.mesh
+        self.dimension = problem.kinematics.dimension
+        self.freedoms = freedoms(self.dimension)
         self.edges = [*self.mesh.facet_sets, *self.mesh.point_sets]
         self.couplings = [coupling.name for coupling in problem.couplings]
         self.discs = [i.name for i in problem.interactions if disc_of(i) is not None]
@@ -93,6 +96,26 @@ class _Expansion:
         for on in places:
             if on not in known:
                 raise ValueError(unknown("set or coupling", on, known))
+        self._require_directions()
+
+    def _require_directions(self) -> None:
+        """Raise ValueError for a direction that the problem lacks, and a point of another
+        dimension."""
+        used: list[tuple[str, str | None]] = []
+        used += [(f"support {s.name!r}", f) for s in self.given_supports for f in s.fixed]
+        used += [(f"load {load.name!r}", load.direction) for load in self.given_loads]
+        for part, freedom in used:
+            if freedom is not None and freedom not in self.freedoms:
+                known = ", ".join(self.freedoms)
+                raise ValueError(f"the {part} has the direction {freedom!r}, but here are {known}")
+        points = [(f"coupling {c.name!r}", "point", c.point) for c in self.stated.couplings]
+        for load in self.given_loads:
+            if load.core is not None:
+                points.append((f"load {load.name!r}", "core.centre", load.core[0]))
+        for part, key, point in points:
+            if len(point) != self.dimension:
+                said = f"{key} = {point} must be {self.dimension} numbers here"
+                raise ValueError(f"the {part} does not fit: {said}")
 
     def _require_one_support(self) -> None:
         """Raise ValueError where two names prescribe how one set moves along one axis."""
@@ -102,7 +125,7 @@ class _Expansion:
             if other != s.name:
                 raise ValueError(
                     f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in "
-                    f"{'xy'[s.axis]}"
+                    f"{'xyz'[s.axis]}"
                 )
 
     def _travel(self) -> float:
@@ -122,7 +145,7 @@ class _Expansion:
         is_large = any(getattr(body.material, "finite", False) for body in self.stated.bodies)
         most = _STRETCHED * size if is_large else size
         for load in self.given_loads:
-            if load.kind != "displacement" or load.direction == "rotation":
+            if load.kind != "displacement" or _turns(load.direction):
                 continue
             farthest = max(load.stages, key=abs)
             if abs(farthest) > most:
@@ -134,15 +157,16 @@ class _Expansion:
         self._require_near_turns(lowest, highest, most)
 
     def _box(self) -> tuple[Array, Array]:
-        """The lowest and the highest x and y of the mesh and the discs' centres. Collective."""
+        """The lowest and the highest coordinates of mesh and discs' centres. Collective."""
         comm = self.mesh.mesh.comm
         discs = [disc_of(part) for part in self.stated.interactions]
         centres = [disc.centre for disc in discs if disc is not None]
-        x = self.mesh.mesh.geometry.x[:, :2]
-        x = np.concatenate([x, np.reshape(centres, (-1, 2))])
+        d = self.dimension
+        x = self.mesh.mesh.geometry.x[:, :d]
+        x = np.concatenate([x, np.reshape(centres, (-1, d))])
         ends = np.concatenate([x.max(axis=0, initial=-np.inf), -x.min(axis=0, initial=np.inf)])
         comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
-        return -ends[2:], ends[:2]
+        return -ends[d:], ends[:d]
 
     def _require_near_turns(self, lowest: Array, highest: Array, most: float) -> None:
         """Raise ValueError for a coupling that turns about a held point so far away that all the
@@ -151,12 +175,14 @@ class _Expansion:
         displaced = [load for load in self.given_loads if load.kind == "displacement"]
         held = self.held | {(load.on, str(load.direction)) for load in displaced}
         for load in displaced:
-            if load.direction != "rotation" or load.on not in points:
+            if not _turns(load.direction) or load.on not in points:
                 continue
             point = points[load.on]
             beside = np.maximum(point - highest, lowest - point)
-            x, y = np.maximum(beside, 0.0)
-            arms = [arm for axis, arm in (("x", y), ("y", x)) if (load.on, axis) in held]
+            beside = np.maximum(beside, 0.0)
+            i, j = self._turn(str(load.direction))
+            crossed = (("xyz"[i], beside[j]), ("xyz"[j], beside[i]))
+            arms = [arm for axis, arm in crossed if (load.on, axis) in held]
             moved = max(map(abs, load.stages)) * max(arms, default=0.0)
             if moved > most:
                 raise ValueError(
@@ -169,14 +195,14 @@ class _Expansion:
         """What holds a set; couplings take their supports themselves."""
         if support.on in self.couplings:
             return
-        if "rotation" in support.fixed:
-            raise ValueError(
-                f"the support {support.name!r} fixes the rotation of {support.on!r}, which is no "
-                "coupling: "
-                'a set is held in "x" and "y"'
-            )
         for freedom in support.fixed:
-            self.supports.append(Dirichlet(support.name, support.on, _AXES[freedom]))
+            if _turns(freedom):
+                axes = " and ".join(f'"{axis}"' for axis in "xyz"[: self.dimension])
+                raise ValueError(
+                    f"the support {support.name!r} fixes the {freedom} of {support.on!r}, which is "
+                    f"no coupling: a set is held in {axes}"
+                )
+            self.supports.append(Dirichlet(support.name, support.on, self.freedoms[freedom]))
 
     def _load(self, load: Load) -> None:
         """A pressure; a force spread over cells; or what moves a set, a reference point or a
@@ -189,7 +215,7 @@ class _Expansion:
         if load.kind == "pressure":
             self.loads.append(DeadLoad(facets=load.on, pressure=1.0, drive=load.name))
             return
-        if load.direction == "rotation" and load.on not in self.couplings:
+        if _turns(load.direction) and load.on not in self.couplings:
             raise ValueError(
                 f"the load {load.name!r} turns {load.on!r}, which is no coupling: only couplings "
                 "have a rotation"
@@ -197,18 +223,26 @@ class _Expansion:
         if spread:
             self._spread(load)
         elif load.on not in [*self.couplings, *self.discs]:
-            axis = _AXES[str(load.direction)]
+            axis = self.freedoms[str(load.direction)]
             self.supports.append(Dirichlet(load.name, load.on, axis, 1.0, load.name))
 
     def _spread(self, load: Load) -> None:
         """A force on cells, evenly or in a core."""
-        force = _ALONG[str(load.direction)]
+        force = self._along(load)
         density = None
         if load.core is not None:
             centre, radius = load.core
             require_core(self.mesh, load.on, centre, radius, f"load {load.name!r}: core.radius")
             density = core_density(centre, radius)
         self.loads.append(DeadLoad(cells=load.on, force=force, density=density, drive=load.name))
+
+    def _along(self, load: Load) -> tuple[float, ...]:
+        """The unit vector along the axis of the ``load``."""
+        return tuple(np.eye(self.dimension)[self.freedoms[str(load.direction)]])
+
+    def _turn(self, freedom: str) -> tuple[int, int]:
+        """The axes from the first to the second of which a rotation turns."""
+        return _TURNS[self.dimension][self.freedoms[freedom] - self.dimension]
 
     def _drive(self, coupling: str, freedom: str, control: Control) -> str:
         """The load of a reference point in one of its freedoms, or a drive of its own whose
@@ -220,29 +254,30 @@ class _Expansion:
         return drive.name
 
     def _rigid_point(self, coupling: Coupling) -> None:
-        X, Y = coupling.point
-        rates: dict[str, list[tuple[int, Rate]]] = {
-            "x": [(0, 1.0)],
-            "y": [(1, 1.0)],
-            "rotation": [(0, lambda x: Y - x[:, 1]), (1, lambda x: x[:, 0] - X)],
-        }
-        for axis in (0, 1):
+        for axis in range(self.dimension):
             self.supports.append(Dirichlet(coupling.name, coupling.facets, axis))
-        for freedom in _AXES:
+        for freedom in self.freedoms:
             if (coupling.name, freedom) in self.held:
                 continue
             drive = self._drive(coupling.name, freedom, "force")
-            for axis, rate in rates[freedom]:
+            for axis, rate in self._rates(freedom, coupling.point):
                 self.supports.append(Dirichlet(coupling.name, coupling.facets, axis, rate, drive))
+
+    def _rates(self, freedom: str, point: Sequence[float]) -> list[tuple[int, Rate]]:
+        """What a motion of a reference ``point`` displaces along the axes."""
+        if not _turns(freedom):
+            return [(self.freedoms[freedom], 1.0)]
+        i, j = self._turn(freedom)
+        return [(i, lambda x: point[j] - x[:, j]), (j, lambda x: x[:, i] - point[i])]
 
     def _mean_point(self, coupling: Coupling) -> None:
         # with its mirror image an edge moves along the symmetry line alone
         mirrored = self.stated.symmetry > 1
         point = None if mirrored else coupling.point
-        for freedom, axis in _AXES.items():
+        for freedom, axis in self.freedoms.items():
             if (coupling.name, freedom) not in self.held | self.loaded.keys():
                 continue
-            if mirrored and freedom == "rotation":
+            if mirrored and _turns(freedom):
                 raise ValueError(
                     f"the coupling {coupling.name!r} of a part with mirror images cannot turn"
                 )
@@ -253,7 +288,7 @@ class _Expansion:
         disc = part.surfaces[0]
         if isinstance(disc, RigidCircle):
             loads = [load for load in self.given_loads if load.on == part.name]
-            rates = {load.name: _ALONG[str(load.direction)] for load in loads}
+            rates: dict[str, Any] = {load.name: self._along(load) for load in loads}
             part = replace(part, surfaces=(Rigid(disc, rates), part.surfaces[1]))
         return replace(part, slide=part.slide or slide)
 
@@ -266,15 +301,20 @@ class _Expansion:
                 driven.append((load, stated.body_of(load.on).name))
 
         def guess(factor: float) -> Guess:
-            moved: dict[str, tuple[float, float]] = {}
+            moved: dict[str, Array] = {}
             for load, body in driven:
                 values = stated.values(load)
                 value = float(np.interp(factor, range(len(values)), values))
-                x, y = moved.get(body, (0.0, 0.0))
-                moved[body] = (x + value, y) if load.direction == "x" else (x, y + value)
+                so_far = moved.get(body, np.zeros(self.dimension))
+                moved[body] = so_far + value * np.array(self._along(load))
             return Guess(factor, moved)
 
         return guess
+
+
+def _turns(freedom: str | None) -> bool:
+    """Whether a direction is a rotation."""
+    return freedom is not None and freedom.startswith("rotation")
 
 
 def disc_of(part: Any) -> RigidCircle | None:

@@ -12,10 +12,19 @@ import numpy as np
 from archord.materials.material import Material
 from archord.report.errors import InputError, in_sentences, require_of
 
-Freedom = Literal["x", "y", "rotation"]
+Freedom = Literal["x", "y", "rotation", "z", "rotation x", "rotation y", "rotation z"]
 Values = float | Sequence[float]
 FREEDOMS = get_args(Freedom)
 _KINDS = ("displacement", "force", "pressure")
+_IN_WORDS = '"x", "y", "z", "rotation", or "rotation x", "rotation y", "rotation z"'
+
+
+def freedoms(dimension: int) -> dict[str, int]:
+    """The directions of a problem of this ``dimension`` with their numbers: along the axes, then
+    about them. Only couplings turn."""
+    axes = "xyz"[:dimension]
+    turns = [f"rotation {axis}" for axis in axes] if dimension == 3 else ["rotation"]
+    return {freedom: k for k, freedom in enumerate((*axes, *turns))}
 
 
 def _require_name(part: Any, key: str = "name") -> None:
@@ -27,8 +36,8 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.number)) and bool(np.isfinite(value))
 
 
-def _is_pair(value: Any) -> bool:
-    return np.shape(value) == (2,) and all(map(_is_number, value))
+def _is_place(value: Any) -> bool:
+    return np.shape(value) in ((2,), (3,)) and all(map(_is_number, value))
 
 
 @in_sentences
@@ -87,7 +96,8 @@ class Support:
     on : str
         A coupling, or a set of facets, points or cells: the first that has the name.
     fixed : str or sequence of str
-        The directions held: "x", "y", "xy", or a list with "rotation", which couplings alone have.
+        The directions held: letters such as "xy", in space "xyz"; or a list, which may have the
+        "rotation" of a coupling, in space its "rotation x", "rotation y" and "rotation z".
 
     Raises
     ------
@@ -113,12 +123,11 @@ class Support:
         object.__setattr__(self, "on", self.on or self.name)
         _require_name(self, "on")
         fixed = self.fixed
-        if fixed in ("x", "y", "xy"):
-            fixed = tuple(fixed)
-        elif isinstance(fixed, str):
-            fixed = (fixed,)
+        if isinstance(fixed, str):
+            are_letters = {*fixed} <= {*"xyz"}
+            fixed = tuple(fixed) if are_letters else (fixed,)
         known = len(fixed) > 0 and all(freedom in FREEDOMS for freedom in fixed)
-        require_of(self, known, "fixed", "must be directions among x, y and rotation")
+        require_of(self, known, "fixed", f"must be directions among {_IN_WORDS}")
         object.__setattr__(self, "fixed", tuple(fixed))
 
 
@@ -134,8 +143,9 @@ class Load:
     on : str
         The interaction of a rigid disc, a coupling, or a set of facets, points or cells: the first
         that has the name.
-    direction : {"x", "y", "rotation"}
-        The direction of a displacement or a force; "rotation" is of couplings alone.
+    direction : {"x", "y", "z", "rotation", "rotation x", "rotation y", "rotation z"}
+        The direction of a displacement or a force. Rotations are of couplings alone: "rotation" in
+        a plane, in space one about each axis.
     displacement : float or sequence of float
         The displacement, or the angle in radians.
     force : float or sequence of float
@@ -143,7 +153,8 @@ class Load:
     pressure : float or sequence of float
         The pressure on a facet set, on its undeformed area, along the normal into the body.
     core : tuple
-        The circle ((x, y), radius) in which a force on cells is spread, less and less outward.
+        The circle ((x, y), radius), in space the ball ((x, y, z), radius), in which a force on
+        cells is spread, less and less outward.
 
     Raises
     ------
@@ -165,7 +176,7 @@ class Load:
     displacement: Values | None = None
     force: Values | None = None
     pressure: Values | None = None
-    core: tuple[tuple[float, float], float] | None = None
+    core: tuple[tuple[float, ...], float] | None = None
 
     def __post_init__(self) -> None:
         """Check the parts; raise `InputError`."""
@@ -183,13 +194,11 @@ class Load:
         numbers = len(values) > 0 and all(map(_is_number, values))
         require_of(self, numbers, self.kind, "must be a number, or a list of numbers")
         wanted = (None,) if self.kind == "pressure" else FREEDOMS
-        said = (
-            'must be "x", "y" or "rotation", and None for a pressure, which acts along the normal'
-        )
+        said = f"must be {_IN_WORDS}, and None for a pressure, which acts along the normal"
         require_of(self, self.direction in wanted, "direction", said)
-        said = "is a circle ((x, y), radius), for a force on cells"
+        said = "is a circle ((x, y), radius) or a ball ((x, y, z), radius), for a force on cells"
         is_circle = self.core is None or (
-            len(self.core) == 2 and _is_pair(self.core[0]) and _is_number(self.core[1])
+            len(self.core) == 2 and _is_place(self.core[0]) and _is_number(self.core[1])
         )
         alone = self.core is None or self.kind == "force"
         require_of(self, is_circle and alone, "core", said)
@@ -217,7 +226,7 @@ class Coupling:
     facets : str
         The set of facets.
     point : tuple of float
-        The reference point (x, y).
+        The reference point (x, y), in space (x, y, z); the origin by default.
     kind : {"rigid", "distributing"}
         Facets of a rigid coupling move as one body. Facets of a distributing one do so only on
         average, and forces are spread over them.
@@ -236,7 +245,7 @@ class Coupling:
 
     name: str
     facets: str = ""
-    point: tuple[float, float] = (0.0, 0.0)
+    point: tuple[float, ...] = (0.0, 0.0)
     kind: Literal["rigid", "distributing"] = "rigid"
 
     def __post_init__(self) -> None:
@@ -244,7 +253,8 @@ class Coupling:
         _require_name(self)
         object.__setattr__(self, "facets", self.facets or self.name)
         _require_name(self, "facets")
-        require_of(self, _is_pair(self.point), "point", "must be two numbers, x and y")
+        said = "must be two numbers, x and y, or three in space"
+        require_of(self, _is_place(self.point), "point", said)
         known = self.kind in ("rigid", "distributing")
         require_of(self, known, "kind", 'must be "rigid" or "distributing"')
         object.__setattr__(self, "point", tuple(map(float, self.point)))
