@@ -200,3 +200,22 @@ def work_precision(
     failed = [line for line in lines if line.timing.failure and line.point.code == "archord"]
     faults = [f"{line.point.name}: {line.timing.failure}" for line in failed]
     return _conclude(*table.write(lines, output), faults, quiet)
+
+
+@benchmark.command()
+@output("folder for the table", "runs/outside")
+@click.option(
+    "--only", default="", show_default=False, metavar="PATTERN", help="problems with such a name"
+)
+@quiet()
+def outside(output: Path, only: str, quiet: bool) -> int:
+    """Solve problems that others have set, on several meshes, and print them beside the published
+    values."""
+    from archord.benchmarks.outside import table
+
+    problems = table.chosen(only)
+    if not problems:
+        names = ", ".join(problem.name for problem in table.PROBLEMS)
+        raise InputError(f"--only {only}: must be part of {names}.")
+    rows = table.run(problems, _telling(quiet))
+    return _conclude(*table.write(rows, problems, output), [], quiet)

@@ -46,6 +46,7 @@ ROOMS = [
     "benchmarks.stability",
     "benchmarks.peers",
     "benchmarks.axisymmetric",
+    "benchmarks.outside",
     "benchmarks.cost",
     "commands",
     "archord",

@@ -1,0 +1,1 @@
+"""Problems that others have set, with the values that they published."""
