@@ -28,7 +28,8 @@ from archord.benchmarks.axisymmetric.case import (
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import mesh_joint
+from archord.geometry.shapes.sketch import Sketch
 from archord.postprocess.run import Run
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
 

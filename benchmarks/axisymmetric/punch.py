@@ -10,7 +10,8 @@ from mpi4py import MPI
 from archord.benchmarks.axisymmetric.case import NU, STEEL, Place, Study
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import mesh_joint
+from archord.geometry.shapes.sketch import Sketch
 from archord.materials.elasticity import Elastic
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
 

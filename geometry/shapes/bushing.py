@@ -13,7 +13,8 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import PinPart, Sketch, around, mesh_joint
+from archord.geometry.shapes.joint_mesh import mesh_joint
+from archord.geometry.shapes.sketch import Bore, PinPart, Sketch, around
 
 _LAYERS = 2  # across a wall, at least
 _SLENDER = 4.0  # longest element of a wall over its thickness
@@ -50,6 +51,7 @@ def bushing(
     ]
     sketch = Sketch(names, ["pin", "flat", *(name for pair in sets for name in pair), "axis"])
     sketch.pin(shifts[0], 1, pin)
+    sketch.bores.append(Bore(sets[0][0], size, growth))
     sketch.sizes["pin"] = f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"
     for body, pair, (inner, outer), x in zip(names[1:], sets, rings, shifts[1:], strict=True):
         draw_ring(sketch, body, pair, (inner, outer), x, 1, size)

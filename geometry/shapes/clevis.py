@@ -13,8 +13,9 @@ from typing import Any
 from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import PinPart, Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.geometry.shapes.lug import ACROSS, Plate, draw_plate, plate_size, size_around
+from archord.geometry.shapes.sketch import PinPart, Sketch
 
 _GAP = 1.0  # between the plates, in radii
 _SETS = ("pin", "hole", "flat", "clamp", "end", "sides")

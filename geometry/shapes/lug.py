@@ -17,7 +17,8 @@ from mpi4py import MPI
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.bushing import between, draw_ring, longest_edge
-from archord.geometry.shapes.joint_mesh import PinPart, Sketch, around, mesh_joint
+from archord.geometry.shapes.joint_mesh import mesh_joint
+from archord.geometry.shapes.sketch import Bore, PinPart, Sketch, around
 
 ACROSS = 3  # elements across the narrowest ligament, at least
 _SLEEVE = ["bushing inside", "bushing outside"]
@@ -129,6 +130,7 @@ def lug(
         sketch.pin(x, up, pin)
         if wall:
             draw_ring(sketch, "bushing", _SLEEVE, (bore, outer), 0.0, up, size)
+    sketch.bores.append(Bore("bushing inside" if wall else "hole", size, growth))
     sketch.sizes["pin"] = size_around(x, 1.0, size, growth)
     sketch.sizes["lug"] = plate_size(plate, size, growth)
     arcs = sketch.lines["pin"] + sketch.lines["hole"]

@@ -12,7 +12,8 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint, refinements
+from archord.geometry.shapes.joint_mesh import mesh_joint, refinements
+from archord.geometry.shapes.sketch import Bore, Sketch
 
 _EDGE_GROWTH = (
     0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
@@ -113,6 +114,7 @@ def quarter_joint(
                 f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
             )
             sketch.sizes[body] = f"Min({sketch.sizes[body]}, {near_edge})"
+    sketch.bores.append(Bore("hole", size, growth))
     return mesh_joint(comm, sketch, radius=radius, **options)
 
 
@@ -161,4 +163,5 @@ def half_ring(
     for body, arc, on_arc in (("pin", "pin", size_ratio * size), ("block", "hole", size)):
         sketch.sizes[body] = f"Min({on_arc!r} + {from_arc}, {from_core})"
         sketch.parts |= dict.fromkeys(sketch.lines[arc], math.pi / 2 / on_arc)
+    sketch.bores.append(Bore("hole", size, growth))
     return mesh_joint(comm, sketch, radius=radius, **options)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.shapes.joint_mesh import Sketch, around, mesh_joint
+from archord.geometry.shapes.joint_mesh import mesh_joint
+from archord.geometry.shapes.sketch import Sketch, around
 from tests.geometry.shapes.measures import area
 
 

@@ -1,0 +1,86 @@
+"""A joint in a plane as gmsh is to draw it: points, lines, arcs, faces, and the sets of lines.
+
+Lengths are in radii of the pin whatever the units of the scene, so meshes do not depend on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+from archord.geometry.meshes.refine import Circle
+
+Place = tuple[float, float]
+PinPart = Literal["half", "whole", "none"]
+
+
+class Bore(NamedTuple):
+    """A hole that the pin lies in: its set, the element size on it and its growth away from it."""
+
+    facets: str
+    size: float
+    growth: float
+
+
+class Sketch:
+    """A joint as gmsh is to draw it: every body has each point, line and arc once.
+
+    ``faces`` are the faces of every body, ``lines`` the lines of every set; sets have the numbers
+    1, 2, ... in the order of their names, and may be empty. Shapes add the element ``sizes`` of
+    bodies (expressions in x and y), how many equal edges a line has at least (``parts``), the
+    corners of faces that are cut into a ``grid``, and the ``bores``.
+    """
+
+    def __init__(self, bodies: Sequence[str], sets: Sequence[str]) -> None:
+        self.points: dict[tuple[str, Place], int] = {}
+        self.curves: list[list[int]] = []  # start, end, and the centre of an arc
+        self.loops: list[list[int]] = []
+        self._curve: dict[tuple[str, Place, Place], int] = {}
+        self.faces: dict[str, list[int]] = {name: [] for name in bodies}
+        self.lines: dict[str, list[int]] = {name: [] for name in sets}
+        self.circles: dict[str, Circle] = {}
+        self.sizes: dict[str, str] = {}
+        self.parts: dict[int, float] = {}
+        self.grid: dict[int, list[int]] = {}
+        self.bores: list[Bore] = []
+
+    def point(self, body: str, place: Place) -> int:
+        """The point of ``body`` at (x, y)."""
+        return self.points.setdefault((body, place), len(self.points) + 1)
+
+    def path(self, body: str, *places: Place, on: Circle | None = None) -> list[int]:
+        """The lines of ``body`` from each place to the next, or arcs ``on`` the circle of a set."""
+        if on:
+            self.circles[on.facets] = on
+        for a, b in pairwise(places):
+            if (body, a, b) not in self._curve:
+                self.curves.append(
+                    [self.point(body, place) for place in (a, b, *([on.centre] if on else []))]
+                )
+                self._curve[body, a, b] = self._curve[body, b, a] = len(self.curves)
+        return [self._curve[body, a, b] for a, b in pairwise(places)]
+
+    def face(self, body: str, **paths: list[int]) -> int:
+        """A face of ``body`` within ``paths`` that together are closed, in whatever direction each
+        line goes; the lines go to the sets of these names, where there are such."""
+        self.loops.append([line for path in paths.values() for line in path])
+        self.faces[body].append(len(self.loops))
+        for name in paths.keys() & self.lines:
+            self.lines[name] += [line for line in paths[name] if line not in self.lines[name]]
+        return len(self.loops)
+
+    def pin(self, x: float, up: int, part: PinPart, before: str = "") -> None:
+        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0); the names of
+        its body and its sets have ``before`` in front."""
+        pin = f"{before}pin"
+        for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
+            arc = self.path(pin, (x + to, 0), (x, up), on=Circle(pin, (x, 0.0), 1.0))
+            flat = self.path(pin, (x, up), (x, 0))
+            axis = self.path(pin, (x, 0), (x + to, 0))
+            self.face(pin, **{pin: arc, f"{before}flat": flat, "axis": axis})
+
+
+def around(x: float) -> str:
+    """The distance from (x, 0), for sizes."""
+    return f"Sqrt((x - ({x!r}))^2 + y^2)"  # gmsh knows no "- -1"

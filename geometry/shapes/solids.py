@@ -1,0 +1,306 @@
+"""Joints in space: the faces of a sketch, each extruded along z, meshed by gmsh with curved
+tetrahedra of second order."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.sketch import Sketch, around
+
+MIDDLE = "mid-plane"  # the set of facets at z = 0
+FACES = "faces"  # the set of the other flat facets across z
+RIM = "rim"  # the set of the chamfers and fillets
+_SAME = 1e-6  # distance of places that are one, in radii of the pin
+_OPTIONS = {"ElementOrder": 2, "HighOrderOptimize": 0}
+
+
+@dataclass(frozen=True)
+class Depths:
+    """How a joint is extruded: from its mid-plane z = 0, half of it.
+
+    - ``thickness``: of all bodies but the pin, the whole
+    - ``pin_length``: the whole
+    - ``chamfer``: leg of a chamfer of 45 degrees at the rims of the holes that the pin lies in
+    - ``fillet``: radius of a rounding there, instead
+    - ``rim_ratio``: element size at these rims over the size on the arcs
+    """
+
+    thickness: float
+    pin_length: float
+    chamfer: float = 0.0
+    fillet: float = 0.0
+    rim_ratio: float = 1.0
+
+    def over(self, radius: float) -> Depths:
+        """These depths in radii of the pin."""
+        lengths = ("thickness", "pin_length", "chamfer", "fillet")
+        return replace(self, **{name: getattr(self, name) / radius for name in lengths})
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A part of a ``body``: the faces of a ``profile`` of the sketch, from ``bottom`` to ``top``.
+
+    - ``names``: names of facet sets by their names in the sketch, where they differ
+    - ``rims``: heights at which its bore ends
+    """
+
+    body: str
+    profile: str
+    bottom: float
+    top: float
+    names: Mapping[str, str] = field(default_factory=dict)
+    rims: tuple[float, ...] = ()
+
+
+class _Line(NamedTuple):
+    """A line of a sketch by its middle ``(2,)``, and the sets that have it."""
+
+    middle: Array
+    sets: Sequence[str]
+
+
+def slabs_of(sketch: Sketch, depths: Depths) -> list[Slab]:
+    """The bodies of a ``sketch``, each extruded once."""
+    half = depths.thickness / 2
+    slabs = []
+    for body in filter(sketch.faces.get, sketch.faces):
+        top = depths.pin_length / 2 if body == "pin" else half
+        rims = (half,) if bore_of(sketch, body) else ()
+        slabs.append(Slab(body, body, 0.0, top, rims=rims))
+    return slabs
+
+
+def mesh_solids(
+    comm: MPI.Comm,
+    sketch: Sketch,
+    slabs: Sequence[Slab],
+    depths: Depths,
+    *,
+    radius: float,
+    partitioner=None,
+) -> TaggedMesh:
+    """Mesh the ``slabs`` of a ``sketch``, times ``radius``, with all nodes of cylinders on them.
+
+    Facets over the lines of a set are the set, with a name of the slab's own where it has one.
+    Further sets are "mid-plane" (z = 0), "faces" (the other flat ends), and "rim", the chamfers or
+    fillets, which belong to their bore's set, too. Collective; rank 0 meshes.
+    """
+    build = partial(draw_solids, sketch, slabs, depths)
+    key = (*vars(sketch).items(), tuple(slabs), depths)
+    made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key)
+    made.mesh.geometry.x[:] *= radius
+    return made
+
+
+def lines_of(sketch: Sketch, profile: str) -> list[_Line]:
+    """The lines around the faces of a ``profile``."""
+    place_of = {number: np.array(place) for (_, place), number in sketch.points.items()}
+    numbers = {line for face in sketch.faces[profile] for line in sketch.loops[face - 1]}
+    lines = []
+    for number in sorted(numbers):
+        start, stop, *centre = (place_of[point] for point in sketch.curves[number - 1])
+        middle = (start + stop) / 2
+        if centre:
+            out = middle - centre[0]
+            middle = centre[0] + out * np.linalg.norm(start - centre[0]) / np.linalg.norm(out)
+        sets = [name for name, members in sketch.lines.items() if number in members]
+        lines.append(_Line(middle, sets))
+    return lines
+
+
+def bore_of(sketch: Sketch, profile: str) -> str:
+    """The set of the hole in a ``profile`` that the pin lies in, "" where there is none."""
+    sets = {name for line in lines_of(sketch, profile) for name in line.sets}
+    return next((bore.facets for bore in sketch.bores if bore.facets in sets), "")
+
+
+def _is_among(height: float, heights: Sequence[float]) -> bool:
+    return any(abs(height - other) < _SAME for other in heights)
+
+
+def draw_solids(sketch: Sketch, slabs: Sequence[Slab], depths: Depths, gmsh: Any) -> None:
+    """Draw the ``slabs`` of a ``sketch`` in ``gmsh``: bodies, sets and element sizes."""
+    drawing = _Drawing(gmsh, sketch, depths)
+    bodies: dict[str, dict[int, Slab]] = defaultdict(dict)
+    for slab in slabs:
+        for volume in drawing.extruded(slab):
+            bodies[slab.body][drawing.blunted(volume, slab)] = slab
+    sets: dict[str, list[int]] = defaultdict(list)
+    fields = drawing.rim_sizes(slabs)
+    for body, apart in bodies.items():
+        parts = drawing.joined(apart)
+        gmsh.model.addPhysicalGroup(3, list(parts), name=body)
+        for name, surface in drawing.named_surfaces(parts):
+            if surface not in sets[name]:
+                sets[name].append(surface)
+        for volume, slab in parts.items():
+            fields.append(drawing.size_within(volume, slab))
+    for name, surfaces in sets.items():
+        gmsh.model.addPhysicalGroup(2, surfaces, name=name)
+    drawing.use_smallest(fields)
+    for option, value in _OPTIONS.items():
+        gmsh.option.setNumber(f"Mesh.{option}", value)
+
+
+class _Drawing:
+    """A model of gmsh in which profiles of a ``sketch`` are extruded."""
+
+    def __init__(self, gmsh: Any, sketch: Sketch, depths: Depths) -> None:
+        self.model = gmsh.model
+        self.occ = gmsh.model.occ
+        self.field = gmsh.model.mesh.field
+        self.sketch = sketch
+        self.depths = depths
+        self.lines = {name: lines_of(sketch, name) for name, faces in sketch.faces.items() if faces}
+
+    def extruded(self, slab: Slab) -> list[int]:
+        """The volumes of a ``slab``, one over each face."""
+        places = self.sketch.points.items()
+        point = {
+            number: self.occ.addPoint(*place, slab.bottom)
+            for (profile, place), number in places
+            if profile == slab.profile
+        }
+        surfaces = []
+        for face in self.sketch.faces[slab.profile]:
+            curves = []
+            for line in self._in_turn(self.sketch.loops[face - 1]):
+                start, stop, *centre = (point[k] for k in self.sketch.curves[line - 1])
+                add = self.occ.addCircleArc if centre else self.occ.addLine
+                curves.append(add(start, *centre, stop))
+            surfaces.append((2, self.occ.addPlaneSurface([self.occ.addCurveLoop(curves)])))
+        made = self.occ.extrude(surfaces, 0, 0, slab.top - slab.bottom)
+        self.occ.synchronize()
+        return [tag for dim, tag in made if dim == 3]
+
+    def _in_turn(self, loop: Sequence[int]) -> list[int]:
+        """The lines of a ``loop`` as they follow each other."""
+        left = {line: self.sketch.curves[line - 1][:2] for line in loop}
+        line, (_, end) = left.popitem()
+        ordered = [line]
+        while left:
+            line = next(other for other, ends in left.items() if end in ends)
+            start, stop = left.pop(line)
+            end = stop if end == start else start
+            ordered.append(line)
+        return ordered
+
+    def blunted(self, volume: int, slab: Slab) -> int:
+        """The ``volume`` with a chamfer or a fillet where its bore ends."""
+        depths = self.depths
+        length = depths.chamfer or depths.fillet
+        if not (length and slab.rims):
+            return volume
+        bore = bore_of(self.sketch, slab.profile)
+        walls = []
+        curves = []
+        for wall in self._boundary(3, volume):
+            if bore not in (self._sets_over(wall, slab) or ()):
+                continue
+            for curve in self._boundary(2, wall):
+                if _is_among(self._middle(1, curve)[2], slab.rims):
+                    walls.append(wall)
+                    curves.append(curve)
+        if depths.chamfer:
+            made = self.occ.chamfer([volume], curves, walls, [length])
+        else:
+            made = self.occ.fillet([volume], curves, [length])
+        self.occ.synchronize()
+        return made[0][1]
+
+    def joined(self, parts: Mapping[int, Slab]) -> dict[int, Slab]:
+        """The volumes of a body, with common surfaces where they meet."""
+        first, *others = ((3, volume) for volume in parts)
+        if not others:
+            return dict(parts)
+        _, made = self.occ.fragment([first], others)
+        self.occ.synchronize()
+        return {volume: slab for [(_, volume)], slab in zip(made, parts.values(), strict=True)}
+
+    def named_surfaces(self, parts: Mapping[int, Slab]) -> Iterator[tuple[str, int]]:
+        """The surfaces of a body, each with the name of a set that it belongs to."""
+        around_each = {volume: self._boundary(3, volume) for volume in parts}
+        n_sides = Counter(surface for found in around_each.values() for surface in found)
+        for volume, slab in parts.items():
+            for surface in around_each[volume]:
+                sets = self._sets_over(surface, slab)
+                if sets is None and n_sides[surface] == 1:
+                    sets = self._sets_across(surface, slab)
+                for name in sets or ():
+                    yield slab.names.get(name, name), surface
+
+    def _boundary(self, dim: int, tag: int) -> list[int]:
+        """The surfaces of a volume, or the curves of a surface."""
+        found = self.model.getBoundary([(dim, tag)], oriented=False)
+        return [tag for _, tag in found]
+
+    def _middle(self, dim: int, tag: int) -> Array:
+        """The point ``(3,)`` of a curve or a surface in the middle of its parameters."""
+        low, high = self.model.getParametrizationBounds(dim, tag)
+        return np.array(self.model.getValue(dim, tag, (low + high) / 2))
+
+    def _sets_over(self, surface: int, slab: Slab) -> Sequence[str] | None:
+        """The sets of the line that a ``surface`` stands over; None where it stands over none."""
+        middle = self._middle(2, surface)[:2]
+        for line in self.lines[slab.profile]:
+            if np.abs(line.middle - middle).max() < _SAME and not self._is_flat(surface):
+                return line.sets
+        return None
+
+    def _is_flat(self, surface: int) -> bool:
+        """Whether a ``surface`` lies across z."""
+        low, high = self.model.getParametrizationBounds(2, surface)
+        normal = self.model.getNormal(surface, (low + high) / 2)
+        return abs(normal[2]) > 1 - _SAME
+
+    def _sets_across(self, surface: int, slab: Slab) -> list[str]:
+        """The sets of a flat end, a chamfer or a fillet."""
+        if self._is_flat(surface):
+            return [MIDDLE if abs(self._middle(2, surface)[2]) < _SAME else FACES]
+        return [RIM, bore_of(self.sketch, slab.profile)]
+
+    def rim_sizes(self, slabs: Sequence[Slab]) -> list[int]:
+        """Fields of element sizes that grow from where bores end."""
+        if self.depths.rim_ratio == 1:
+            return []
+        fields = []
+        for bore, slab in product(self.sketch.bores, slabs):
+            circle = self.sketch.circles[bore.facets]
+            smallest = self.depths.rim_ratio * bore.size
+            for height in slab.rims:
+                off = (
+                    f"Sqrt(({around(circle.centre[0])} - {circle.radius!r})^2 + (z - {height!r})^2)"
+                )
+                fields.append(self._size(f"{smallest!r} + {bore.growth!r} * {off}"))
+        return fields
+
+    def size_within(self, volume: int, slab: Slab) -> int:
+        """A field of the element sizes in a ``volume``."""
+        whole = self._size(self.sketch.sizes[slab.profile])
+        within = self.field.add("Restrict")
+        self.field.setNumber(within, "InField", whole)
+        self.field.setNumbers(within, "VolumesList", [volume])
+        return within
+
+    def _size(self, expression: str) -> int:
+        field = self.field.add("MathEval")
+        self.field.setString(field, "F", expression)
+        return field
+
+    def use_smallest(self, fields: Sequence[int]) -> None:
+        """Make the smallest of the ``fields`` the element size."""
+        smallest = self.field.add("Min")
+        self.field.setNumbers(smallest, "FieldsList", fields)
+        self.field.setAsBackgroundMesh(smallest)
