@@ -17,7 +17,7 @@ from archord.scene.problem import ProblemScene
 from archord.solver.problem import Problem
 
 if TYPE_CHECKING:
-    from archord.geometry.meshes.plane_mesh import PlaneMesh
+    from archord.geometry.meshes.mesh_arrays import MeshArrays
 
 
 def scene_text(scene: AnyScene, folder: Path) -> str:
@@ -33,7 +33,7 @@ def mesh_in_use(scene: AnyScene, folder: Path) -> str:
     return MESH if in_use else ""
 
 
-def given_mesh(problem: Problem | None, comm: MPI.Comm) -> PlaneMesh | None:
+def given_mesh(problem: Problem | None, comm: MPI.Comm) -> MeshArrays | None:
     """The mesh that a ``problem`` from Python has in no file: on rank 0, None elsewhere.
     Collective."""
     if problem is None or problem.mesh_file:
@@ -41,7 +41,7 @@ def given_mesh(problem: Problem | None, comm: MPI.Comm) -> PlaneMesh | None:
     return Mesh.of(problem.mesh).plain(comm)
 
 
-def write_mesh(mesh: PlaneMesh, folder: Path) -> None:
+def write_mesh(mesh: MeshArrays, folder: Path) -> None:
     """Write ``mesh`` to the run's ``folder``. Raises `OSError`."""
     from archord.geometry.meshes.stored import store_mesh
 

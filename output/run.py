@@ -42,7 +42,7 @@ from archord.solver.path.system import System
 from archord.solver.problem import Problem
 
 if TYPE_CHECKING:
-    from archord.geometry.meshes.plane_mesh import PlaneMesh
+    from archord.geometry.meshes.mesh_arrays import MeshArrays
 
 
 @dataclass
@@ -219,7 +219,7 @@ class _Output:
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return position, work
 
-    def _make(self, given: PlaneMesh | None) -> None:
+    def _make(self, given: MeshArrays | None) -> None:
         clear(self.folder, kept=mesh_in_use(self.account.scene, self.folder))
         if given is not None:
             write_mesh(given, self.folder)

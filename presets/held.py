@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.check import check_mesh, facets_within, gaps
 from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.motions import AXISYMMETRIC, PLANE, free_motions
-from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.quality import beyond_axis
 from archord.materials.material import Array
 from archord.solver.conditions import Dirichlet
@@ -112,27 +112,27 @@ def _moved(problem: Problem) -> dict[str, str]:
     return found | {support.on: support.name for support in _supports(problem)}
 
 
-def _half_loaded(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
+def _half_loaded(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     """What is said of facets inside a body along which a load is to be spread."""
     for name in sorted(_spread(problem)):
         for said in facets_within(whole, name):
             yield f"{said}, where nothing can load them: give it the facets of the boundary alone"
 
 
-def _half_held(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
+def _half_held(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     """Warnings of facets inside a body in a set whose other facets are on the boundary."""
     for name in sorted(_moved(problem)):
         for said in facets_within(whole, name):
             yield f"{said}: look whether its elements are numbered as the set takes them"
 
 
-def _stiffened(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
+def _stiffened(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     """Warnings of forces on edges that are not straight: an edge under a force moves by one
     displacement, which keeps its shape along the force."""
     for load in _loads(problem):
         if load.kind != "force" or load.on not in whole.facet_sets:
             continue
-        edges = whole.edges[np.isin(whole.tags, whole.facet_sets[load.on])]
+        edges = whole.facets[np.isin(whole.tags, whole.facet_sets[load.on])]
         x = whole.x[np.unique(edges[:, :2])]
         extents = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
         if extents[1] > _BENT * extents[0]:
@@ -144,7 +144,7 @@ def _stiffened(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
             )
 
 
-def _moved_in_contact(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
+def _moved_in_contact(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     """Warnings of sets with a prescribed motion that have some facets of a surface in contact, and
     others."""
     smooth = [part for part in problem.interactions if not _is_tied(part)]
@@ -154,7 +154,7 @@ def _moved_in_contact(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
         touching = np.isin(whole.tags, whole.facet_sets[surface])
         both = there & touching
         if both.any() and (there & ~touching).any() and (touching & ~there).any():
-            x, y = whole.x[whole.edges[both][0, :2]].mean(axis=0)
+            x, y = whole.x[whole.facets[both][0, :2]].mean(axis=0)
             yield (
                 f"the set {on!r} of {by!r} has {both.sum()} facets of the surface {surface!r} of "
                 f"{part!r}, as at ({x:.6g}, {y:.6g}), which it moves whatever they touch: look "
@@ -162,13 +162,13 @@ def _moved_in_contact(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
             )
 
 
-def _shared(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
+def _shared(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     """What is said of facets that two interactions have: what is between them would be counted
     twice."""
     surfaces = [(part.name, name) for part in problem.interactions for name in _surfaces(part)]
     for (first, one), (second, other) in combinations(surfaces, 2):
         tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
-        common = whole.edges[np.isin(whole.tags, [*tags])]
+        common = whole.facets[np.isin(whole.tags, [*tags])]
         if first != second and len(common):
             x, y = whole.x[common[0, :2]].mean(axis=0)
             yield (
@@ -179,7 +179,7 @@ def _shared(problem: Problem, whole: PlaneMesh) -> Iterator[str]:
 
 
 def _loose(
-    problem: Problem, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]
+    problem: Problem, whole: MeshArrays, cells: dict[str, str], owner: dict[str, str]
 ) -> Iterator[str]:
     """What is said of bodies that neither supports nor contact hold; a turning one in contact is no
     fault."""
@@ -188,7 +188,7 @@ def _loose(
     for part in problem.interactions:
         names = _surfaces(part)
         facets = np.isin(whole.tags, whole.facet_sets[names[-1]])
-        ends = whole.x[whole.edges[facets][:, :2]]
+        ends = whole.x[whole.facets[facets][:, :2]]
         middle = ends.mean(axis=1)
         chord = ends[:, 1] - ends[:, 0]
         chord /= np.linalg.norm(chord, axis=1)[:, None]
@@ -217,7 +217,7 @@ def _loose(
 
 
 def _held_places(
-    problem: Problem, whole: PlaneMesh, cells: dict[str, str]
+    problem: Problem, whole: MeshArrays, cells: dict[str, str]
 ) -> dict[str, list[tuple[Array, Array]]]:
     """Where supports and displacements hold each body, and along what: places ``(k, 2)`` and
     directions ``(k, 2)``."""
@@ -310,10 +310,10 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
         yield f"{said}: of its interference of {wanted:g} only {left:.3g} presses them together"
 
 
-def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:
+def _nodes(whole: MeshArrays, name: str, of_cells: bool = False) -> np.ndarray:
     """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone;
     none of another name."""
     if not of_cells and (name in whole.facet_sets or name in whole.point_sets):
-        edges = whole.edges[np.isin(whole.tags, whole.facet_sets.get(name, ()))]
+        edges = whole.facets[np.isin(whole.tags, whole.facet_sets.get(name, ()))]
         return np.union1d(edges, whole.point_sets.get(name, ())).astype(np.int64)
     return np.unique(whole.cells[np.isin(whole.bodies, whole.cell_sets.get(name, ()))])

@@ -163,11 +163,18 @@ def _load(load: Load) -> dict[str, Any]:
     return words
 
 
+def _plane(problem: Problem) -> str:
+    """The name of the problem's kinematics, by its mesh where they wait for it."""
+    if problem.kinematics is not None:
+        return problem.kinematics.name
+    return "space" if problem.mesh.dimension == 3 else "strain"
+
+
 def _analysis(problem: Problem) -> dict[str, Any]:
     is_large = any(isinstance(body.material, LargeStrain) for body in problem.bodies)
     symmetry = int(problem.symmetry) if problem.symmetry % 1 == 0 else problem.symmetry
     words = {
-        "plane": problem.kinematics.name,
+        "plane": _plane(problem),
         "strain": "large" if is_large else problem.strain,
         "degree": problem.degree,
         "thickness": problem.thickness,

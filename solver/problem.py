@@ -67,9 +67,11 @@ class Problem:
     fit_steps : int
         Output steps of the stage before, in which interferences arise.
     kinematics : {"plane strain", "plane stress", "axisymmetric", "space"}
-        The kinematics of strain: how displacement becomes strain, in all bodies. Axisymmetric
-        problems have the coordinates x = r and y = z, and forces of the whole ring. Contact in
-        space knows no rigid discs yet. The kinematics of an `Interaction` are of contact.
+        The kinematics of strain: how displacement becomes strain, in all bodies. By default, as the
+        mesh is: space for tetrahedra and hexahedra, plane strain for triangles and quadrilaterals.
+        Axisymmetric problems have the coordinates x = r and y = z, and forces of the whole ring.
+        Contact in space knows no rigid discs yet. The kinematics of an `Interaction` are of
+        contact.
     thickness : float
         The thickness; forces and energies are per unit thickness without it.
     strain : {"small", "large"}
@@ -134,7 +136,7 @@ class Problem:
     drives: Sequence[Drive] = ()
     steps: int | Sequence[int] = 20
     fit_steps: int = 1
-    kinematics: Any = PLANE_STRAIN
+    kinematics: Any = None
     thickness: float | None = None
     strain: Literal["small", "large"] = "small"
     symmetry: float = 1.0
@@ -160,11 +162,11 @@ class Problem:
         if self.strain not in ("small", "large"):
             said = f'must be "small" or "large", not {self.strain!r}'
             raise InputError(f"archord.Problem: strain {said}.")
-        kinematics = _kinematics(self.kinematics, self.thickness)
-        object.__setattr__(self, "kinematics", kinematics)
-        if kinematics.is_plane and kinematics.thickness != 1:
-            object.__setattr__(self, "thickness", kinematics.thickness)
-        self._require_fitting_mesh()
+        given = self.kinematics
+        if given is None and isinstance(self.mesh, TaggedMesh):
+            given = "space" if self.mesh.dimension == 3 else PLANE_STRAIN
+        if given is not None:
+            self._take(_kinematics(given, self.thickness))
         bodies = [replace(body, material=self._live(body)) for body in self.bodies]
         object.__setattr__(self, "bodies", bodies)
         for kind in _DIFFERENT:
@@ -176,6 +178,13 @@ class Problem:
                 load.check()
         if not self.is_stated:
             self._require_drives()
+
+    def _take(self, kinematics: Kinematics) -> None:
+        """Take these ``kinematics``. Raises `InputError` for a mesh of others."""
+        object.__setattr__(self, "kinematics", kinematics)
+        if kinematics.is_plane and kinematics.thickness != 1:
+            object.__setattr__(self, "thickness", kinematics.thickness)
+        self._require_fitting_mesh()
 
     def _require_fitting_mesh(self) -> None:
         """Raise `InputError` for a mesh of other kinematics, and for contact that space lacks."""
@@ -227,7 +236,8 @@ class Problem:
         return replace(self, mesh=self.mesh.on(comm))
 
     def _live(self, body: Body) -> Any:
-        """The material of the ``body`` under the problem's kinematics."""
+        """The material of the ``body`` under the problem's kinematics, or as it is while these wait
+        for the mesh."""
         material = body.material
         if isinstance(material, str):
             try:
@@ -235,6 +245,8 @@ class Problem:
             except ValueError as error:
                 said = f'body "{body.name}".material = "{body.material}" {error}'
                 raise InputError(f"archord.Problem: {said}.") from None
+        if self.kinematics is None:
+            return material
         try:
             material = material.under(self.kinematics)
         except ValueError as error:

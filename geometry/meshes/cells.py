@@ -1,70 +1,125 @@
 """Cells and their sides as rows of node numbers, in the order of basix and of other programs.
 
-A row names the corners of a Lagrange cell first, then the nodes within its sides, then those inside
-it. A side comes as its two ends and the nodes between them.
+A row names the corners of a Lagrange cell first, then the nodes within its edges, then those within
+its faces, then those inside it. A side is an edge of a plane cell, a face of a cell in space. Its
+row has the same order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import basix
 import numpy as np
 from dolfinx.mesh import CellType, to_type
 
-from archord.geometry.basis import QUADRILATERAL, TRIANGLE, Array, lagrange_element, order_of
+from archord.geometry.basis import (
+    HEXAHEDRON,
+    QUADRILATERAL,
+    TETRAHEDRON,
+    TRIANGLE,
+    Array,
+    dimension_of,
+    lagrange_element,
+    order_of,
+)
 
-_SERENDIPITY = 8  # nodes of a quadrilateral of second order without one in its middle
+_HIGHEST = 3  # order
+_SERENDIPITY = {QUADRILATERAL: (8, 9), HEXAHEDRON: (20, 27)}  # nodes, without and with middle ones
+# Corners of the parts within a simplex, as pairs of its corners between which they lie. What the
+# parts at the corners of a tetrahedron leave is cut from the edge 0 2 to the edge 1 3.
+_WITHIN = {
+    TRIANGLE: [[(1, 2), (0, 2), (0, 1)]],
+    TETRAHEDRON: [
+        [(0, 2), (1, 3), (0, 1), (0, 3)],
+        [(0, 2), (1, 3), (0, 3), (2, 3)],
+        [(0, 2), (1, 3), (2, 3), (1, 2)],
+        [(0, 2), (1, 3), (1, 2), (0, 1)],
+    ],
+}
 
 
 def n_corners(kind: basix.CellType) -> int:
-    """How many corners, and so how many sides, a cell has."""
+    """How many corners a cell has."""
     return len(basix.topology(kind)[0])
+
+
+def side_kind(kind: basix.CellType) -> basix.CellType:
+    """The kind of the sides of a cell: interval, triangle or quadrilateral."""
+    return basix.cell.subentity_types(kind)[-2][0]
+
+
+def n_sides(kind: basix.CellType) -> int:
+    """How many sides a cell has."""
+    return len(basix.topology(kind)[-2])
+
+
+def entities_of(kind: basix.CellType, cells: np.ndarray, dim: int) -> np.ndarray:
+    """Nodes ``(m s, b)`` of the edges (``dim`` 1), faces or insides of ``cells`` ``(m, a)``, cell
+    by cell."""
+    of_entity = _closures(kind, cells.shape[1])[dim]
+    return cells[:, of_entity].reshape(-1, of_entity.shape[1])
+
+
+@cache
+def _closures(kind: basix.CellType, nodes: int) -> list[np.ndarray]:
+    """For each dimension the nodes ``(s, b)`` of the entities of a cell of so many ``nodes``."""
+    orders = range(1, 2 * _HIGHEST + 1)  # twice the highest one while cells are cut
+    elements = [lagrange_element(kind, order) for order in orders]
+    [element] = [element for element in elements if element.dim == nodes]
+    return [np.array(of_dim) for of_dim in element.entity_closure_dofs]
 
 
 def sides_of(kind: basix.CellType, cells: np.ndarray) -> np.ndarray:
     """Nodes ``(m s, b)`` of the sides of ``cells`` ``(m, a)``, cell by cell."""
-    order = order_of(kind, cells.shape[1])
-    of_side = lagrange_element(kind, order).entity_closure_dofs[1]
-    return cells[:, of_side].reshape(-1, order + 1)
+    return entities_of(kind, cells, dimension_of(kind) - 1)
 
 
 def along(sides: np.ndarray) -> np.ndarray:
-    """``sides`` ``(k, b)`` with their nodes as they follow each other."""
+    """Edges ``sides`` ``(k, b)`` with their nodes as they follow each other."""
     return sides[:, [0, *range(2, sides.shape[1]), 1]]
 
 
-def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where each edge comes first among ``ends`` ``(k, 2)``, and the number ``(k,)`` of each edge.
+def distinct(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where each edge or face comes first among ``corners`` ``(k, c)``, and the number ``(k,)`` of
+    each.
 
-    Edges have no direction.
+    They have no direction.
     """
-    low, high = np.sort(ends.astype(np.int64), axis=1).T
-    number = low * (high.max(initial=0) + 1) + high
-    _, first, which = np.unique(number, return_index=True, return_inverse=True)
-    return first, which
+    number, *others = np.sort(corners.astype(np.int64), axis=1).T
+    first = np.zeros(0, dtype=np.int64)
+    for other in others:
+        number = number * (other.max(initial=0) + 1) + other
+        _, first, number = np.unique(number, return_index=True, return_inverse=True)
+    return first, number
 
 
-def edges_among(edges: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Whether each of ``edges`` ``(k, b)`` is one of the ``others`` ``(j, b)``."""
-    _, which = distinct_edges(np.concatenate([edges[:, :2], others[:, :2]]))
-    return np.isin(which[: len(edges)], which[len(edges) :])
+def corners_of(kind: basix.CellType, sides: np.ndarray) -> np.ndarray:
+    """The corners ``(k, c)`` of ``sides`` ``(k, b)`` of cells."""
+    return sides[:, : n_corners(side_kind(kind))]
 
 
-def sides_between(kind: basix.CellType, cells: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Which of `sides_of` ``cells`` has each pair of ``ends`` ``(k, 2)``; where none has, a number
-    beyond them."""
+def sides_among(kind: basix.CellType, sides: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Whether each of the ``sides`` ``(k, b)`` is one of the ``others`` ``(j, b)``."""
+    _, which = distinct(np.concatenate([corners_of(kind, sides), corners_of(kind, others)]))
+    return np.isin(which[: len(sides)], which[len(sides) :])
+
+
+def sides_between(kind: basix.CellType, cells: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Which of `sides_of` ``cells`` has each row of ``corners`` ``(k, c)``; where none has, a
+    number beyond them."""
     sides = sides_of(kind, cells)
-    first, which = distinct_edges(np.concatenate([sides[:, :2], ends]))
+    first, which = distinct(np.concatenate([corners_of(kind, sides), corners]))
     return first[which[len(sides) :]]
 
 
 def outer_sides(kind: basix.CellType, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The sides ``(k, b)`` of ``cells`` that belong to one cell alone, and that cell ``(k,)``."""
     sides = sides_of(kind, cells)
-    first, which = distinct_edges(sides[:, :2])
+    first, which = distinct(corners_of(kind, sides))
     alone = first[np.bincount(which) == 1]
-    return sides[alone], alone // n_corners(kind)
+    return sides[alone], alone // n_sides(kind)
 
 
 def inner_weights(kind: basix.CellType, order: int) -> Array:
@@ -74,24 +129,35 @@ def inner_weights(kind: basix.CellType, order: int) -> Array:
     quadratic ones.
     """
     element = lagrange_element(kind, order)
-    p = np.arange(order + 1)
-    determined = p[:, None] + p < order if kind == TRIANGLE else np.minimum(p[:, None], p) <= 1
-    i, j = np.nonzero(determined)
-    x, y = element.points.T[:, :, None]
-    values = x**i * y**j
-    on_sides = len(values) - len(element.entity_dofs[2][0])
+    d = dimension_of(kind)
+    powers = np.indices((order + 1,) * d).reshape(d, -1)
+    simplex = n_corners(kind) == d + 1
+    determined = powers.sum(axis=0) < order if simplex else powers.min(axis=0) <= 1
+    x = element.points.T[:, :, None]
+    values = np.prod(x ** powers[:, None, determined], axis=0)
+    on_sides = len(values) - len(element.entity_dofs[-1][0])
     return values[on_sides:] @ np.linalg.pinv(values[:on_sides])
 
 
-def with_middle_nodes(x: Array, cells: np.ndarray) -> tuple[Array, np.ndarray]:
-    """Nodes and quadrilaterals ``(m, 9)`` for ``cells`` ``(m, 8)``, which have no node inside.
+def with_middle_nodes(
+    kind: basix.CellType, x: Array, cells: np.ndarray
+) -> tuple[Array, np.ndarray]:
+    """Nodes and ``cells`` with middle nodes, for quadrilaterals ``(m, 8)`` and hexahedra ``(m,
+    20)``, which have none in their faces and inside.
 
-    The new node lies where the others interpolate. Four corners come first, then the middles of the
-    sides in any order.
+    A new node lies where the nodes around it interpolate. Corners come first, then the middles of
+    the edges in basix' order.
     """
-    middle = np.einsum("b,cbk->ck", inner_weights(QUADRILATERAL, 2)[0], x[cells])
-    number = len(x) + np.arange(len(cells))
-    return np.concatenate([x, middle]), np.column_stack([cells, number])
+    element = lagrange_element(kind, 2)
+    for dim in range(2, dimension_of(kind) + 1):
+        weights = inner_weights(basix.cell.subentity_types(kind)[dim][0], 2)[0]
+        around = np.array(element.entity_closure_dofs[dim])[:, :-1]
+        faces = cells[:, around].reshape(-1, around.shape[1])
+        first, which = distinct(faces[:, : 2**dim])
+        middle = np.einsum("b,cbk->ck", weights, x[faces[first]])
+        cells = np.hstack([cells, (len(x) + which).reshape(len(cells), -1)])
+        x = np.concatenate([x, middle])
+    return x, cells
 
 
 def in_basix_order(
@@ -102,18 +168,31 @@ def in_basix_order(
 ) -> tuple[Array, np.ndarray]:
     """Nodes and ``cells`` ``(m, a)`` from those in another program's order.
 
-    Quadrilaterals of 8 nodes get a ninth.
+    Quadrilaterals of 8 nodes get a ninth, hexahedra of 20 nodes seven more.
     """
-    if kind == QUADRILATERAL and cells.shape[1] == _SERENDIPITY:
-        x, cells = with_middle_nodes(x, cells)
-    order_of(kind, cells.shape[1])
-    return x, cells[:, permutation(to_type(kind.name), cells.shape[1])]
+    given = cells.shape[1]
+    without, whole = _SERENDIPITY.get(kind, (0, 0))
+    wanted = whole if given == without else given
+    order_of(kind, wanted)
+    cells = cells[:, permutation(to_type(kind.name), wanted)[:given]]
+    return (x, cells) if given == wanted else with_middle_nodes(kind, x, cells)
 
 
-def quarters(kind: basix.CellType, X: Array) -> Array:
-    """Where the four parts ``(4, q, 2)`` of a reference cell have the points ``X`` ``(q, 2)``."""
-    corner = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]])
-    size = np.full(4, 0.5)
-    if kind == TRIANGLE:
-        size[3] = -0.5  # the part in the middle is turned
-    return corner[:, None] + size[:, None, None] * X
+@cache
+def _parts(kind: basix.CellType) -> tuple[Array, Array]:
+    """First corners ``(p, d)`` and edges ``(p, d, d)`` of the parts of a reference cell, half as
+    large."""
+    corner = basix.geometry(kind)
+    n, d = corner.shape
+    if kind not in _WITHIN:
+        return corner / 2, np.broadcast_to(np.eye(d) / 2, (n, d, d))
+    at_corners = [[(k, other) for other in range(n)] for k in range(n)]
+    x = corner[np.array([*at_corners, *_WITHIN[kind]])].mean(axis=2)
+    return x[:, 0], x[:, 1:] - x[:, :1]
+
+
+def parts_of(kind: basix.CellType, X: Array) -> Array:
+    """Where the parts ``(2^d, q, d)`` of a reference cell, cut in the middles of its edges, have
+    the points ``X`` ``(q, d)``."""
+    corner, edges = _parts(kind)
+    return corner[:, None] + X @ edges

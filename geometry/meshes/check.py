@@ -16,14 +16,15 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import Curve, circle_through
 from archord.geometry.meshes.cells import (
     along,
-    distinct_edges,
-    edges_among,
-    n_corners,
+    corners_of,
+    distinct,
+    n_sides,
     outer_sides,
+    sides_among,
     sides_of,
 )
 from archord.geometry.meshes.fenicsx import gathered
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import distorted, faults, place, thin
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
@@ -70,25 +71,29 @@ def check_mesh(
         inside = {
             body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()
         }
-        straight = [found for pair in pairs if len(pair) == 2 for found in _sagitta(mesh, pair)]
+        is_plane = mesh.dimension == 2
+        arcs = [pair for pair in pairs if len(pair) == 2 and is_plane]
+        straight = [found for pair in arcs for found in _sagitta(mesh, pair)]
         found = chain(
             faults(mesh),
             _of_bodies(mesh, inside, millimetres),
             *(_of_surface(mesh, inside, name) for name in surfaces),
             (said for said, spoils in straight if spoils),
-            _overlaps(mesh, inside, overlap),
+            _overlaps(mesh, inside, overlap) if is_plane else (),
         )
         fault = next(found, "")
         warnings = distorted(mesh) + thin(mesh) + [said for said, _ in straight]
         for body, within in inside.items():
-            warnings += [*cracks(mesh, body, within), *holes(mesh, body, within)]
+            warnings += cracks(mesh, body, within)
+            if is_plane:
+                warnings += holes(mesh, body, within)
     fault, warnings = tagged.mesh.comm.bcast((fault, warnings))
     if fault:
         raise ValueError(fault)
     return [*tagged.notes, *warnings]
 
 
-def _of_bodies(mesh: PlaneMesh, inside: Inside, millimetres: bool) -> Iterator[str]:
+def _of_bodies(mesh: MeshArrays, inside: Inside, millimetres: bool) -> Iterator[str]:
     size = np.ptp(mesh.x, axis=0).max()
     if millimetres and size < 1:
         yield f"the mesh is {size:g} mm large; is it in metres? Then give mesh.scale = 1000"
@@ -120,27 +125,27 @@ def parts(kind: basix.CellType, cells: np.ndarray) -> np.ndarray:
     """The part ``(m,)`` of each of ``cells``, from 0: cells that share sides are of one part."""
     if not len(cells):
         return np.zeros(0, dtype=np.int32)
-    _, side = distinct_edges(sides_of(kind, cells)[:, :2])
-    cell = np.arange(len(cells)).repeat(n_corners(kind))
+    _, side = distinct(corners_of(kind, sides_of(kind, cells)))
+    cell = np.arange(len(cells)).repeat(n_sides(kind))
     at_sides = coo_matrix((np.ones(len(side)), (cell, side))).tocsr()
     return connected_components(at_sides @ at_sides.T, directed=False)[1]
 
 
-def _of_surface(mesh: PlaneMesh, inside: Inside, name: str) -> Iterator[str]:
-    edges = mesh.facets(name)
-    owners = [body for body, cells in inside.items() if np.isin(edges, mesh.cells[cells]).any()]
+def _of_surface(mesh: MeshArrays, inside: Inside, name: str) -> Iterator[str]:
+    facets = mesh.facets_of(name)
+    owners = [body for body, cells in inside.items() if np.isin(facets, mesh.cells[cells]).any()]
     if len(owners) > 1:
         yield (
             f"the facet set {name!r} is of the bodies {' and '.join(map(repr, owners))}; a "
             "surface is of one"
         )
-    if not _outside(mesh, edges).all():
+    if not _outside(mesh, facets).all():
         yield (
             f"the facet set {name!r} lies inside the body {owners[0]!r}; a surface is on a boundary"
         )
 
 
-def _polygons(mesh: PlaneMesh, edges: np.ndarray) -> Array:
+def _polygons(mesh: MeshArrays, edges: np.ndarray) -> Array:
     """Points ``(k, pieces + 1, 2)`` on ``edges`` ``(k, b)``."""
     order = edges.shape[1] - 1
     shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(np.linspace(0, 1, _PIECES + 1))
@@ -159,7 +164,7 @@ class _Outline(NamedTuple):
     end: Array
 
     @classmethod
-    def of(cls, mesh: PlaneMesh, cells: np.ndarray) -> _Outline:
+    def of(cls, mesh: MeshArrays, cells: np.ndarray) -> _Outline:
         sides, behind = outer_sides(mesh.kind, cells)
         middles = mesh.x[cells[behind]].mean(axis=1)
         polygon = _polygons(mesh, sides)
@@ -191,7 +196,7 @@ class _Outline(NamedTuple):
         return np.where(depth > spare[nearest], depth, 0.0)
 
 
-def _overlaps(mesh: PlaneMesh, inside: Inside, allowed: float) -> Iterator[str]:
+def _overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
     """Boundary vertices of a body, or middles of its cells there, that lie in another by more than
     is ``allowed``."""
     into = _INTO_CURVED if mesh.order > 1 else _INTO_STRAIGHT
@@ -215,10 +220,10 @@ def _overlaps(mesh: PlaneMesh, inside: Inside, allowed: float) -> Iterator[str]:
                 break
 
 
-def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
+def cracks(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
     """A warning of nodes of a ``body`` of these ``cells`` that ought to be one."""
     sides, _ = outer_sides(mesh.kind, mesh.cells[cells])
-    nodes = np.unique(sides[:, :2])
+    nodes = np.unique(corners_of(mesh.kind, sides))
     near = _SAME * np.ptp(mesh.x, axis=0).max()
     pairs = cKDTree(mesh.x[nodes]).query_pairs(near, output_type="ndarray")
     if len(pairs):
@@ -229,7 +234,7 @@ def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
         )
 
 
-def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
+def holes(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
     """Warnings of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a
     facet set, and of nodes in which its boundary meets itself."""
     sides, _ = outer_sides(mesh.kind, mesh.cells[cells])
@@ -239,8 +244,8 @@ def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
     joined = coo_matrix((np.ones(len(ends)), number.T), shape=(len(nodes), len(nodes)))
     loop = connected_components(joined, directed=False)[1][number[:, 0]]
     outermost = loop[mesh.x[ends, 0].max(axis=1).argmax()]
-    named = edges_among(ends, mesh.edges)
-    small = np.bincount(loop) == n_corners(mesh.kind)
+    named = sides_among(mesh.kind, sides, mesh.facets)
+    small = np.bincount(loop) == n_sides(mesh.kind)
     small &= np.bincount(loop, weights=named) == 0
     small[outermost] = False
     if small.any():
@@ -256,27 +261,29 @@ def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
         )
 
 
-def facets_within(mesh: PlaneMesh, name: str) -> Iterator[str]:
+def facets_within(mesh: MeshArrays, name: str) -> Iterator[str]:
     """A warning of a facet set with a part inside the bodies and the rest on their boundary."""
-    edges = mesh.facets(name)
-    within = ~_outside(mesh, edges)
+    facets = mesh.facets_of(name)
+    within = ~_outside(mesh, facets)
     if within.any() and not within.all():
-        at = place(mesh.x[edges[within][0, :2]].mean(axis=0))
+        at = place(mesh.x[corners_of(mesh.kind, facets[within])[0]].mean(axis=0))
         yield (
-            f"the facet set {name!r} has {within.sum()} of its {len(edges)} facets inside a body, "
+            f"the facet set {name!r} has {within.sum()} of its {len(facets)} facets inside a body, "
             f"as at {at}"
         )
 
 
-def gaps(mesh: PlaneMesh, name: str) -> Iterator[str]:
+def gaps(mesh: MeshArrays, name: str) -> Iterator[str]:
     """A warning of single facets on the boundary that no set has, though the facets at both of
     their ends are of sets, one of them of ``name`` and in line with them."""
+    if mesh.dimension != 2:
+        return
     outer, _ = outer_sides(mesh.kind, mesh.cells)
-    of_none = outer[~edges_among(outer, mesh.edges), :2]
-    between = of_none[np.isin(of_none, mesh.edges[:, :2]).all(axis=1)]
+    of_none = outer[~sides_among(mesh.kind, outer, mesh.facets), :2]
+    between = of_none[np.isin(of_none, mesh.facets[:, :2]).all(axis=1)]
     direction = {
         int(node): mesh.x[end] - mesh.x[start]
-        for start, end in mesh.facets(name)[:, :2]
+        for start, end in mesh.facets_of(name)[:, :2]
         for node in (start, end)
     }
     missing = [edge for edge in between if _goes_on(mesh, edge, direction)]
@@ -288,7 +295,7 @@ def gaps(mesh: PlaneMesh, name: str) -> Iterator[str]:
         )
 
 
-def _goes_on(mesh: PlaneMesh, edge: np.ndarray, direction: Mapping[int, Array]) -> bool:
+def _goes_on(mesh: MeshArrays, edge: np.ndarray, direction: Mapping[int, Array]) -> bool:
     """Whether an ``edge`` meets facets, which have a ``direction`` at their ends, and turns little
     there."""
     own = mesh.x[edge[1]] - mesh.x[edge[0]]
@@ -297,13 +304,13 @@ def _goes_on(mesh: PlaneMesh, edge: np.ndarray, direction: Mapping[int, Array]) 
     return max(cosines, default=0.0) > _STRAIGHT
 
 
-def _outside(mesh: PlaneMesh, edges: np.ndarray) -> np.ndarray:
-    """Whether each of the ``edges`` ``(k, b)`` is on the boundary of the mesh."""
+def _outside(mesh: MeshArrays, facets: np.ndarray) -> np.ndarray:
+    """Whether each of the ``facets`` ``(k, b)`` is on the boundary of the mesh."""
     outer, _ = outer_sides(mesh.kind, mesh.cells)
-    return edges_among(edges, outer)
+    return sides_among(mesh.kind, facets, outer)
 
 
-def _sagitta(mesh: PlaneMesh, pair: Pair) -> Iterator[tuple[str, bool]]:
+def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
     """What is wrong where a round surface beside another, or beside a disc of that radius, has
     straight sides, and whether this spoils their clearance.
 
@@ -313,7 +320,7 @@ def _sagitta(mesh: PlaneMesh, pair: Pair) -> Iterator[tuple[str, bool]]:
     deepest = 0.0
     names = [name for name in pair if isinstance(name, str)]
     for name in names:
-        edges = mesh.facets(name)
+        edges = mesh.facets_of(name)
         circle = circle_through(mesh.x[np.unique(edges[:, :2])])
         if circle is None:
             return

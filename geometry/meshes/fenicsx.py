@@ -19,9 +19,9 @@ from dolfinx.mesh import create_mesh, entities_to_geometry, meshtags, meshtags_f
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.cells import n_corners, sides_between, sides_of
+from archord.geometry.meshes.cells import corners_of, n_corners, sides_between, sides_of
+from archord.geometry.meshes.mesh_arrays import MeshArrays, gmsh_dimension
 from archord.geometry.meshes.mesh_cache import kept_mesh
-from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle, on_circles
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.kernels.compat import cell_nodes
@@ -38,7 +38,7 @@ _OPTIONS = {
     "Algorithm": 6,
     "HighOrderOptimize": 0,
 }
-_ARRAYS = ("x", "cells", "bodies", "edges", "tags")
+_ARRAYS = ("x", "cells", "bodies", "facets", "tags")
 _UNTAGGED = np.iinfo(np.int32).min  # the tag of a cell that has none
 
 
@@ -56,7 +56,8 @@ def gmsh_to_mesh(
     """Mesh what a function draws in gmsh, and distribute it over the ranks.
 
     The sets have the names of gmsh's physical groups. An error on rank 0 is raised on every rank.
-    What has a mesh already is taken by `Mesh`.
+    Where physical volumes are drawn, the mesh is of space, else of a plane. What has a mesh already
+    is taken by `Mesh`.
 
     Parameters
     ----------
@@ -70,9 +71,9 @@ def gmsh_to_mesh(
     order : int
         The order of the cells.
     refinements : int
-        How many times the cells are cut in four, before they get nodes of higher order.
+        How many times the edges of the cells are cut in two, before they get nodes of higher order.
     quads : bool
-        Quadrilaterals instead of triangles.
+        Quadrilaterals instead of triangles, in a plane.
     partitioner : callable
         Replaces the cut in `sectors`, as in dolfinx.
     key : tuple
@@ -103,7 +104,7 @@ def gmsh_to_mesh(
     >>> list(mesh.cell_sets), list(mesh.facet_sets)
     (['pin'], ['rim'])
     """
-    made: PlaneMesh | None = None
+    made: MeshArrays | None = None
     failure: Exception | None = None
     if comm.rank == 0:
         make = partial(_made, build, circles, order, refinements, quads)
@@ -120,7 +121,7 @@ def gmsh_to_mesh(
 
 def _made(
     build: Callable, circles: Sequence[Circle], order: int, refinements: int, quads: bool
-) -> PlaneMesh:
+) -> MeshArrays:
     options = _OPTIONS | {"RecombineAll": quads}
     if quads:
         options["RecombinationAlgorithm"] = _ALL_QUADS
@@ -128,12 +129,12 @@ def _made(
         for name, value in options.items():
             gmsh.option.setNumber(f"Mesh.{name}", value)
         build(gmsh)
-        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.generate(gmsh_dimension(gmsh))
         for _ in range(refinements):
             gmsh.model.mesh.refine()
         if order > 2:
             gmsh.model.mesh.setOrder(order)
-        mesh = PlaneMesh.from_gmsh(gmsh)
+        mesh = MeshArrays.from_gmsh(gmsh)
     if order == 2:  # in much less time than gmsh's setOrder
         mesh = mesh.second_order()
     mesh = on_circles(mesh, circles)
@@ -173,7 +174,7 @@ def own_gmsh() -> Iterator[Any]:
 
 
 def distribute(
-    comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cut | None = None
+    comm: MPI.Comm, made: MeshArrays | None, partitioner=None, cut: Cut | None = None
 ) -> TaggedMesh:
     """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None; cut in
     `sectors`, if not as ``cut`` or ``partitioner`` say. Collective."""
@@ -188,21 +189,21 @@ def distribute(
     if partitioner is None and comm.size > 1:
         partitioner = in_parts
     equispaced = basix.LagrangeVariant.equispaced
-    element = basix.ufl.element("P", made.kind, made.order, equispaced, shape=(2,))
+    element = basix.ufl.element("P", made.kind, made.order, equispaced, shape=(made.dimension,))
     mesh = create_mesh(comm, cells=made.cells, x=made.x, e=element, partitioner=partitioner)
     dim = mesh.topology.dim
     number = np.asarray(mesh.topology.original_cell_index)
     bodies = comm.bcast(made.bodies)[number]
     cells = meshtags(mesh, dim, np.arange(len(number), dtype=np.int32), bodies)
-    edges, tags = distribute_entity_data(mesh, dim - 1, made.edges, made.tags)
+    corners, tags = distribute_entity_data(mesh, dim - 1, made.facets, made.tags)
     mesh.topology.create_connectivity(dim - 1, dim)
-    facets = meshtags_from_entities(mesh, dim - 1, adjacencylist(edges), tags)
+    facets = meshtags_from_entities(mesh, dim - 1, adjacencylist(corners), tags)
     places = {name: made.x[nodes] for name, nodes in made.point_sets.items() if comm.rank == 0}
     points = comm.bcast(places)
     return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points, made.notes)
 
 
-def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
+def gathered(tagged: TaggedMesh) -> MeshArrays | None:
     """The inverse of `distribute`: the whole mesh on rank 0, None elsewhere. Collective."""
     from scipy.spatial import cKDTree  # a solve without a mesh from Python does not pay for it
 
@@ -217,32 +218,34 @@ def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
     body[tagged.cells.indices] = tagged.cells.values
     owned = tagged.facets.indices < topology.index_map(dim - 1).size_local
     facets = tagged.facets.indices[owned]
-    none = np.zeros((0, 2), dtype=np.int32)
-    ends = entities_to_geometry(mesh, dim - 1, facets)[:, :2] if len(facets) else none
+    corners = sides_of(kind, cell_nodes(mesh)[:0])
+    if len(facets):
+        corners = entities_to_geometry(mesh, dim - 1, facets)
+    corners = corners_of(kind, corners)
     try:
         number = np.asarray(topology.original_cell_index)[:n]
     except RuntimeError:  # of a submesh
         number = index_map.local_range[0] + np.arange(n)
     cells = node[cell_nodes(mesh)[:n]]
     tags = tagged.facets.values[owned]
-    x = mesh.geometry.x[:, :2]
-    parts = mesh.comm.gather((number, cells, body[:n], node[ends], tags, node, x))
+    x = mesh.geometry.x[:, :dim]
+    parts = mesh.comm.gather((number, cells, body[:n], node[corners], tags, node, x))
     if parts is None:
         return None
-    number, cells, body, ends, tags, node, x = map(np.concatenate, zip(*parts, strict=True))
+    number, cells, body, corners, tags, node, x = map(np.concatenate, zip(*parts, strict=True))
     nodes, first = np.unique(node, return_index=True)
     x = x[first]
     cells = np.searchsorted(nodes, cells)
-    facets = sides_between(kind, cells, np.searchsorted(nodes, ends))
-    edges = sides_of(kind, cells)[facets]
+    found = sides_between(kind, cells, np.searchsorted(nodes, corners))
+    facets = sides_of(kind, cells)[found]
     order = np.argsort(number)
     points = {name: cKDTree(x).query(places)[1] for name, places in tagged.point_sets.items()}
-    return PlaneMesh(
+    return MeshArrays(
         x,
         kind,
         cells[order],
         body[order],
-        edges,
+        facets,
         tags,
         dict(tagged.cell_sets),
         dict(tagged.facet_sets),
@@ -252,14 +255,14 @@ def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
 
 
 def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
-    """The rank ``(n,)`` of each of the ``cells`` ``(n, k)`` with vertices ``x`` ``(m, 2)``: sectors
-    around the origin, numbered from below, of as many cells each.
+    """The rank ``(n,)`` of each of the ``cells`` ``(n, k)`` with vertices ``x`` ``(m, d)``: sectors
+    around the origin, or the z axis, numbered from below, of as many cells each.
 
     Points in contact face each other along rays from there, so most pairs stay on one rank; and the
     cut is the same in every run, unlike the cut of a graph partitioner, whose input arrives in any
     order.
     """
-    middle_x, middle_y = x[cells].mean(axis=1).T
+    middle_x, middle_y = x[cells].mean(axis=1).T[:2]
     return _in_turn(np.arctan2(middle_y, middle_x), n_parts)
 
 

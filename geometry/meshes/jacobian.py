@@ -2,8 +2,8 @@
 
 The determinant of a cell's map is a polynomial, which lies between its smallest and largest
 Bernstein coefficient (Johnen, Remacle and Geuzaine 2013, "Geometrical validity of curvilinear
-finite elements"). Where these leave the sign open, the cell is cut in four, which brings
-coefficients and values together.
+finite elements"). Where these leave the sign open, the cell is cut in the middles of its edges,
+which brings coefficients and values together.
 """
 
 from __future__ import annotations
@@ -14,24 +14,41 @@ from math import factorial
 import basix
 import numpy as np
 
-from archord.geometry.basis import TRIANGLE, Array, lagrange_element, tabulate
-from archord.geometry.meshes.cells import quarters
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.basis import Array, dimension_of, lagrange_element, tabulate
+from archord.geometry.meshes.cells import n_corners, parts_of
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 
-_DEEPEST = 6  # cuts in four; a part that is open then is 1/64 of its cell long
+_DEEPEST = 6  # cuts; a part that is open then is 1/64 of its cell long
+# in space, of a cell's largest determinant: a smallest one above this is not looked for
+_SOUND = 0.05
+_AT_ONCE = 500_000  # determinants
 _NEAR = 1e-3  # of a cell's largest determinant: how far the bounds of a smallest one may be apart
 
 
-def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
+def smallest_determinants(mesh: MeshArrays) -> tuple[Array, Array]:
     """For each cell of ``mesh`` the smallest and the largest determinant ``(n,)`` of its map,
     positive for cells whose corners run either way round.
 
     The smallest is a value of the determinant, at most a thousandth of the largest one above the
-    true minimum.
+    true minimum. In space this holds where it is small.
     """
-    kind = mesh.kind
-    degree = 2 * (mesh.order - 1) if kind == TRIANGLE else 2 * mesh.order - 1
-    value = _determinants(mesh, degree)
+    d = mesh.dimension
+    degree = d * (mesh.order - 1) if _is_simplex(mesh.kind) else d * mesh.order - 1
+    n_points = len(_points(mesh.kind, degree))
+    pieces = np.array_split(mesh.cells, 1 + len(mesh.cells) * n_points // _AT_ONCE)
+    found = [_extremes(mesh.kind, _determinants(mesh, cells, degree), degree) for cells in pieces]
+    smallest, largest = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return smallest, largest
+
+
+def _is_simplex(kind: basix.CellType) -> bool:
+    """Whether a cell is a triangle or a tetrahedron."""
+    return n_corners(kind) == dimension_of(kind) + 1
+
+
+def _extremes(kind: basix.CellType, value: Array, degree: int) -> tuple[Array, Array]:
+    """`smallest_determinants` of cells from the values ``(n, q)`` at the nodes of the ``degree``,
+    which are changed."""
     to_bernstein = _bernstein_of_values(kind, degree)
     # all Bernstein polynomials have the same integral
     signed_area = (value @ to_bernstein.T).mean(axis=1)
@@ -45,6 +62,8 @@ def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
     for _ in range(_DEEPEST):
         bound = (value @ to_bernstein.T).min(axis=1)
         still_open = bound < smallest[cell] - _NEAR * np.abs(largest[cell])
+        if dimension_of(kind) == 3:
+            still_open &= bound < _SOUND * largest[cell]
         if not still_open.any():
             break
         value = np.einsum("pqr,nr->npq", parts, value[still_open]).reshape(-1, value.shape[1])
@@ -53,36 +72,38 @@ def smallest_determinants(mesh: PlaneMesh) -> tuple[Array, Array]:
     return smallest, largest
 
 
-def _determinants(mesh: PlaneMesh, degree: int) -> Array:
-    """Determinants ``(n, q)`` at the Lagrange nodes of the ``degree``, which determine the
-    polynomial."""
+def _determinants(mesh: MeshArrays, cells: np.ndarray, degree: int) -> Array:
+    """Determinants ``(n, q)`` of ``cells`` at the Lagrange nodes of the ``degree``, which determine
+    the polynomial."""
     slopes = tabulate(mesh.kind, mesh.order, _points(mesh.kind, degree))[1:]
-    by_X, by_Y = np.tensordot(slopes, mesh.x[mesh.cells], axes=(2, 1))  # (q, n, 2) each
+    by_X, by_Y, *by_Z = np.tensordot(slopes, mesh.x[cells], axes=(2, 1))  # (q, n, d) each
+    if by_Z:
+        return np.einsum("qni,qni->nq", np.cross(by_X, by_Y), by_Z[0])
     return (by_X[..., 0] * by_Y[..., 1] - by_X[..., 1] * by_Y[..., 0]).T
 
 
 def _points(kind: basix.CellType, degree: int) -> Array:
-    """Equispaced nodes ``(q, 2)`` of a ``degree``; the middle of the cell for degree 0."""
+    """Equispaced nodes ``(q, d)`` of a ``degree``; the middle of the cell for degree 0."""
     if degree == 0:
-        return np.full((1, 2), 1 / 3)
+        return basix.geometry(kind).mean(axis=0, keepdims=True)
     return lagrange_element(kind, degree).points
 
 
 @cache
 def _bernstein_of_values(kind: basix.CellType, degree: int) -> Array:
     """The matrix ``(q, q)`` from values at the nodes to Bernstein coefficients."""
-    X, Y = _points(kind, degree).T[:, :, None]
-    i, j = np.indices((degree + 1, degree + 1)).reshape(2, -1)
-    if kind == TRIANGLE:
-        inside = i + j <= degree
-        i = i[inside]
-        j = j[inside]
-        rest = degree - i - j
-        values = _choose(degree, i, j, rest) * X**i * Y**j * (1 - X - Y) ** rest
+    X = _points(kind, degree).T[:, :, None]
+    d = len(X)
+    powers: np.ndarray = np.indices((degree + 1,) * d).reshape(d, -1)
+    if _is_simplex(kind):
+        powers = powers[:, powers.sum(axis=0) <= degree]
+        rest = degree - powers.sum(axis=0)
+        last = (1 - X.sum(axis=0)) ** rest
+        values = _choose(degree, *powers, rest) * np.prod(X ** powers[:, None], axis=0) * last
     else:
-        of_x = _choose(degree, i, degree - i) * X**i * (1 - X) ** (degree - i)
-        of_y = _choose(degree, j, degree - j) * Y**j * (1 - Y) ** (degree - j)
-        values = of_x * of_y
+        along = [_choose(degree, i, degree - i) * x**i for x, i in zip(X, powers, strict=True)]
+        back = np.prod((1 - X) ** (degree - powers[:, None]), axis=0)
+        values = np.prod(along, axis=0) * back
     return np.linalg.inv(values)
 
 
@@ -94,6 +115,6 @@ def _choose(degree: int, *parts: np.ndarray) -> Array:
 
 @cache
 def _values_on_parts(kind: basix.CellType, degree: int) -> Array:
-    """Matrices ``(4, q, q)`` from values at the nodes of a cell to those at the nodes of its four
+    """Matrices ``(2^d, q, q)`` from values at the nodes of a cell to those at the nodes of its
     parts."""
-    return tabulate(kind, degree, quarters(kind, _points(kind, degree)))[0]
+    return tabulate(kind, degree, parts_of(kind, _points(kind, degree)))[0]

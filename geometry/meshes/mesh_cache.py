@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
 from archord.kernels.compiled import cache_folder, is_private
 
@@ -18,7 +18,7 @@ _MOST = 100  # meshes kept
 _LARGEST = 200_000  # triangles: larger ones take long to solve, and space
 
 
-def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
+def kept_mesh(key: tuple, make: Callable[[], MeshArrays]) -> MeshArrays:
     """The mesh that ``key`` determines: the kept one, or what ``make`` returns.
 
     A mesh is made where another version of gmsh or of this code made the kept one, where the kept
@@ -46,7 +46,7 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
     return mesh
 
 
-def _keep(mesh: PlaneMesh, path: Path) -> None:
+def _keep(mesh: MeshArrays, path: Path) -> None:
     """Write ``mesh`` to ``path``, and remove the meshes that were not used for longest. Raises
     `OSError`."""
     folder = path.parent

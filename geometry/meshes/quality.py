@@ -4,40 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import basix
 import numpy as np
 
-from archord.geometry.basis import Array, bulk_quadrature, tabulate
-from archord.geometry.meshes.cells import distinct_edges, n_corners, sides_of
+from archord.geometry.basis import Array, bulk_quadrature, lagrange_element, tabulate
+from archord.geometry.meshes.cells import corners_of, distinct, entities_of, sides_of
 from archord.geometry.meshes.jacobian import smallest_determinants
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 # Smallest over largest jacobian below which a cell is told of. Cells below -0.02 are refused: the
 # corner of a curved cell with two sides on one arc is flat, and comes out a little below zero.
 _DISTORTED = 0.02
-_THIN = 0.005  # area over the square of the longest side, below which a cell is told of
+# area over the square of the longest edge, or the root of the volume over its cube, below which a
+# cell is told of
+_THIN = 0.005
+_UNLIKE_CORNERS = {
+    2: "triangles alone, or with quadrilaterals of four different corners",
+    3: "tetrahedra alone, or with hexahedra of eight different corners",
+}
 
 
 def place(x: Array) -> str:
     """A point as text."""
-    return f"({x[0]:g}, {x[1]:g})"
+    return f"({', '.join(f'{value:g}' for value in x)})"
 
 
-def _place_of(mesh: PlaneMesh, cell: int) -> str:
+def _place_of(mesh: MeshArrays, cell: int) -> str:
     """The middle of a ``cell`` and the sets that have it."""
     names = [repr(name) for name, tags in mesh.cell_sets.items() if mesh.bodies[cell] in tags]
     middle = place(mesh.x[mesh.cells[cell]].mean(axis=0))
     return f"{middle} in {' and '.join(names)}" if names else middle
 
 
-def faults(mesh: PlaneMesh) -> list[str]:
+def faults(mesh: MeshArrays) -> list[str]:
     """Why nothing can be computed on ``mesh``: cells that are folded, collapsed, there twice, or
-    three at an edge."""
+    three at a side."""
     checks = (_unsound, _there_twice, _crowded, _apart)
     return [said for check in checks for said in check(mesh)]
 
 
-def _there_twice(mesh: PlaneMesh) -> Iterator[str]:
+def _there_twice(mesh: MeshArrays) -> Iterator[str]:
     nodes = np.sort(mesh.cells, axis=1)
     _, first, count = np.unique(nodes, axis=0, return_index=True, return_counts=True)
     again = first[count > 1]
@@ -45,41 +52,54 @@ def _there_twice(mesh: PlaneMesh) -> Iterator[str]:
         yield f"{len(again)} cells are there twice, the first at {_place_of(mesh, again[0])}"
 
 
-def _crowded(mesh: PlaneMesh) -> Iterator[str]:
+def _crowded(mesh: MeshArrays) -> Iterator[str]:
     sides = sides_of(mesh.kind, mesh.cells)
-    first, which = distinct_edges(sides[:, :2])
+    first, which = distinct(corners_of(mesh.kind, sides))
     crowded = first[np.bincount(which) > 2]
     if len(crowded):
         at = place(mesh.x[sides[crowded[0]]].mean(axis=0))
+        what = "edges" if mesh.dimension == 2 else "faces"
         yield (
-            f"{len(crowded)} edges belong to more than two cells, the first at {at}: cells overlap"
+            f"{len(crowded)} {what} belong to more than two cells, the first at {at}: cells overlap"
         )
 
 
-def _apart(mesh: PlaneMesh) -> Iterator[str]:
-    """Cells that share the ends of a side, but not the nodes between them."""
+def _apart(mesh: MeshArrays) -> Iterator[str]:
+    """Cells that share the corners of a side, but not the nodes between them."""
     sides = sides_of(mesh.kind, mesh.cells)
-    first, which = distinct_edges(sides[:, :2])
+    corners = corners_of(mesh.kind, sides)
+    first, which = distinct(corners)
     same_side = sides[first][which]
     unlike = (np.sort(sides, axis=1) != np.sort(same_side, axis=1)).any(axis=1)
-    at_corners = len(np.unique(sides[:, :2]))
-    on_sides = sides[first, 2:].size
-    within_cells = mesh.cells.size - sides[:, 1:].size
+    expected = len(np.unique(corners)) + _nodes_between_corners(mesh)
     if unlike.any():
         at = place(mesh.x[sides[unlike][0, 0]])
         yield f"cells do not have all nodes of their common sides in common, as at {at}"
-    elif at_corners + on_sides + within_cells != len(np.unique(mesh.cells)):
+    elif expected != len(np.unique(mesh.cells)):
         yield "cells do not have all nodes of their common sides in common"
 
 
-def _jacobians(mesh: PlaneMesh) -> tuple[Array, Array]:
-    """At ``q`` points of each cell ``(n, q, 2, 2)``, and the points' weights."""
+def _nodes_between_corners(mesh: MeshArrays) -> int:
+    """How many nodes a sound mesh of these cells has within edges, faces and cells."""
+    count = 0
+    within = lagrange_element(mesh.kind, mesh.order).entity_dofs
+    topology = basix.topology(mesh.kind)
+    for dim in range(1, mesh.dimension + 1):
+        n_corners = len(topology[dim][0])
+        corners = entities_of(mesh.kind, mesh.cells, dim)[:, :n_corners]
+        first, _ = distinct(corners)
+        count += len(first) * len(within[dim][0])
+    return count
+
+
+def _jacobians(mesh: MeshArrays) -> tuple[Array, Array]:
+    """At ``q`` points of each cell ``(n, q, d, d)``, and the points' weights."""
     X, weights = bulk_quadrature(mesh.kind, mesh.order + 1)
     slopes = tabulate(mesh.kind, mesh.order, X)[1:]
     return np.einsum("jqa,nai->nqij", slopes, mesh.x[mesh.cells]), weights
 
 
-def _unsound(mesh: PlaneMesh) -> Iterator[str]:
+def _unsound(mesh: MeshArrays) -> Iterator[str]:
     """Cells whose map cannot be inverted everywhere, corners and middles of sides included."""
     nodes = np.sort(mesh.cells, axis=1)
     repeating = np.flatnonzero((nodes[:, 1:] == nodes[:, :-1]).any(axis=1))
@@ -87,13 +107,11 @@ def _unsound(mesh: PlaneMesh) -> Iterator[str]:
         at = _place_of(mesh, repeating[0])
         yield (
             f"{len(repeating)} cells have a node twice, the first at {at}: a {mesh.kind.name} "
-            "must not be collapsed; "
-            "mesh such bodies with triangles alone, or with quadrilaterals of four different "
-            "corners"
+            f"must not be collapsed; mesh such bodies with {_UNLIKE_CORNERS[mesh.dimension]}"
         )
         return
     smallest, largest = smallest_determinants(mesh)
-    size = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1) ** 2
+    size = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1) ** mesh.dimension
     flat = largest <= _FLAT * size
     lowest = -_DISTORTED * largest if mesh.order > 1 else 0.0
     folded = (smallest < lowest) | _turned_at_points(mesh)
@@ -101,19 +119,20 @@ def _unsound(mesh: PlaneMesh) -> Iterator[str]:
     if not len(bad):
         return
     worst = bad[np.argmin((smallest / size)[bad])]
-    how = "it has no area"
+    measure = "area" if mesh.dimension == 2 else "volume"
+    how = f"it has no {measure}"
     if not flat[worst]:
         how = f"{_falls(smallest[worst] / largest[worst])}; move the nodes on its sides"
     at = _place_of(mesh, worst)
-    yield f"{len(bad)} cells are folded or have no area, the worst at {at}: {how}"
+    yield f"{len(bad)} cells are folded or have no {measure}, the worst at {at}: {how}"
 
 
-def _turned_at_points(mesh: PlaneMesh) -> np.ndarray:
+def _turned_at_points(mesh: MeshArrays) -> np.ndarray:
     """Whether the determinants of a cell ``(n,)`` do not have one sign at its integration
     points."""
     J, _ = _jacobians(mesh)
     determinant = np.linalg.det(J)
-    none = _FLAT * (J**2).sum(axis=(2, 3)).max(axis=1)
+    none = _FLAT * (J**2).sum(axis=(2, 3)).max(axis=1) ** (mesh.dimension / 2)
     return (determinant.min(axis=1) <= none) & (determinant.max(axis=1) >= -none)
 
 
@@ -121,7 +140,7 @@ def _falls(ratio: float) -> str:
     return f"its Jacobian determinant falls to {ratio:.2g} of its largest value"
 
 
-def distorted(mesh: PlaneMesh) -> list[str]:
+def distorted(mesh: MeshArrays) -> list[str]:
     """A warning of cells whose map is nearly singular somewhere: stresses there are worthless."""
     smallest, largest = smallest_determinants(mesh)
     bad = np.flatnonzero(smallest < _DISTORTED * largest)
@@ -135,12 +154,13 @@ def distorted(mesh: PlaneMesh) -> list[str]:
     ]
 
 
-def thin(mesh: PlaneMesh) -> list[str]:
+def thin(mesh: MeshArrays) -> list[str]:
     """A warning of cells that are far longer than wide, as with one node that lies far off."""
-    ends = mesh.x[sides_of(mesh.kind, mesh.cells)[:, :2]]
+    d = mesh.dimension
+    ends = mesh.x[entities_of(mesh.kind, mesh.cells, 1)[:, :2]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    longest = lengths.reshape(-1, n_corners(mesh.kind)).max(axis=1)
-    roundness = areas(mesh) / longest**2
+    longest = lengths.reshape(len(mesh.cells), -1).max(axis=1)
+    roundness = (measures(mesh) / longest**d) ** (1 / (d - 1))
     bad = np.flatnonzero(roundness < _THIN)
     if not len(bad):
         return []
@@ -152,8 +172,8 @@ def thin(mesh: PlaneMesh) -> list[str]:
     ]
 
 
-def areas(mesh: PlaneMesh) -> Array:
-    """Area ``(n,)`` of each cell."""
+def measures(mesh: MeshArrays) -> Array:
+    """Area or volume ``(n,)`` of each cell."""
     J, weights = _jacobians(mesh)
     return np.abs(np.linalg.det(J)) @ weights
 

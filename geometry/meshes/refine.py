@@ -14,8 +14,8 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array, lagrange_element
 from archord.geometry.curve import circle_through
-from archord.geometry.meshes.cells import along, quarters, sides_between
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.cells import along, parts_of
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.tagged_mesh import tags_of
 
 _OFF_CIRCLE = 0.05  # of the radius
@@ -37,8 +37,8 @@ class Circle(NamedTuple):
 
 
 def refined(
-    mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: Sequence[Circle] = ()
-) -> PlaneMesh:
+    mesh: MeshArrays, times: int = 0, order: int | None = None, circles: Sequence[Circle] = ()
+) -> MeshArrays:
     """``mesh`` with each cell cut in four so many ``times``, then of a higher ``order``.
 
     The nodes of ``circles`` are moved onto them along their rays. Without a circle, new nodes lie
@@ -51,7 +51,7 @@ def refined(
         _require_near(mesh, circle)
         notes += _elsewhere(mesh, circle)
 
-    def settled(mesh: PlaneMesh) -> PlaneMesh:
+    def settled(mesh: MeshArrays) -> MeshArrays:
         return on_circles(mesh, circles).centred() if circles else mesh
 
     mesh = settled(replace(mesh, notes=tuple(notes)))
@@ -65,9 +65,9 @@ def refined(
     return settled(_raised(mesh, order))
 
 
-def _require_near(mesh: PlaneMesh, circle: Circle) -> None:
+def _require_near(mesh: MeshArrays, circle: Circle) -> None:
     """Raise ValueError if a node of ``circle`` is far from it."""
-    x = mesh.x[np.unique(mesh.facets(circle.facets))]
+    x = mesh.x[np.unique(mesh.facets_of(circle.facets))]
     off = circle.distance(x)
     if off.max() <= _OFF_CIRCLE * circle.radius:
         return
@@ -82,10 +82,10 @@ def _require_near(mesh: PlaneMesh, circle: Circle) -> None:
     raise ValueError(said)
 
 
-def _elsewhere(mesh: PlaneMesh, circle: Circle) -> list[str]:
+def _elsewhere(mesh: MeshArrays, circle: Circle) -> list[str]:
     """A warning if the ends of the facets of ``circle`` lie on another one: its clearance is not
     the drawn one."""
-    corners = mesh.x[np.unique(mesh.facets(circle.facets)[:, :2])]
+    corners = mesh.x[np.unique(mesh.facets_of(circle.facets)[:, :2])]
     drawn = circle_through(corners)
     moved = circle.distance(corners).max()
     if drawn is None or moved <= _ELSEWHERE * circle.radius:
@@ -101,7 +101,7 @@ def _elsewhere(mesh: PlaneMesh, circle: Circle) -> list[str]:
     ]
 
 
-def on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:
+def on_circles(mesh: MeshArrays, circles: Sequence[Circle]) -> MeshArrays:
     """``mesh`` with the nodes of ``circles`` moved onto them along their rays, as far as it has
     these facet sets.
 
@@ -110,16 +110,16 @@ def on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:
     """
     x = mesh.x.copy()
     for circle in circles:
-        nodes = np.unique(mesh.facets(circle.facets))
+        nodes = np.unique(mesh.facets_of(circle.facets))
         ray = x[nodes] - circle.centre
         x[nodes] = circle.centre + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
     return replace(mesh, x=x)
 
 
-def _raised(mesh: PlaneMesh, order: int) -> PlaneMesh:
+def _raised(mesh: MeshArrays, order: int) -> MeshArrays:
     """``mesh`` with nodes of a higher ``order`` on its cells as they are curved."""
     variant = basix.LagrangeVariant.equispaced
-    geometry = basix.ufl.element("P", mesh.kind, mesh.order, variant, shape=(2,))
+    geometry = basix.ufl.element("P", mesh.kind, mesh.order, variant, shape=(mesh.dimension,))
     made = create_mesh(MPI.COMM_SELF, cells=mesh.cells, x=mesh.x, e=geometry)
     V = fem.functionspace(made, basix.ufl.element("P", mesh.kind, order, variant))
     cells = np.empty(V.dofmap.list.shape, dtype=np.int64)
@@ -134,25 +134,23 @@ def _raised(mesh: PlaneMesh, order: int) -> PlaneMesh:
         raise ValueError(
             f"point sets have nodes of order {mesh.order} that a mesh of order {order} has not"
         )
-    sides = cells[:, new.entity_closure_dofs[1]].reshape(-1, order + 1)
-    edges = sides[sides_between(mesh.kind, mesh.cells, mesh.edges[:, :2])]
-    x = V.tabulate_dof_coordinates()[:, :2].copy()
-    return replace(mesh, x=x, cells=cells, edges=edges, point_sets=points)
+    x = V.tabulate_dof_coordinates()[:, : mesh.dimension].copy()
+    return replace(mesh, point_sets=points).with_cells(x, cells)
 
 
-def _cut(mesh: PlaneMesh) -> PlaneMesh:
+def _cut(mesh: MeshArrays) -> MeshArrays:
     """Each cell of order p cut in four, whose nodes are the nodes of a cell of order 2 p."""
     p = mesh.order
     made = _raised(mesh, 2 * p)
-    parts = quarters(mesh.kind, lagrange_element(mesh.kind, p).points)
+    parts = parts_of(mesh.kind, lagrange_element(mesh.kind, p).points)
     points = lagrange_element(mesh.kind, 2 * p).points
     nodes = _distances(parts.reshape(-1, 2), points).argmin(axis=1)
     cells = made.cells[:, nodes].reshape(4 * len(mesh.cells), -1)
-    line = along(made.edges)
+    line = along(made.facets)
     halves = np.stack([line[:, : p + 1], line[:, p:]], axis=1).reshape(-1, p + 1)
-    edges = halves[:, [0, p, *range(1, p)]]
+    facets = halves[:, [0, p, *range(1, p)]]
     bodies = mesh.bodies.repeat(4)
-    return replace(made, cells=cells, bodies=bodies, edges=edges, tags=mesh.tags.repeat(2))
+    return replace(made, cells=cells, bodies=bodies, facets=facets, tags=mesh.tags.repeat(2))
 
 
 def _distances(points: Array, others: Array) -> Array:

@@ -6,20 +6,20 @@ from __future__ import annotations
 import basix
 import numpy as np
 
-from archord.geometry.basis import QUADRILATERAL, Array, order_of, tabulate
-from archord.geometry.curve import lagrange
-from archord.geometry.meshes.cells import distinct_edges, n_corners, sides_of
+from archord.geometry.basis import Array, dimension_of, order_of, tabulate
+from archord.geometry.meshes.cells import distinct, entities_of, n_corners
 
 
 class SecondOrder:
     """Second-order cells in the place of cells with ``nodes`` ``(m, a)``.
 
-    Their nodes are vertices, then the middles of edges, then the middles of quadrilaterals.
+    Their nodes are vertices, then the middles of edges, then the middles of quadrilaterals, then
+    the middles of hexahedra.
 
     - ``corners``: how many of a cell's nodes are vertices
-    - ``cells`` ``(m, 6)`` or ``(m, 9)``: their nodes, in basix' order
-    - ``between``: the vertices ``(e, 2)`` of edges and ``(m, 4)`` of quadrilaterals, between which
-      the nodes behind the vertices lie
+    - ``cells`` ``(m, 6)``, ``(m, 9)``, ``(m, 10)`` or ``(m, 27)``: their nodes, in basix' order
+    - ``between``: the vertices of edges ``(e, 2)``, of quadrilaterals ``(f, 4)`` and, in space, of
+      hexahedra ``(m, 8)``, between which the nodes behind the vertices lie
     """
 
     def __init__(self, kind: basix.CellType, nodes: np.ndarray) -> None:
@@ -27,34 +27,40 @@ class SecondOrder:
         m = len(nodes)
         self.corners = n_corners(kind)
         self._vertices, vertex = np.unique(nodes[:, : self.corners], return_inverse=True)
-        sides = sides_of(kind, nodes)
-        first, edge = distinct_edges(sides[:, :2])
-        self._edges = sides[first]
-        n_vertices = len(self._vertices)
-        parts = [vertex.reshape(m, -1), n_vertices + edge.reshape(m, -1)]
-        self._whole = nodes[: m if kind == QUADRILATERAL else 0]  # cells with a node in the middle
-        if len(self._whole):
-            parts.append(n_vertices + len(first) + np.arange(m)[:, None])
+        parts = [vertex.reshape(m, -1)]
+        self.between: list[np.ndarray] = []
+        # nodes ``(e, b)`` of the entities with a node in the middle, and its weights ``(b,)``
+        self._middles: list[tuple[np.ndarray, Array]] = []
+        n_nodes = len(self._vertices)
+        for dim in range(1, dimension_of(kind) + 1):
+            of_dim = basix.cell.subentity_types(kind)[dim][0]
+            entities = entities_of(kind, nodes, dim)
+            if n_corners(of_dim) != 2**dim:
+                entities = entities[:0]
+            around = entities[:, : n_corners(of_dim)]
+            first = which = np.arange(len(entities))  # a cell shares its inside with no other
+            if dim < dimension_of(kind):
+                first, which = distinct(around)
+            middle = np.full((1, dim), 0.5)
+            self._middles.append((entities[first], tabulate(of_dim, order, middle)[0, 0]))
+            self.between.append(np.searchsorted(self._vertices, around[first]))
+            parts.append((n_nodes + which).reshape(m, -1))
+            n_nodes += len(first)
         self.cells = np.hstack(parts)
-        ends = self._edges[:, :2]
-        around = self._whole[:, : self.corners]
-        self.between = [np.searchsorted(self._vertices, of) for of in (ends, around)]
-        self._at_middle = tabulate(kind, order, np.array([[0.5, 0.5]]))[0, 0]
-        at_half = lagrange(order) @ 0.5 ** np.arange(order + 1)  # of equispaced nodes
-        self._weights = at_half[[0, order, *range(1, order)]]
 
     def __call__(self, values: Array) -> Array:
         """Values ``(m, k)`` at the nodes of the second-order cells, from those at the nodes of the
         cells."""
-        middles = np.einsum("a,eak->ek", self._weights, values[self._edges])
-        within = np.einsum("a,nak->nk", self._at_middle, values[self._whole])
-        return np.concatenate([values[self._vertices], middles, within])
+        middles = [
+            np.einsum("a,eak->ek", weights, values[entities]) for entities, weights in self._middles
+        ]
+        return np.concatenate([values[self._vertices], *middles])
 
     def along(self, ends: np.ndarray) -> np.ndarray:
         """Nodes ``(k, 3)`` of edges with the vertices ``ends`` ``(k, 2)``: the first one, the
         middle, the last one."""
         edges = self.between[0]
         wanted = np.searchsorted(self._vertices, ends)
-        first, which = distinct_edges(np.concatenate([edges, wanted]))
+        first, which = distinct(np.concatenate([edges, wanted]))
         middle = len(self._vertices) + first[which[len(edges) :]]
         return np.column_stack([wanted[:, 0], middle, wanted[:, 1]])

@@ -9,18 +9,18 @@ import numpy as np
 
 from archord.geometry.basis import TRIANGLE
 from archord.geometry.curve import Curve, circle_through
-from archord.geometry.meshes.cells import along, n_corners, sides_between, sides_of
+from archord.geometry.meshes.cells import along, n_sides, sides_between, sides_of
 from archord.geometry.meshes.check import cracks, parts
-from archord.geometry.meshes.plane_mesh import PlaneMesh
-from archord.geometry.meshes.quality import areas, distorted
+from archord.geometry.meshes.mesh_arrays import MeshArrays
+from archord.geometry.meshes.quality import distorted, measures
 from archord.postprocess.pictures.pictures import save_figure
 from archord.report.figure import new_figure
 from archord.report.table import Table
 
 
-def mesh_text(name: str, mesh: PlaneMesh) -> str:
+def mesh_text(name: str, mesh: MeshArrays) -> str:
     """What is in ``mesh``, in tables with a row a set; warnings come last."""
-    area = areas(mesh)
+    area = measures(mesh)
     width, height = np.ptp(mesh.x, axis=0)
     left, low = mesh.x.min(axis=0)
     kind = f"{mesh.kind.name}s of order {mesh.order}"
@@ -33,7 +33,7 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
         bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", n_parts)
     facets = Table("facet set", "of", "circle", "facets", "length", "shortest", "longest", left=3)
     for name, tags in mesh.facet_sets.items():
-        facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
+        facets.add(name, *_facet_row(mesh, mesh.facets[np.isin(mesh.tags, tags)], cells))
     points = Table("point set", "nodes", left=1)
     for name, nodes in mesh.point_sets.items():
         points.add(name, len(nodes))
@@ -47,10 +47,12 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
     return "\n\n".join(parts_of_text)
 
 
-def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarray]) -> list[object]:
+def _facet_row(
+    mesh: MeshArrays, edges: np.ndarray, cells: Mapping[str, np.ndarray]
+) -> list[object]:
     """Owners, circle, number, length, shortest and longest of the ``edges`` of a set."""
     nodes, count = np.unique(edges[:, :2], return_counts=True)
-    behind = sides_between(mesh.kind, mesh.cells, edges[:, :2]) // n_corners(mesh.kind)
+    behind = sides_between(mesh.kind, mesh.cells, edges[:, :2]) // n_sides(mesh.kind)
     owners = ", ".join(name for name, inside in cells.items() if inside[behind].any())
     ends = Curve(mesh.x, edges.shape[1] - 1, along(edges)).arc_length(np.array([0.0, 1.0]))
     length = np.diff(ends)[:, 0]
@@ -68,7 +70,7 @@ def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarra
     return [owners, ", ".join(said), len(edges), *(f"{value:.5g}" for value in sizes)]
 
 
-def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
+def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
     """The cells, facets and points of named sets, each set in a colour, small ones over large;
     returns ``target``. Raises `InputError`."""
     from matplotlib import colormaps
@@ -86,8 +88,8 @@ def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
         )
     axes.add_collection(LineCollection(sides, colors="0.5", linewidths=0.3, zorder=1))
     for k, (name, tags) in enumerate(mesh.facet_sets.items()):
-        edges = mesh.x[along(mesh.edges[np.isin(mesh.tags, tags)])]
-        above = 3 - len(edges) / len(mesh.edges)
+        edges = mesh.x[along(mesh.facets[np.isin(mesh.tags, tags)])]
+        above = 3 - len(edges) / len(mesh.facets)
         axes.add_collection(
             LineCollection(
                 edges, colors=[colours(k % 10)], linewidths=2.0, label=name, zorder=above

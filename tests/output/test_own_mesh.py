@@ -16,7 +16,7 @@ from archord.commands.progress import Progress
 from archord.geometry.basis import TRIANGLE
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.formats.read import read_mesh, tagged
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
 
 CURVED = np.array(
@@ -120,7 +120,7 @@ def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):
     """Curved cells, the names of sets in their order, points."""
     cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
     sets = {"b": np.array([1]), "a": np.array([0]), "both": np.array([0, 1])}
-    made = PlaneMesh.of_sets(
+    made = MeshArrays.of_sets(
         TRIANGLE,
         CURVED,
         cells,
@@ -131,7 +131,7 @@ def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):
     with (tmp_path / "mesh.npz").open("wb") as file:
         store_mesh(made, file)
     found = stored_mesh(tmp_path / "mesh.npz")
-    for name in ("x", "cells", "bodies", "edges", "tags"):
+    for name in ("x", "cells", "bodies", "facets", "tags"):
         np.testing.assert_array_equal(getattr(found, name), getattr(made, name))
     assert list(found.cell_sets.items()) == list(made.cell_sets.items())
     assert list(found.facet_sets.items()) == list(made.facet_sets.items())
@@ -160,7 +160,7 @@ def test_a_mesh_of_archord_0_2_is_read(tmp_path):
     """Its file does not name the kind of its cells."""
     cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
     path = tmp_path / "mesh.npz"
-    made = PlaneMesh.of_sets(TRIANGLE, CURVED, cells, {}, {"z": np.array([[0, 1]])}, {})
+    made = MeshArrays.of_sets(TRIANGLE, CURVED, cells, {}, {"z": np.array([[0, 1]])}, {})
     with path.open("wb") as file:
         store_mesh(made, file)
     arrays = dict(np.load(path))
@@ -169,7 +169,7 @@ def test_a_mesh_of_archord_0_2_is_read(tmp_path):
     sets = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
     np.savez(path, **(arrays | {"sets": sets}))
     assert stored_mesh(path).kind == TRIANGLE
-    assert stored_mesh(path).edges.tolist() == made.edges.tolist()
+    assert stored_mesh(path).facets.tolist() == made.facets.tolist()
 
 
 @pytest.mark.parametrize("name", ["x", "cells", "edges", "tags", "bodies", "sets"])
@@ -178,7 +178,7 @@ def test_a_damaged_mesh_is_refused(tmp_path, name):
     path = tmp_path / "mesh.npz"
     with path.open("wb") as file:
         store_mesh(
-            PlaneMesh.of_sets(TRIANGLE, CURVED, cells, {}, {"z": np.array([[0, 1]])}, {}), file
+            MeshArrays.of_sets(TRIANGLE, CURVED, cells, {}, {"z": np.array([[0, 1]])}, {}), file
         )
     arrays = dict(np.load(path))
     lowered = [] if name in ("tags", "bodies") else [arrays[name] * 0 - 1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from archord.geometry.basis import QUADRILATERAL
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.refine import Circle, refined
 from archord.postprocess.pictures.mesh import draw_mesh, mesh_text
 from archord.report.errors import InputError
@@ -22,7 +22,7 @@ def ring(n=12, order=1):
     )
     sets = {"inner": np.arange(n), "outer": n + np.arange(n), "all": np.arange(2 * n)}
     facets = {"bore": cells[:n, :2], "half": cells[: n // 2, :2], "seam": cells[:1, [0, 2]]}
-    made = PlaneMesh.of_sets(QUADRILATERAL, x, cells, sets, facets, {"east": np.array([0])})
+    made = MeshArrays.of_sets(QUADRILATERAL, x, cells, sets, facets, {"east": np.array([0])})
     return refined(made, order=order, circles=[Circle("bore", (0, 0), 1.0)])
 
 

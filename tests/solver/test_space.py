@@ -8,6 +8,8 @@ from dolfinx.mesh import CellType, create_rectangle, locate_entities_boundary, m
 from scipy.optimize import brentq
 
 import archord
+from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.stored import store_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import von_mises
 from archord.materials.j2 import J2Material
@@ -219,6 +221,21 @@ def test_a_material_of_ones_own_has_six_components(large, comm):
         pulled(box(comm), plane, supports)
 
 
+def test_kinematics_are_by_the_mesh(comm, tmp_path):
+    """Also where the mesh is a file that is read later; what contradicts it is refused then."""
+    bodies = [Body("box", MATERIALS["elastic"])]
+    assert Problem(box(comm), bodies).kinematics.name == "space"
+    assert Problem(rectangle(comm, (1, 1), (1.0, 1.0)), bodies).kinematics.name == "strain"
+    path = tmp_path / "box.npz"
+    with path.open("wb") as file:
+        store_mesh(gathered(box(comm)), file)
+    problem = Problem(path, bodies).on(comm)
+    assert problem.kinematics.name == problem.bodies[0].material.plane == "space"
+    stated = Problem(path, bodies, kinematics="plane stress")
+    with pytest.raises(archord.InputError, match=r'"plane stress" do not fit .* kind tetrahedron'):
+        stated.on(comm)
+
+
 class OwnFriction(archord.ContactLaw):
     """A law that was made for a plane."""
 
@@ -229,7 +246,7 @@ def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
     """Contact; and a mesh of another dimension, or a thickness, does not fit."""
     bodies = [Body("box", MATERIALS["elastic"])]
     with pytest.raises(archord.InputError, match=r'"plane strain" do not fit .* kind tetrahedron'):
-        Problem(box(comm), bodies)
+        Problem(box(comm), bodies, kinematics="plane strain")
     with pytest.raises(archord.InputError, match=r'"space" do not fit .* kind quadrilateral'):
         Problem(rectangle(comm, (1, 1), (1.0, 1.0)), bodies, kinematics="space")
     rubbing = Interaction("joint", ("x0", "x1"), OwnFriction())

@@ -19,7 +19,7 @@ import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE
-from archord.geometry.meshes.cells import in_basix_order, n_corners, outer_sides
+from archord.geometry.meshes.cells import in_basix_order, n_sides, outer_sides
 from archord.geometry.meshes.formats.abaqus_blocks import (
     Options,
     Rows,
@@ -27,7 +27,7 @@ from archord.geometry.meshes.formats.abaqus_blocks import (
     number_of,
     scoped_blocks,
 )
-from archord.geometry.meshes.plane_mesh import PlaneMesh, one_kind
+from archord.geometry.meshes.mesh_arrays import MeshArrays, one_kind
 
 # plane stress, plane strain, axisymmetric, trusses; the fourth character is the number of nodes
 _KINDS = re.compile(r"(CP[ES][3468]|CAX[3468]|T[23]D[23])[A-Z]*")
@@ -175,7 +175,7 @@ class _Model:
         return chosen
 
 
-def read_abaqus(path: Path) -> PlaneMesh:
+def read_abaqus(path: Path) -> MeshArrays:
     """The mesh of an .inp file. Raises ValueError.
 
     Its element sets are cell sets. Facet sets are its surfaces, its sets of trusses and what its
@@ -200,13 +200,13 @@ def read_abaqus(path: Path) -> PlaneMesh:
         if trusses:
             ends = [(truss[0], truss[-1]) for truss in trusses]
             facet_sets[name].append(_places(node, chain(*ends), "node").reshape(-1, 2))
-    n_sides = n_corners(kind)
-    faces = {f"S{k + 1}": [k, (k + 1) % n_sides] for k in range(n_sides)}
+    count = n_sides(kind)
+    faces = {f"S{k + 1}": [k, (k + 1) % count] for k in range(count)}
     for name, parts in model.surfaces.items():
         for elements, face in parts:
             if face not in faces:
                 raise ValueError(
-                    f"the surface {name!r} has the face {face!r}, which is none of S1 to S{n_sides}"
+                    f"the surface {name!r} has the face {face!r}, which is none of S1 to S{count}"
                 )
             places = _places(cell, elements, f"element of the surface {name!r}")
             facet_sets[name].append(nodes[places][:, faces[face]])
@@ -223,7 +223,7 @@ def read_abaqus(path: Path) -> PlaneMesh:
         if len(rest):
             point_sets[name] = rest
     facets = {name: np.concatenate(ends) for name, ends in facet_sets.items()}
-    return PlaneMesh.of_sets(kind, x, cells, cell_sets, facets, point_sets)
+    return MeshArrays.of_sets(kind, x, cells, cell_sets, facets, point_sets)
 
 
 def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarray:

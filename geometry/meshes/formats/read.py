@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +19,12 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
 from archord.geometry.meshes.formats.abaqus import read_abaqus
 from archord.geometry.meshes.formats.xdmf import read_xdmf
-from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
+from archord.geometry.meshes.mesh_arrays import (
+    MeshArrays,
+    coordinates,
+    gmsh_dimension,
+    require_known,
+)
 from archord.geometry.meshes.quality import faults
 from archord.geometry.meshes.refine import Circle, refined
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
@@ -26,6 +32,7 @@ from archord.geometry.meshes.tagged_mesh import Sets, TaggedMesh
 from archord.report.readable import require_file
 
 _HEADERS = (b"$MeshFormat", b"$NOD", b"$Comments")
+_NAMED = re.compile(rb"\$PhysicalNames\s+\d+\s+(.*?)\$EndPhysicalNames", re.DOTALL)
 Source = str | Path | ModuleType | TaggedMesh
 
 
@@ -45,7 +52,7 @@ def read_mesh(
     A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx,
     an .npz file of archord, the module gmsh with a model on rank 0, or a mesh as `tagged` returns
     it. Sets have the names of physical groups, of sets and surfaces, or the values of tags.
-    Collective; raises ValueError on all ranks for what is no mesh of plane cells of one kind.
+    Collective; raises ValueError on all ranks for what is no mesh of cells of one kind.
     """
     made: Any = gathered(source) if isinstance(source, TaggedMesh) else None
     failure = ""
@@ -66,12 +73,30 @@ def read_mesh(
     return distribute(comm, made, partitioner, strips)
 
 
-def plane_mesh_of(source: Source, comm: MPI.Comm, order: int | None) -> PlaneMesh | None:
+def arrays_of(source: Source, comm: MPI.Comm, order: int | None) -> MeshArrays | None:
     """The mesh of ``source``, of this ``order`` where a model is yet to be meshed: on rank 0, None
     elsewhere. Collective for a mesh of dolfinx; raises what a damaged file makes of it."""
     if isinstance(source, TaggedMesh):
         return gathered(source)
     return _read(source, order or 2) if comm.rank == 0 else None
+
+
+def dimension_of_source(source: Any) -> int:
+    """Dimension of the cells of a `Source`, or of (mesh, cells, facets); 2 for what cannot be
+    read."""
+    if isinstance(source, tuple):
+        return source[0].topology.dim
+    if isinstance(source, TaggedMesh):
+        return source.dimension
+    try:
+        if isinstance(source, ModuleType):
+            return gmsh_dimension(source)
+        named = _NAMED.search(Path(source).read_bytes())
+        if Path(source).suffix.lower() == ".msh" and named:
+            return 3 if re.search(rb"^3 ", named[1], re.MULTILINE) else 2
+        return _read(source, 1).dimension
+    except Exception:  # whatever a damaged file makes of it is raised where it is used
+        return 2
 
 
 def tagged(
@@ -82,15 +107,19 @@ def tagged(
     facet_sets: Mapping[str, int] | None = None,
 ) -> TaggedMesh:
     """A dolfinx ``mesh`` with its tags, named by ``cell_sets`` and ``facet_sets`` or else by their
-    numbers; without tags, all cells are "all". Collective; raises ValueError on all ranks for what
-    is not plane."""
+    numbers; without tags, all cells are "all". Collective; raises ValueError on all ranks for
+    tags of another dimension, and for triangles and quadrilaterals that do not lie in a plane."""
     dim = mesh.topology.dim
-    if dim != 2 or (cells and cells.dim != dim) or (facets and facets.dim != dim - 1):
+    fitting = dim in (2, 3)
+    fitting &= cells is None or cells.dim == dim
+    fitting &= facets is None or facets.dim == dim - 1
+    if not fitting:
         raise ValueError(
             "the mesh and the tags of its cells must be of dimension 2, the tags of facets of "
-            "dimension 1"
+            "dimension 1; or of 3 and 2"
         )
-    flat(np.concatenate(mesh.comm.allgather(mesh.geometry.x)))
+    require_known([mesh.basix_cell().name])
+    coordinates(np.concatenate(mesh.comm.allgather(mesh.geometry.x)), dim)
     mesh.topology.create_connectivity(dim - 1, dim)
     if cells is None:
         index_map = mesh.topology.index_map(dim)
@@ -118,12 +147,13 @@ def _named(comm: MPI.Comm, tags: MeshTags, names: Mapping[str, int] | None) -> S
     return {name: (tag,) if tag in values else () for name, tag in names.items()}
 
 
-def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
+def _read(source: str | Path | ModuleType, order: int) -> MeshArrays:
     if isinstance(source, ModuleType):
-        if not len(source.model.mesh.getElementTypes(2)):
-            source.model.mesh.generate(2)
+        d = gmsh_dimension(source)
+        if not len(source.model.mesh.getElementTypes(d)):
+            source.model.mesh.generate(d)
             source.model.mesh.setOrder(order)
-        return PlaneMesh.from_gmsh(source)
+        return MeshArrays.from_gmsh(source)
     path = Path(source)
     readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf, ".npz": stored_mesh}
     if path.suffix.lower() not in readers:
@@ -135,7 +165,7 @@ def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
     return readers[path.suffix.lower()](path)
 
 
-def _read_gmsh(path: Path) -> PlaneMesh:
+def _read_gmsh(path: Path) -> MeshArrays:
     """What gmsh reads in a process of its own, as it ends the process on some damaged files."""
     with path.open("rb") as file:
         if not file.read(20).startswith(_HEADERS):  # gmsh would run it as a script
@@ -167,7 +197,7 @@ def _merge(path: Path, found: Path, said: Path) -> NoReturn:
             signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
         with own_gmsh() as gmsh:
             gmsh.merge(str(path))
-            mesh = PlaneMesh.from_gmsh(gmsh)
+            mesh = MeshArrays.from_gmsh(gmsh)
         with found.open("wb") as file:
             store_mesh(mesh, file)
         status = 0

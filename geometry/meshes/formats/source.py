@@ -15,7 +15,7 @@ from archord.report.errors import InputError
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from archord.geometry.meshes.plane_mesh import PlaneMesh
+    from archord.geometry.meshes.mesh_arrays import MeshArrays
     from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 _KINDS = "a mesh file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
@@ -79,6 +79,13 @@ class Mesh:
         return str(self.source) if isinstance(self.source, (str, Path)) else ""
 
     @property
+    def dimension(self) -> int:
+        """Dimension of the cells. A file is looked into; 2 where it cannot be read."""
+        from archord.geometry.meshes.formats.read import dimension_of_source
+
+        return dimension_of_source(self.source)
+
+    @property
     def n_ranks(self) -> int:
         """How many ranks the mesh is on already; 1 if it is still to be read."""
         source = self.source
@@ -111,11 +118,11 @@ class Mesh:
             refine=self.refine,
         )
 
-    def plain(self, comm: MPI.Comm) -> PlaneMesh | None:
+    def plain(self, comm: MPI.Comm) -> MeshArrays | None:
         """The mesh before it is scaled and refined: on rank 0, None elsewhere. Collective."""
-        from archord.geometry.meshes.formats.read import plane_mesh_of
+        from archord.geometry.meshes.formats.read import arrays_of
 
-        return plane_mesh_of(self._tagged(), comm, self.order)
+        return arrays_of(self._tagged(), comm, self.order)
 
     def _tagged(self) -> Any:
         from archord.geometry.meshes.formats.read import tagged

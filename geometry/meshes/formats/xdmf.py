@@ -11,21 +11,25 @@ import h5py
 import numpy as np
 from dolfinx.cpp.io import perm_vtk
 
-from archord.geometry.basis import QUADRILATERAL, TRIANGLE
-from archord.geometry.meshes.cells import in_basix_order, n_corners
+from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE, dimension_of
+from archord.geometry.meshes.cells import corners_of, in_basix_order, n_corners
 from archord.geometry.meshes.formats.beside import beside
-from archord.geometry.meshes.plane_mesh import SOLID, PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays, require_known
 from archord.report.readable import require_memory
 
-_SOLIDS = ("tet", "hex", "wedge", "pyramid")
-_PLANE = {"tri": TRIANGLE, "quad": QUADRILATERAL}  # by how the names of topologies start
+_KINDS = {  # by how the names of topologies start
+    "tri": TRIANGLE,
+    "quad": QUADRILATERAL,
+    "tet": TETRAHEDRON,
+    "hex": HEXAHEDRON,
+}
 _TAGS = "Attribute[@Center='Cell']"
 
 
-def read_xdmf(path: Path) -> PlaneMesh:
+def read_xdmf(path: Path) -> MeshArrays:
     """The first grid with a geometry. Raises ValueError.
 
-    Sets are what other grids, or this one, have as values of cells, lines and points. The names of
+    Sets are what other grids, or this one, have as values of cells, sides and points. The names of
     sets are these values as text.
     """
     grids = [
@@ -38,6 +42,7 @@ def read_xdmf(path: Path) -> PlaneMesh:
         raise ValueError("there is no grid with topology and geometry")
     mesh = meshes[0]
     kind = _kind(mesh)
+    d = dimension_of(kind)
     x = _data(path, mesh, "Geometry")
     cells = _data(path, mesh, "Topology")
     sets: dict[int, dict[str, np.ndarray]] = defaultdict(dict)  # by their topological dimension
@@ -56,18 +61,18 @@ def read_xdmf(path: Path) -> PlaneMesh:
                 )
             of_dimension[name] = entities[values == value]
     corners = slice(n_corners(kind))
-    parts = [np.sort(part[:, corners]) for part in (cells, *sets[2].values())]
+    parts = [np.sort(part[:, corners]) for part in (cells, *sets[d].values())]
     _, first, which = np.unique(
         np.concatenate(parts), axis=0, return_index=True, return_inverse=True
     )
     _, *members = np.split(first[which.ravel()], np.cumsum([len(part) for part in parts[:-1]]))
     x, cells = in_basix_order(kind, x, cells.astype(np.int64), perm_vtk)
-    return PlaneMesh.of_sets(
+    return MeshArrays.of_sets(
         kind,
         x,
         cells,
-        dict(zip(sets[2], members, strict=True)),
-        {name: lines[:, :2] for name, lines in sets[1].items()},
+        dict(zip(sets[d], members, strict=True)),
+        {name: corners_of(kind, sides) for name, sides in sets[d - 1].items()},
         {name: nodes[:, 0] for name, nodes in sets[0].items()},
     )
 
@@ -81,19 +86,22 @@ def _topology(grid: ElementTree.Element) -> str:
 def _kind(grid: ElementTree.Element) -> basix.CellType:
     """The kind of the cells of a ``grid``. Raises ValueError."""
     name = _topology(grid)
-    if name.startswith(_SOLIDS):
-        raise ValueError(SOLID)
-    for start, kind in _PLANE.items():
+    require_known([name.partition("_")[0]])
+    for start, kind in _KINDS.items():
         if name.startswith(start):
             return kind
-    raise ValueError(f"a grid has cells of type {name!r}; triangles and quadrilaterals are read")
+    raise ValueError(
+        f"a grid has cells of type {name!r}; triangles, quadrilaterals, tetrahedra and hexahedra "
+        "are read"
+    )
 
 
 def _dimension(grid: ElementTree.Element) -> int:
     """Topological dimension of what a ``grid`` has."""
     name = _topology(grid)
-    if name.startswith(tuple(_PLANE)):
-        return 2
+    for start, kind in _KINDS.items():
+        if name.startswith(start):
+            return dimension_of(kind)
     return 0 if name.startswith("polyvertex") else 1
 
 

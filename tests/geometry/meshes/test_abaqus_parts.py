@@ -62,7 +62,7 @@ def read(tmp_path, text, comm=MPI.COMM_SELF):
 
 def ends(mesh, name):
     """The corners of a facet set."""
-    nodes = np.unique(mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])][:, :2])
+    nodes = np.unique(mesh.facets[np.isin(mesh.tags, mesh.facet_sets[name])][:, :2])
     return sorted(map(tuple, (mesh.x[nodes].round(9) + 0.0).tolist()))
 
 

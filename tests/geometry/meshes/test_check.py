@@ -11,8 +11,8 @@ from archord.geometry.curve import circle_through
 from archord.geometry.meshes.check import check_mesh
 from archord.geometry.meshes.fenicsx import distribute, gathered
 from archord.geometry.meshes.jacobian import smallest_determinants
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.motions import AXISYMMETRIC, free_motions
-from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.quality import beyond_axis, distorted, faults
 from archord.geometry.meshes.refine import Circle, refined
 
@@ -51,7 +51,7 @@ def joined(*grids):
 
 
 def check(comm, made, bodies, **options):
-    mesh = PlaneMesh.of_sets(QUADRILATERAL, *made, {}) if comm.rank == 0 else None
+    mesh = MeshArrays.of_sets(QUADRILATERAL, *made, {}) if comm.rank == 0 else None
     return check_mesh(distribute(comm, mesh), bodies, **options)
 
 
@@ -220,7 +220,7 @@ def test_straight_sides_of_arcs_are_told_with_their_sagitta():
         check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[:1])
     (said,) = check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[1:])
     assert "their corners" in said
-    straight = refined(PlaneMesh.of_sets(QUADRILATERAL, *arcs(0.01), {}), order=2)
+    straight = refined(MeshArrays.of_sets(QUADRILATERAL, *arcs(0.01), {}), order=2)
     with pytest.raises(ValueError, match=r"a sagitta of 0.0031"):
         check_mesh(distribute(MPI.COMM_SELF, straight), bodies, **PAIR)
     assert (
@@ -232,7 +232,7 @@ def test_straight_sides_of_arcs_are_told_with_their_sagitta():
         == []
     )
     circles = [Circle("0 top", (0.0, 0.0), 1.0), Circle("1 top", (0.0, 0.0), 1.01)]
-    curved = refined(PlaneMesh.of_sets(QUADRILATERAL, *arcs(0.01), {}), order=2, circles=circles)
+    curved = refined(MeshArrays.of_sets(QUADRILATERAL, *arcs(0.01), {}), order=2, circles=circles)
     assert check_mesh(distribute(MPI.COMM_SELF, curved), bodies, **PAIR) == []
 
 
@@ -243,7 +243,7 @@ def test_a_circle_that_is_not_the_drawn_one_is_told(radius, x, warned):
     """It changes the clearance: nodes were moved by up to a twentieth of the radius without a
     word."""
     given = [Circle("0 top", (x, 0.0), radius), Circle("1 top", (0.0, 0.0), 1.1)]
-    made = refined(PlaneMesh.of_sets(QUADRILATERAL, *arcs(0.1), {}), order=2, circles=given)
+    made = refined(MeshArrays.of_sets(QUADRILATERAL, *arcs(0.1), {}), order=2, circles=given)
     for mesh in (made, gathered(distribute(MPI.COMM_SELF, made))):
         assert len(mesh.notes) == warned
         assert all(
@@ -273,7 +273,7 @@ def bent(kind, order, amount, mirrored=False):
     x = nodes.copy()
     x[middle, 1] += 4 * amount * x[middle, 0] * (1 - x[middle, 0])
     x[:, 0] *= -1 if mirrored else 1
-    return PlaneMesh.of_sets(kind, x, np.arange(len(x))[None], {}, {}, {})
+    return MeshArrays.of_sets(kind, x, np.arange(len(x))[None], {}, {}, {})
 
 
 def test_a_corner_of_two_sides_on_one_arc_is_a_warning():
@@ -319,7 +319,7 @@ def test_a_fold_between_corners_and_nodes_is_found():
         inside = X[X.sum(axis=1) <= 1 + 1e-12] if kind == TRIANGLE else X
         nodes = lagrange_element(kind, order).points
         x = nodes + rng.uniform(-0.35, 0.35, (300, *nodes.shape)) / order
-        made = PlaneMesh.of_sets(
+        made = MeshArrays.of_sets(
             kind, x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {}
         )
         table = tabulate(kind, order, inside)[1:]
@@ -338,14 +338,14 @@ def test_a_straight_cell_may_not_fold_at_all():
     x = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
     for inward, refused in ((0.505, False), (0.495, True)):
         x[3] = inward
-        mesh = PlaneMesh.of_sets(QUADRILATERAL, x[[0, 1, 2, 3]], np.arange(4)[None], {}, {}, {})
+        mesh = MeshArrays.of_sets(QUADRILATERAL, x[[0, 1, 2, 3]], np.arange(4)[None], {}, {}, {})
         assert bool(faults(mesh)) == refused
 
 
 def test_collapsed_cells_say_so():
     x, cells = grid(2, 1)
     cells[1, 3] = cells[1, 1]
-    said = faults(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {"plate": np.arange(2)}, {}, {}))[0]
+    said = faults(MeshArrays.of_sets(QUADRILATERAL, x, cells, {"plate": np.arange(2)}, {}, {}))[0]
     assert said.startswith(
         "1 cells have a node twice, the first at (0.75, 0.25) in 'plate': a quadrilateral must not"
     )
@@ -356,16 +356,16 @@ def test_cells_that_cannot_be_used(mirrored):
     """Folded, flat or there twice; clockwise ones can be."""
     x, cells = grid(2, 2)
     x = x * [-1, 1] if mirrored else x
-    made = PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {})
+    made = MeshArrays.of_sets(QUADRILATERAL, x, cells, {}, {}, {})
     assert faults(made) == []
     x[4] = [0.9 * np.sign(x[5, 0]), -0.6]
-    assert faults(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {}))[0].startswith(
+    assert faults(MeshArrays.of_sets(QUADRILATERAL, x, cells, {}, {}, {}))[0].startswith(
         "2 cells are folded or have no area"
     )
     x, cells = grid(2, 1)
-    twice = PlaneMesh.of_sets(QUADRILATERAL, x, np.concatenate([cells, cells[:1]]), {}, {}, {})
+    twice = MeshArrays.of_sets(QUADRILATERAL, x, np.concatenate([cells, cells[:1]]), {}, {}, {})
     assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5) in 'all'"
-    curved = refined(PlaneMesh.of_sets(QUADRILATERAL, x, cells, {}, {}, {}), order=2)
+    curved = refined(MeshArrays.of_sets(QUADRILATERAL, x, cells, {}, {}, {}), order=2)
     apart = curved.cells.copy()
     bound = curved.cells.copy()
     apart[1, 5] = apart[1, 6]
@@ -375,7 +375,7 @@ def test_cells_that_cannot_be_used(mirrored):
             faults(replace(curved, cells=wrong))
         )
     third = np.concatenate([cells, [[1, 6, 4, 7]]])
-    crowded = PlaneMesh.of_sets(
+    crowded = MeshArrays.of_sets(
         QUADRILATERAL, np.concatenate([x, [[2.0, 0], [2, 1]]]), third, {}, {}, {}
     )
     assert (
@@ -454,6 +454,6 @@ def test_bodies_that_hold_each_other():
 
 @pytest.mark.mpi
 def test_checks_see_the_mesh_of_all_ranks(comm):
-    mesh = distribute(comm, PlaneMesh.of_sets(QUADRILATERAL, *TWO, {}) if comm.rank == 0 else None)
+    mesh = distribute(comm, MeshArrays.of_sets(QUADRILATERAL, *TWO, {}) if comm.rank == 0 else None)
     whole = gathered(mesh)
     assert (whole is None) or len(whole.cells) == 10

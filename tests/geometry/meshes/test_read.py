@@ -7,6 +7,7 @@ import pytest
 import ufl
 from dolfinx import fem, io
 from dolfinx.mesh import (
+    CellType,
     create_mesh,
     create_submesh,
     create_unit_cube,
@@ -74,7 +75,8 @@ def content(mesh):
             fem.assemble_scalar(fem.form(fem.Constant(dolfinx_mesh, 1.0) * measure))
         )
 
-    n = dolfinx_mesh.topology.index_map(2).size_local
+    d = mesh.dimension
+    n = dolfinx_mesh.topology.index_map(d).size_local
     for name in mesh.cell_sets:
         cells = mesh.cells_in(name)[mesh.cells_in(name) < n]
         dx = ufl.Measure(
@@ -83,9 +85,9 @@ def content(mesh):
         found["cells", name] = comm.allreduce(len(cells)), total(dx(1))
     for name in mesh.facet_sets:
         facets = np.sort(mesh.facets_in(name))
-        tags = meshtags(dolfinx_mesh, 1, facets, np.ones(len(facets), dtype=np.int32))
+        tags = meshtags(dolfinx_mesh, d - 1, facets, np.ones(len(facets), dtype=np.int32))
         ds = ufl.Measure("ds", dolfinx_mesh, subdomain_data=tags, metadata={"quadrature_degree": 8})
-        owned = facets < dolfinx_mesh.topology.index_map(1).size_local
+        owned = facets < dolfinx_mesh.topology.index_map(d - 1).size_local
         found["facets", name] = comm.allreduce(int(owned.sum())), total(ds(1))
     return dolfinx_mesh.topology.cell_name(), dolfinx_mesh.geometry.cmap.degree, found
 
@@ -293,18 +295,10 @@ def test_a_deck_gone_wrong_is_refused_in_a_sentence(comm, deck, old, new, said):
     assert str(refusal.value).startswith(str(path))
 
 
-def test_solids_and_lines_say_what_they_are(module, tmp_path, comm):
+def test_lines_say_what_they_are(module, tmp_path, comm):
     gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
     gmsh.model.occ.synchronize()
-    gmsh.model.addPhysicalGroup(3, [1], name="box")
-    gmsh.model.mesh.generate(3)
-    gmsh.write(str(tmp_path / "box.msh"))
-    with io.XDMFFile(MPI.COMM_SELF, tmp_path / "box.xdmf", "w") as file:
-        file.write_mesh(create_unit_cube(MPI.COMM_SELF, 1, 1, 1))
-    for name in ("box.msh", "box.xdmf"):
-        with pytest.raises(ValueError, match=r"of solid \(3D\) elements, and archord is plane"):
-            read_mesh(tmp_path / name, comm)
-    gmsh.model.removePhysicalGroups()
+    gmsh.model.mesh.generate(1)
     gmsh.model.addPhysicalGroup(1, [1], name="edge")
     gmsh.write(str(tmp_path / "line.msh"))
     with pytest.raises(ValueError, match=r"no plane cells in named sets \(only points, lines"):
@@ -441,9 +435,13 @@ def test_dolfinx_meshes_that_are_not_plane_and_tags_in_the_wrong_place_are_refus
     square.topology.create_connectivity(1, 2)
     facets = exterior_facet_indices(square.topology)
     tags = meshtags(square, 1, facets, np.ones(len(facets), dtype=np.int32))
-    for wrong in (lambda: tagged(square, tags), lambda: tagged(create_unit_cube(comm, 2, 2, 2))):
+    cube = create_unit_cube(comm, 2, 2, 2)
+    for wrong in (lambda: tagged(square, tags), lambda: tagged(cube, facets=tags)):
         with pytest.raises(ValueError, match="must be of dimension 2"):
             wrong()
+    prisms = create_unit_cube(comm, 1, 1, 1, CellType.prism)
+    with pytest.raises(ValueError, match="the mesh has prisms, which are not read: cut them"):
+        tagged(prisms)
     element = basix.ufl.element("P", "triangle", 1, shape=(3,))
     with pytest.raises(ValueError, match="not plane: z differs by 1"):
         tagged(create_mesh(MPI.COMM_SELF, cells=np.array([[0, 1, 2]]), e=element, x=np.eye(3)))

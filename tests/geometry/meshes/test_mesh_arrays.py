@@ -4,7 +4,7 @@ import gmsh
 import numpy as np
 import pytest
 
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 
 
 @pytest.fixture
@@ -28,20 +28,20 @@ def model():
 
 
 def test_every_node_belongs_to_a_cell(model):
-    mesh = PlaneMesh.from_gmsh(model)
+    mesh = MeshArrays.from_gmsh(model)
     assert (np.unique(mesh.cells) == np.arange(len(mesh.x))).all()
     assert set(mesh.bodies) == {7}
-    assert np.abs(mesh.x[mesh.edges[mesh.tags == 3]].sum(axis=2) - 1).max() < 1e-12
-    assert np.abs(np.linalg.norm(mesh.x[mesh.edges[mesh.tags == 4]], axis=2) - 1).max() < 1e-12
+    assert np.abs(mesh.x[mesh.facets[mesh.tags == 3]].sum(axis=2) - 1).max() < 1e-12
+    assert np.abs(np.linalg.norm(mesh.x[mesh.facets[mesh.tags == 4]], axis=2) - 1).max() < 1e-12
 
 
 def test_middle_nodes_are_those_that_gmsh_would_make(model):
     """Of every cell and every edge, in basix' order, on the arc too."""
-    ours = PlaneMesh.from_gmsh(model).second_order()
-    arc = np.unique(ours.edges[ours.tags == 4])
+    ours = MeshArrays.from_gmsh(model).second_order()
+    arc = np.unique(ours.facets[ours.tags == 4])
     ours.x[arc] /= np.linalg.norm(ours.x[arc], axis=1)[:, None]
     model.model.mesh.setOrder(2)
-    gmshs = PlaneMesh.from_gmsh(model)
+    gmshs = MeshArrays.from_gmsh(model)
     assert ours.x.shape == gmshs.x.shape
     assert np.abs(ours.x[ours.cells] - gmshs.x[gmshs.cells]).max() < 1e-9
-    assert np.abs(ours.x[ours.edges] - gmshs.x[gmshs.edges]).max() < 1e-9
+    assert np.abs(ours.x[ours.facets] - gmshs.x[gmshs.facets]).max() < 1e-9

@@ -1,4 +1,5 @@
-"""A mesh of curved triangles or quadrilaterals as arrays, before dolfinx distributes it."""
+"""A mesh of curved cells of one kind, in a plane or in space, as arrays before dolfinx distributes
+it."""
 
 from __future__ import annotations
 
@@ -11,11 +12,14 @@ import basix
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
-from archord.geometry.basis import Array, order_of
+from archord.geometry.basis import Array, dimension_of, order_of
 from archord.geometry.meshes.cells import (
-    distinct_edges,
+    corners_of,
+    distinct,
+    entities_of,
     in_basix_order,
     inner_weights,
+    n_corners,
     sides_between,
     sides_of,
     with_middle_nodes,
@@ -23,23 +27,25 @@ from archord.geometry.meshes.cells import (
 
 _FAR = 1e30  # coordinates beyond overflow
 _INCOMPLETE = 20  # gmsh's number of triangles of third order without a node inside
-SOLID = (
-    "the mesh is of solid (3D) elements, and archord is plane: mesh a plane section of the bodies"
-)
+_CUT = "cut them into tetrahedra, or mesh with tetrahedra or hexahedra alone"
+_ONE_KIND = {
+    2: ("plane cells", "triangles", "quadrilaterals"),
+    3: ("solid cells", "tetrahedra", "hexahedra"),
+}
 _THICK = 1e-6  # difference of z over the mesh's size
 
 Numbers = tuple[Mapping[str, int], Mapping[str, int]]
 
 
 @dataclass(frozen=True)
-class PlaneMesh:
-    """Nodes, cells of one kind, and the edges of named curves.
+class MeshArrays:
+    """Nodes, cells of one kind, and their sides in named sets, in ``d`` = 2 or 3 dimensions.
 
-    - ``x`` ``(n, 2)``: the nodes
-    - ``kind``: whether cells are triangles or quadrilaterals
+    - ``x`` ``(n, d)``: the nodes
+    - ``kind``: whether cells are triangles, quadrilaterals, tetrahedra or hexahedra
     - ``cells`` ``(m, a)``: their nodes, in basix' order
     - ``bodies`` ``(m,)``: a tag for each cell
-    - ``edges`` ``(k, b)``: nodes of the facets in sets, in basix' order
+    - ``facets`` ``(k, b)``: nodes of the edges, or of the faces in space, in sets, in basix' order
     - ``tags`` ``(k,)``: a tag for each of these
     - ``cell_sets``, ``facet_sets``: the tags of each set, several where sets overlap
     - ``point_sets``: the nodes of each set
@@ -50,7 +56,7 @@ class PlaneMesh:
     kind: basix.CellType
     cells: np.ndarray
     bodies: np.ndarray
-    edges: np.ndarray
+    facets: np.ndarray
     tags: np.ndarray
     cell_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
@@ -62,17 +68,24 @@ class PlaneMesh:
         """Order of the cells."""
         return order_of(self.kind, self.cells.shape[1])
 
+    @property
+    def dimension(self) -> int:
+        """Dimension of the cells."""
+        return dimension_of(self.kind)
+
     @classmethod
-    def from_gmsh(cls, gmsh) -> PlaneMesh:
-        """What gmsh's model has in physical groups. Raises ValueError if that is not one kind of
-        cells."""
-        points, edges, faces = (_groups(gmsh, dim) for dim in range(3))
-        only_solids = not faces and len(gmsh.model.mesh.getElementTypes(3)) > 0
-        if only_solids or gmsh.model.getPhysicalGroups(3):
-            raise ValueError(SOLID)
-        types = set().union(*(group.types for group in faces.values()))
-        name, _, _, n_nodes, *_ = _properties(gmsh, types)
-        listed = [group.nodes.reshape(-1, n_nodes) for group in faces.values()]
+    def from_gmsh(cls, gmsh) -> MeshArrays:
+        """What gmsh's model has in physical groups: in space where volumes are in groups, in a
+        plane else. Raises ValueError if that is not one kind of cells."""
+        d = gmsh_dimension(gmsh)
+        groups = _groups(gmsh, d)
+        types = set().union(*(group.types for group in groups.values()))
+        name, _, _, n_nodes, *_ = _properties(gmsh, types, d)
+        facets = _groups(gmsh, d - 1)
+        points: dict[str, _Group] = {}
+        for dim in reversed(range(d - 1)):
+            points |= _groups(gmsh, dim)
+        listed = [group.nodes.reshape(-1, n_nodes) for group in groups.values()]
         cells = np.concatenate(listed)
         # old files repeat cells
         _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
@@ -91,12 +104,12 @@ class PlaneMesh:
             kind,
             x,
             cells,
-            dict(zip(faces, members, strict=True)),
-            {name: place(group.nodes[:, :2]) for name, group in edges.items()},
-            {name: place(group.nodes[:, 0]) for name, group in points.items()},
+            dict(zip(groups, members, strict=True)),
+            {name: place(corners_of(kind, group.nodes)) for name, group in facets.items()},
+            {name: np.unique(place(group.nodes)) for name, group in points.items()},
             (
-                {name: group.tag for name, group in faces.items()},
-                {name: group.tag for name, group in edges.items()},
+                {name: group.tag for name, group in groups.items()},
+                {name: group.tag for name, group in facets.items()},
             ),
         )
 
@@ -110,18 +123,18 @@ class PlaneMesh:
         facet_sets: Mapping[str, np.ndarray],
         point_sets: Mapping[str, np.ndarray],
         numbers: Numbers | None = None,
-    ) -> PlaneMesh:
+    ) -> MeshArrays:
         """The mesh of ``cells``, in basix' order, with the nodes of ``x`` ``(n, 2 or 3)`` that they
         use.
 
-        Sets are given by cells ``(k,)``, by the ends ``(k, 2)`` of facets, and by nodes. Sets of
-        cells and of facets have ``numbers``, or are counted from 1. Raises ValueError for what is
-        not plane, and for facets that no cell has.
+        Sets are given by cells ``(k,)``, by the corners ``(k, c)`` of facets, and by nodes. Sets of
+        cells and of facets have ``numbers``, or are counted from 1. Raises ValueError for plane
+        cells that do not lie in a plane, and for facets that no cell has.
         """
         used, of_cells = np.unique(cells, return_inverse=True)
         new = np.full(len(x) + 1, -1)
         new[used] = np.arange(len(used))
-        x = flat(x[used])
+        x = coordinates(x[used], dimension_of(kind))
         cells = of_cells.reshape(cells.shape)
         cell_sets = cell_sets or {"all": np.arange(len(cells))}
         cell_numbers, facet_numbers = numbers or (_counted(cell_sets), _counted(facet_sets))
@@ -129,38 +142,44 @@ class PlaneMesh:
         bodies = np.zeros(len(cells), dtype=np.int32)
         bodies[members] = tags
         sides = sides_of(kind, cells)
-        facets = {name: sides_between(kind, cells, new[ends]) for name, ends in facet_sets.items()}
-        for name, found in facets.items():
-            if lost := (found >= len(sides)).sum():
+        found = {name: sides_between(kind, cells, new[of]) for name, of in facet_sets.items()}
+        what = "edges" if dimension_of(kind) == 2 else "faces"
+        for name, members in found.items():
+            if lost := (members >= len(sides)).sum():
                 raise ValueError(
-                    f"{lost} of the edges of the facet set {name!r} are not edges of cells"
+                    f"{lost} of the {what} of the facet set {name!r} are not {what} of cells"
                 )
-        members, tags, named_facets = _one_tag_each(facets, facet_numbers)
-        edges = sides[members]
+        members, tags, named_facets = _one_tag_each(found, facet_numbers)
+        facets = sides[members]
         points = {name: new[nodes] for name, nodes in point_sets.items()}
         points = {name: nodes[nodes >= 0] for name, nodes in points.items()}
-        return cls(x, kind, cells, bodies, edges, tags, named_cells, named_facets, points)
+        return cls(x, kind, cells, bodies, facets, tags, named_cells, named_facets, points)
 
-    def facets(self, name: str) -> np.ndarray:
+    def facets_of(self, name: str) -> np.ndarray:
         """Nodes ``(k, b)`` of the facets of a set; none if there is no such set."""
-        return self.edges[np.isin(self.tags, self.facet_sets.get(name, ()))]
+        return self.facets[np.isin(self.tags, self.facet_sets.get(name, ()))]
 
-    def second_order(self) -> PlaneMesh:
-        """This mesh of straight cells with nodes on the middles of edges and of quadrilaterals,
-        behind the others."""
-        n = len(self.cells)
-        of_side = basix.topology(self.kind)[1]
-        ends = np.concatenate([self.cells[:, of_side].reshape(-1, 2), self.edges])
-        first, which = distinct_edges(ends)
+    def second_order(self) -> MeshArrays:
+        """This mesh of straight cells with nodes on the middles of edges, of quadrilaterals and of
+        hexahedra, behind the others."""
+        ends = entities_of(self.kind, self.cells, 1)
+        first, which = distinct(ends)
         middles = self.x[ends[first]].mean(axis=1)
         x = np.concatenate([self.x, middles])
-        of_cells, of_edges = np.split(len(self.x) + which, [len(of_side) * n])
-        cells = np.hstack([self.cells, of_cells.reshape(n, -1)])
-        if self.kind == basix.CellType.quadrilateral:
-            x, cells = with_middle_nodes(x, cells)
-        return replace(self, x=x, cells=cells, edges=np.column_stack([self.edges, of_edges]))
+        of_cells = (len(self.x) + which).reshape(len(self.cells), -1)
+        cells = np.hstack([self.cells, of_cells])
+        if n_corners(self.kind) == 2**self.dimension:
+            x, cells = with_middle_nodes(self.kind, x, cells)
+        return self.with_cells(x, cells)
 
-    def centred(self) -> PlaneMesh:
+    def with_cells(self, x: Array, cells: np.ndarray) -> MeshArrays:
+        """This mesh with the nodes ``x`` and ``cells`` of another order that lie where this one's
+        lie."""
+        corners = corners_of(self.kind, self.facets)
+        facets = sides_of(self.kind, cells)[sides_between(self.kind, self.cells, corners)]
+        return replace(self, x=x, cells=cells, facets=facets)
+
+    def centred(self) -> MeshArrays:
         """This mesh with the nodes inside cells where the nodes on the sides want them."""
         weights = inner_weights(self.kind, self.order)
         n_inner = len(weights)
@@ -227,7 +246,7 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
             )
         nodes = np.zeros((0, dim + 1), dtype=np.uint64)
         if of_type:
-            _, _, _, n_nodes, *_ = _properties(gmsh, set(of_type))
+            _, _, _, n_nodes, *_ = _properties(gmsh, set(of_type), dim)
             [parts] = of_type.values()
             nodes = np.concatenate(parts).reshape(-1, n_nodes)
         name = gmsh.model.getPhysicalName(dim, tag) or str(tag)
@@ -235,35 +254,59 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
     return groups
 
 
-def _properties(gmsh, types: set[int]) -> tuple:
-    """What gmsh says of the one of ``types``: its name, dimension, order, number of nodes and
-    more. Raises ValueError if there is not one."""
-    properties = {number: gmsh.model.mesh.getElementProperties(number) for number in types}
-    one_kind({of_type[3] for of_type in properties.values()})
-    return properties.popitem()[1]
+def _properties(gmsh, types: set[int], dim: int) -> tuple:
+    """What gmsh says of the one of ``types`` of dimension ``dim``: its name, dimension, order,
+    number of nodes and more. Raises ValueError if there is not one."""
+    properties = [gmsh.model.mesh.getElementProperties(number) for number in sorted(types)]
+    require_known(found[0].split()[0] for found in properties)
+    nodes = [found[3] for found in properties]
+    if len(nodes) > len(set(nodes)):
+        raise ValueError("the mesh has tetrahedra and hexahedra: it must have one kind")
+    one_kind(set(nodes), max(dim, 2))
+    return properties[0]
 
 
-def flat(x: Array) -> Array:
-    """The first two coordinates of ``x`` ``(n, 2 or 3)``. Raises ValueError where the third
-    differs, and for nan."""
+def gmsh_dimension(gmsh) -> int:
+    """Dimension of the problem in gmsh's model: 3 where volumes are in physical groups. Raises
+    ValueError for volumes in no group, and no faces either."""
+    if gmsh.model.getPhysicalGroups(3):
+        return 3
+    if not gmsh.model.getPhysicalGroups(2) and len(gmsh.model.mesh.getElementTypes(3)):
+        raise ValueError(
+            "the mesh has solid cells in no physical group: name the volumes by physical groups"
+        )
+    return 2
+
+
+def coordinates(x: Array, dimension: int) -> Array:
+    """The first ``dimension`` coordinates of ``x`` ``(n, 2 or 3)``. Raises ValueError where the
+    third one differs in a plane, and for nan."""
     if not np.isfinite(x).all() or not np.abs(x).max(initial=0) < _FAR:
         raise ValueError("some nodes have coordinates that are not finite or beyond 1e30")
     size = np.ptp(x, axis=0)
-    if len(size) == 3 and size[2] > _THICK * size[:2].max():
+    if dimension == 2 and len(size) == 3 and size[2] > _THICK * size[:2].max():
         raise ValueError(
             f"the mesh is not plane: z differs by {size[2]:g}, and must be the same for all nodes"
         )
-    return x[:, :2]
+    return x[:, :dimension]
 
 
-def one_kind(nodes: set[int]) -> int:
+def one_kind(nodes: set[int], dimension: int = 2) -> int:
     """The number of ``nodes`` of all cells. Raises ValueError if there is not one."""
     if len(nodes) == 1:
         return nodes.pop()
-    held = "no plane cells in named sets (only points, lines or elements without a set)"
+    cells, some, others = _ONE_KIND[dimension]
+    held = f"no {cells} in named sets (only points, lines or elements without a set)"
     if nodes:
         held = f"cells of {' and '.join(map(str, sorted(nodes)))} nodes"
     raise ValueError(
-        f"the mesh has {held}; it must have one kind: all triangles or all quadrilaterals, of one "
-        "order"
+        f"the mesh has {held}; it must have one kind: all {some} or all {others}, of one order"
     )
+
+
+def require_known(words: Iterable[str]) -> None:
+    """Raise ValueError if one of the ``words`` is for prisms or pyramids."""
+    wedges = {"prism": "prisms", "wedge": "prisms", "pyramid": "pyramids"}
+    found = sorted({wedges[word.lower()] for word in words if word.lower() in wedges})
+    if found:
+        raise ValueError(f"the mesh has {' and '.join(found)}, which are not read: {_CUT}")
