@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from archord.geometry.curve import RigidCircle
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.geometry.meshes.formats.source import Mesh
+    from archord.geometry.shapes.boxes import boxes
     from archord.geometry.shapes.rectangles import rectangles
     from archord.materials.elasticity import Elastic
     from archord.materials.finite import LargeStrain
@@ -71,6 +72,7 @@ __all__ = [
     "System",
     "TabularHardening",
     "VoceHardening",
+    "boxes",
     "draw_run",
     "export_deck",
     "gmsh_to_mesh",
@@ -84,6 +86,7 @@ _HOME = {
     "archord.geometry.curve": ["RigidCircle"],
     "archord.geometry.meshes.fenicsx": ["gmsh_to_mesh"],
     "archord.geometry.meshes.formats.source": ["Mesh"],
+    "archord.geometry.shapes.boxes": ["boxes"],
     "archord.geometry.shapes.rectangles": ["rectangles"],
     "archord.materials.elasticity": ["Elastic"],
     "archord.materials.finite": ["LargeStrain"],
