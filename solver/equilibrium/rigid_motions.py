@@ -23,6 +23,7 @@ _MOST = 100  # iterations
 _AT_REST = 1e-3  # part of the forces that may be left
 _ROUND_OFF = 1e-9  # the same, of the largest forces on the way
 _DAMPING = 10.0  # ratio of one damping to the next
+_BALANCED = 1e-6  # part of nodal forces below which their resultant is none
 _LOOSE = 1e-6  # part of a free motion that a body has at least which takes part in it
 
 
@@ -166,6 +167,30 @@ class RigidMotions:
         of_loads = np.tensordot(levels, drives.applied, 1)
         of_drives = self.levels @ drives.values(load) / self.problem.whole
         return of_drives + self._on_bodies(self.free, of_loads[None])[:, 0]
+
+    def resultant(self, forces: Array, on_levels: Array) -> float:
+        """Size of what ``forces`` ``(n_owned, d)`` and those ``on_levels`` ``(l,)`` do to the free
+        motions."""
+        on_motions = self._on_bodies(self.free, forces[None])[:, 0] + self.levels @ on_levels
+        return float(np.linalg.norm(on_motions))
+
+    def least_push(self, load: float) -> float:
+        """The least resultant of the forces that single drives prescribe at the ``load``, but for
+        forces that balance by themselves; 0 without any."""
+        drives = self.drives
+        pushes: list[float] = []
+        for level, value in enumerate(drives.values(load)):
+            on_levels = np.zeros(len(drives.rate))
+            forces = np.zeros_like(drives.applied[level])
+            if drives.moving[level]:
+                on_levels[level] = value / self.problem.whole
+            elif level not in drives.unknown:
+                forces = value * drives.applied[level]
+            push = self.resultant(forces, on_levels)
+            size = self.comm.allreduce(float(np.abs(forces).sum()))
+            if push > _BALANCED * size:
+                pushes.append(push)
+        return min(pushes, default=0.0)
 
     def _shortened(self, step: Array, openings: list[Array]) -> Array:
         """The ``step``, in which no gap changes by more than a facet."""

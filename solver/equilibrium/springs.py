@@ -26,6 +26,7 @@ WEAK = 1e-8  # without influence, but well above the round-off of a factorisatio
 _STIFFER = 100.0  # most of M over the smallest shear modulus
 # least of M over the own one: springs must stand out of the round-off of a factorisation
 _LEAST = 1e-5
+_LARGE = 0.1  # part of a force that springs carry only where contact is lost
 _LITTLE = 0.01  # part of the contact forces below which springs hold nothing
 
 
@@ -46,8 +47,8 @@ class Springs:
     on_levels : (l,) on discs
     work : what the springs took up in the step, of the modelled part
     energy : sum of the work over accepted states
-    works : work in the last accepted step, by the names of loose bodies and of interactions with a
-        disc
+    works : work in the last accepted step, by the names of loose bodies and of discs, as "contact
+        disc" for the disc of the interaction "contact"
     idle : whether the springs left all to contact in the last accepted state
     """
 
@@ -116,8 +117,22 @@ class Springs:
             disc = interface.surfaces[0]
             if isinstance(disc, RigidSurface):
                 moves = disc.rate.any(axis=1)
-                found[interface.interaction.name] = float(on_levels[moves].sum())
+                found[f"{interface.interaction.name} disc"] = float(on_levels[moves].sum())
         return found
+
+    def held(self, load: float) -> str:
+        """The body that they hold in place of contact at the ``load``, "" where contact carries
+        what pushes. Without a force that is prescribed, they may hold a body that others push.
+        Collective."""
+        if not self.rigid.drives.pushes(load):
+            return ""
+        forces = self.forces.reshape(-1, self.rigid.drives.dimension)
+        carried = self.rigid.resultant(forces, self.on_levels)
+        least = self.rigid.least_push(load)
+        if not 0 < _LARGE * least < carried:
+            return ""
+        works = self._works()
+        return max(works, key=lambda name: works[name])
 
     def look(self) -> None:
         """See whether they are `idle`."""

@@ -42,7 +42,8 @@ class Newton:
 
     Without convergence ``worst`` is the place ``(d,)`` of the largest residual,
     ``plastic_increment`` the largest of PEEQ. ``active_set_changes`` belong to each residual.
-    ``held`` contact points had to stay on their facets. ``krylov_iterations`` are of all linear
+    ``held`` contact points had to stay on their facets. ``floating`` is the body that nothing but
+    weak springs would hold in the state that was found, and "" where contact carries it. ``krylov_iterations`` are of all linear
     systems that were solved by iterations.
     """
 
@@ -54,6 +55,7 @@ class Newton:
     active_set_changes: list[int] = field(default_factory=list)
     plastic_increment: float = 0.0
     held: bool = False
+    floating: str = ""
     factorisations: int = 0
     evaluations: int = 0
     krylov_iterations: int = 0

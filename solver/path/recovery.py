@@ -159,18 +159,27 @@ class Recovery:
         Where the residual circles though no point opens or closes, points jump between two facets
         that meet at an angle. Each facet is continued beyond its ends then.
         """
-        result = self.newton.solve(guess, line_search=line_search, goal=goal)
-        self._solves.append(result)
+        result = self._solve_carried(guess, line_search=line_search, goal=goal)
         pairs = self.equilibrium.contact.pairs
         can_jump = any(pair.moves for pair in pairs)
-        if result.converged or not can_jump or not _circles(result):
+        if result.converged or result.floating or not can_jump or not _circles(result):
             return result.converged
         for pair in pairs:
             pair.start = "held"
-        result = self.newton.solve(None, line_search=line_search, goal=goal)
+        result = self._solve_carried(None, line_search=line_search, goal=goal)
         result.held = True
-        self._solves.append(result)
         return result.converged
+
+    def _solve_carried(self, guess: Array | None, *, line_search: bool, goal: float) -> Newton:
+        """Solve from ``guess``. What is found does not count if springs carry what pushes a body:
+        they would let it go far away."""
+        result = self.newton.solve(guess, line_search=line_search, goal=goal)
+        self._solves.append(result)
+        springs = self.equilibrium.springs
+        if result.converged and springs is not None:
+            result.floating = springs.held(self.equilibrium.load)
+            result.converged = not result.floating
+        return result
 
 
 def _circles(result: Newton) -> bool:

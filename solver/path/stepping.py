@@ -128,6 +128,16 @@ def march(
 def _why(result: Newton, problem: Problem, load: float, held: float, size: float) -> str:
     """Why the step to ``load`` failed, in one sentence."""
     name = problem.load_name
+    cut = "no smaller step is allowed"
+    if size < 1:
+        cut = f"the step was cut to {size:.2g} of an output step"
+    last_held = f"{cut}; the last load that held is {name} = {held:.6g}"
+    if result.floating:
+        return (
+            f"nothing holds what the loads move at {name} = {load:.6g}: no contact carries "
+            f"{result.floating!r}; hold it by a support, or let more of the loads press it against "
+            f"others; {last_held}"
+        )
     last = "none"
     if result.residuals and np.isfinite(result.residuals[-1]):
         last = f"{result.residuals[-1]:.1e}"
@@ -135,14 +145,11 @@ def _why(result: Newton, problem: Problem, load: float, held: float, size: float
     if result.worst is not None:
         place = ", ".join(f"{x:.4g}" for x in result.worst)
         where = f", the largest residual at ({place})"
-    cut = "no smaller step is allowed"
-    if size < 1:
-        cut = f"the step was cut to {size:.2g} of an output step"
     limit = ""
     if problem.by_force and result.plastic_increment:
         limit = "; if the bodies yield as a whole, the limit load is close"
     return (
         f"no equilibrium at {name} = {load:.6g}: {result.reason}; "
         f"after {result.iterations} iterations the residual over reaction was {last}{where}; "
-        f"{cut}; the last load that held is {name} = {held:.6g}{limit}"
+        f"{last_held}{limit}"
     )

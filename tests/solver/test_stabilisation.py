@@ -9,10 +9,11 @@ from mpi4py import MPI
 from archord.geometry.curve import RigidCircle
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
+from archord.geometry.shapes.rectangles import rectangles
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.path.stepping import StepRules
+from archord.solver.path.stepping import StepFailure, StepRules, march
 from archord.solver.path.system import System
 from archord.solver.problem import (
     Body,
@@ -20,9 +21,11 @@ from archord.solver.problem import (
     Dirichlet,
     Drive,
     Interaction,
+    Load,
     Mean,
     Problem,
     Rigid,
+    Support,
 )
 from tests.solver.parts import ELASTIC, E, blocks, solve
 
@@ -166,3 +169,63 @@ def test_a_mean_motion_of_half_an_edge_is_that_of_the_whole():
             ].drive_force("pull")
         )
     assert found[0] == pytest.approx(found[1], rel=1e-4)
+
+
+def ball(unloading: int) -> Problem:
+    """A rigid ball that a force presses into steel, which yields, and that is let go."""
+    return Problem(
+        rectangles({"block": (0.0, -4.0, 4.0, 4.0)}, size=0.5),
+        [Body("block", material="S355")],
+        [Interaction("contact", (RigidCircle(np.array([0.0, 5.0]), 5.0), "block top"))],
+        [Support("block bottom", fixed="y")],
+        [Load("ball", on="contact", direction="y", force=[-3000.0, 0.0])],
+        steps=[4, unloading],
+        kinematics="axisymmetric",
+        strain="large",
+    )
+
+
+def test_a_ball_that_is_let_go_stays_on_its_body():
+    """Newton's method may find the ball on its springs alone, far below the block. This state does
+    not count: the ball rises by elastic unloading, in steps of any length, until no force is
+    left."""
+    depths = []
+    for unloading in (2, 8):
+        system = System(ball(unloading))
+        path = np.concatenate([np.linspace(0.25, 1, 4), 1 + np.linspace(0, 1, unloading + 1)[1:]])
+        moved = []
+        march(
+            system.load_path(),
+            list(path),
+            substep_done=lambda load, s=system, m=moved: m.append(s.drive_displacement("ball")),
+        )
+        assert min(moved) > -0.1
+        deepest = int(np.argmin(moved))
+        assert (np.diff(moved[deepest:]) > 0).all()
+        assert moved[-1] < 0.8 * moved[deepest]
+        assert abs(system.contact_force("contact")[1]) < 1e-4 * 3000
+        depths.append(moved[-1])
+    assert depths[0] == pytest.approx(depths[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("kinematics", ["plane strain", "plane stress", "axisymmetric"])
+def test_a_step_in_which_springs_alone_hold_a_body_is_not_accepted(kinematics):
+    """A block that is pulled off another: no force is so small that it would be accepted. The body
+    is named, and the accepted state is left."""
+    system = System(
+        Problem(
+            rectangles({"base": (0.0, 0.0, 2.0, 1.0), "lid": (0.0, 1.0, 2.0, 1.0)}, size=0.5),
+            [Body(name, Elastic(210e3, 0.3)) for name in ("base", "lid")],
+            [Interaction("contact", ("base top", "lid bottom"))],
+            [Support("base bottom", fixed="xy"), Support("lid left", fixed="x")],
+            [Load("load", on="lid", direction="y", force=[-10.0, 0.0, 10.0])],
+            kinematics=kinematics,
+            steps=1,
+        )
+    )
+    system.solve([1.0, 2.0])
+    settled = system.equilibrium.state()
+    with pytest.raises(StepFailure, match="no contact carries 'lid'; hold it by a support"):
+        system.solve([3.0])
+    np.testing.assert_array_equal(system.equilibrium.state(), settled)
+    assert np.abs(settled).max() < 1e-3
