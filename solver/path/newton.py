@@ -43,8 +43,8 @@ class Newton:
     Without convergence ``worst`` is the place ``(d,)`` of the largest residual,
     ``plastic_increment`` the largest of PEEQ. ``active_set_changes`` belong to each residual.
     ``held`` contact points had to stay on their facets. ``floating`` is the body that nothing but
-    weak springs would hold in the state that was found, and "" where contact carries it. ``krylov_iterations`` are of all linear
-    systems that were solved by iterations.
+    weak springs would hold in the state that was found, and "" where contact carries it.
+    ``krylov_iterations`` are of all linear systems that were solved by iterations.
     """
 
     converged: bool

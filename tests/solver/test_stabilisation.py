@@ -27,6 +27,7 @@ from archord.solver.problem import (
     Rigid,
     Support,
 )
+from tests.solver.contact.blocks_in_space import bodies, tagged
 from tests.solver.parts import ELASTIC, E, blocks, solve
 
 STEEL = Elastic(210000.0, 0.3, "strain")
@@ -208,24 +209,38 @@ def test_a_ball_that_is_let_go_stays_on_its_body():
     assert depths[0] == pytest.approx(depths[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("kinematics", ["plane strain", "plane stress", "axisymmetric"])
+def pulled_off(kinematics: str) -> Problem:
+    """A block that a force presses onto another, lets go, and pulls off."""
+    if kinematics == "space":
+        mesh = tagged(bodies(MPI.COMM_SELF))
+        base, lid, faces, walls = "lower", "upper", ("upper", "lower"), ("left", "front")
+    else:
+        mesh = rectangles({"base": (0.0, 0.0, 2.0, 1.0), "lid": (0.0, 1.0, 2.0, 1.0)}, size=0.5)
+        base, lid, faces, walls = "base", "lid", ("base top", "lid bottom"), ("lid left",)
+    floor, up = ("base", "z") if kinematics == "space" else ("base bottom", "y")
+    supports = [Support(floor, fixed="xyz" if kinematics == "space" else "xy")]
+    supports += [Support(wall, fixed=axis) for wall, axis in zip(walls, "xy", strict=False)]
+    return Problem(
+        mesh,
+        [Body(name, Elastic(210e3, 0.3)) for name in (base, lid)],
+        [Interaction("contact", faces)],
+        supports,
+        [Load("load", on=lid, direction=up, force=[-10.0, 0.0, 10.0])],
+        kinematics=kinematics,
+        steps=1,
+    )
+
+
+@pytest.mark.parametrize("kinematics", ["plane strain", "plane stress", "axisymmetric", "space"])
 def test_a_step_in_which_springs_alone_hold_a_body_is_not_accepted(kinematics):
     """A block that is pulled off another: no force is so small that it would be accepted. The body
     is named, and the accepted state is left."""
-    system = System(
-        Problem(
-            rectangles({"base": (0.0, 0.0, 2.0, 1.0), "lid": (0.0, 1.0, 2.0, 1.0)}, size=0.5),
-            [Body(name, Elastic(210e3, 0.3)) for name in ("base", "lid")],
-            [Interaction("contact", ("base top", "lid bottom"))],
-            [Support("base bottom", fixed="xy"), Support("lid left", fixed="x")],
-            [Load("load", on="lid", direction="y", force=[-10.0, 0.0, 10.0])],
-            kinematics=kinematics,
-            steps=1,
-        )
-    )
+    problem = pulled_off(kinematics)
+    system = System(problem)
     system.solve([1.0, 2.0])
     settled = system.equilibrium.state()
-    with pytest.raises(StepFailure, match="no contact carries 'lid'; hold it by a support"):
+    said = f"no contact carries {problem.bodies[1].name!r}; hold it by a support"
+    with pytest.raises(StepFailure, match=said):
         system.solve([3.0])
     np.testing.assert_array_equal(system.equilibrium.state(), settled)
     assert np.abs(settled).max() < 1e-3
