@@ -18,7 +18,13 @@ from archord.measures.energies import ENERGIES
 from archord.measures.measure import Accepted, Column, column
 from archord.measures.parts import part_measures
 from archord.presets.general_doubts import ending, refusal, step_checks
-from archord.presets.problem import as_input_error, general_problem, mesh_name, require_mirrored
+from archord.presets.problem import (
+    as_input_error,
+    general_problem,
+    mesh_name,
+    placed,
+    require_mirrored,
+)
 from archord.report.timer import Timer
 from archord.scene.columns import supporting
 from archord.scene.problem import ProblemScene
@@ -40,6 +46,7 @@ def general_account(
     file = given.mesh_file if given else scene.mesh.file
     with timer("mesh"), as_input_error(name):
         problem = given.on(comm) if given else general_problem(scene, comm)
+        scene = placed(scene, problem.mesh)
     warnings = scene.doubts
     with as_input_error(name):
         # what contradicts itself is refused before its mesh is looked at

@@ -3,7 +3,7 @@ body."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, product
 
 import numpy as np
@@ -12,8 +12,8 @@ from mpi4py import MPI
 from archord.geometry.meshes.check import check_mesh, facets_within, gaps
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
-from archord.geometry.meshes.motions import AXISYMMETRIC, PLANE, free_motions
-from archord.geometry.meshes.quality import beyond_axis
+from archord.geometry.meshes.motions import AXISYMMETRIC, PLANE, SPACE, free_motions
+from archord.geometry.meshes.quality import beyond_axis, place
 from archord.materials.material import Array
 from archord.solver.conditions import Dirichlet
 from archord.solver.contact.interaction import Interaction
@@ -28,7 +28,6 @@ _APART = 0.01  # of the same: a gap between tied surfaces that is told of
 _ALIKE = 2.0  # ratio of a drawn overlap and an interference, up to which they mean the same fit
 _ADDS = 0.1  # of an interference: a drawn gap or overlap that changes the fit
 _BENT = 0.01  # of the length of an edge: how far it may depart from a line and be straight
-_ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
 def check(problem: Problem) -> list[str]:
@@ -46,14 +45,16 @@ def check(problem: Problem) -> list[str]:
     doubts = list[str]()
     if whole is not None:
         around_axis = problem.kinematics.has_hoop
+        moves = _free(problem, whole, cells, owner)
         faults = chain(
             beyond_axis(whole.x) if around_axis else [],
             _shared(problem, whole),
             _half_loaded(problem, whole),
-            _loose(problem, whole, cells, owner),
+            _loose(moves, set(owner.values()), SPACE if whole.dimension == 3 else ("rotation",)),
         )
         failure = next(faults, "")
         doubts += _half_held(problem, whole)
+        doubts += _sliding(problem, owner, moves) if whole.dimension == 3 else []
         doubts += _moved_in_contact(problem, whole)
         doubts += _stiffened(problem, whole)
         for name in sorted({*owner, *_moved(problem), *_spread(problem)}):
@@ -132,13 +133,14 @@ def _stiffened(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     for load in _loads(problem):
         if load.kind != "force" or load.on not in whole.facet_sets:
             continue
-        edges = whole.facets[np.isin(whole.tags, whole.facet_sets[load.on])]
-        x = whole.x[np.unique(edges[:, :2])]
+        corners = _corners(whole, whole.facet_sets[load.on])
+        x = whole.x[np.unique(corners)]
         extents = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
-        if extents[1] > _BENT * extents[0]:
+        if extents[-1] > _BENT * extents[0]:
+            shape = "face is not flat" if whole.dimension == 3 else "edge is not straight"
             yield (
                 f"the force {load.name!r} moves all of {load.on!r} by one displacement in "
-                f"{load.direction}, and that edge is not straight: it keeps its shape as if it "
+                f"{load.direction}, and that {shape}: it keeps its shape as if it "
                 "were stiff; a pressure, a distributing coupling, or the force on the body's "
                 "cells leaves it free"
             )
@@ -154,10 +156,10 @@ def _moved_in_contact(problem: Problem, whole: MeshArrays) -> Iterator[str]:
         touching = np.isin(whole.tags, whole.facet_sets[surface])
         both = there & touching
         if both.any() and (there & ~touching).any() and (touching & ~there).any():
-            x, y = whole.x[whole.facets[both][0, :2]].mean(axis=0)
+            at = place(whole.x[whole.facets[both][0, : whole.dimension]].mean(axis=0))
             yield (
                 f"the set {on!r} of {by!r} has {both.sum()} facets of the surface {surface!r} of "
-                f"{part!r}, as at ({x:.6g}, {y:.6g}), which it moves whatever they touch: look "
+                f"{part!r}, as at {at}, which it moves whatever they touch: look "
                 "whether they belong to both"
             )
 
@@ -170,39 +172,46 @@ def _shared(problem: Problem, whole: MeshArrays) -> Iterator[str]:
         tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
         common = whole.facets[np.isin(whole.tags, [*tags])]
         if first != second and len(common):
-            x, y = whole.x[common[0, :2]].mean(axis=0)
+            at = place(whole.x[common[0, : whole.dimension]].mean(axis=0))
             yield (
                 f"the surfaces {one!r} of the interaction {first!r} and {other!r} of {second!r} "
-                f"have {len(common)} facets in common, the first at ({x:.6g}, {y:.6g}), whose "
+                f"have {len(common)} facets in common, the first at {at}, whose "
                 "contact would count twice: a facet goes to one interaction"
             )
 
 
-def _loose(
+def _free(
     problem: Problem, whole: MeshArrays, cells: dict[str, str], owner: dict[str, str]
-) -> Iterator[str]:
-    """What is said of bodies that neither supports nor contact hold; a turning one in contact is no
-    fault."""
+) -> dict[str, list[str]]:
+    """The rigid motions of each body that neither supports nor contact without friction prevent;
+    but a turn of a body in contact in a plane."""
     held = _held_places(problem, whole, cells)
     links: list[tuple[str, str, Array, Array]] = []
     for part in problem.interactions:
         names = _surfaces(part)
-        facets = np.isin(whole.tags, whole.facet_sets[names[-1]])
-        ends = whole.x[whole.facets[facets][:, :2]]
-        middle = ends.mean(axis=1)
-        chord = ends[:, 1] - ends[:, 0]
-        chord /= np.linalg.norm(chord, axis=1)[:, None]
-        across = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
-        for direction in (across, chord) if _is_tied(part) else (across,):
+        corners = whole.x[_corners(whole, whole.facet_sets[names[-1]])]
+        middle = corners.mean(axis=1)
+        sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        frames = np.linalg.qr(sides, mode="complete")[0]  # the tangents, then the normal
+        tangents_too = np.moveaxis(frames, 2, 0)
+        for direction in tangents_too if _is_tied(part) else tangents_too[-1:]:
             if len(names) == 1:
                 held[owner[names[0]]].append((middle, direction))
             else:
                 links.append((owner[names[0]], owner[names[1]], middle, direction))
-    possible = AXISYMMETRIC if problem.kinematics.has_hoop else PLANE
-    moves = free_motions(held, links, possible)
-    touching = set(owner.values())
+    possible = SPACE if whole.dimension == 3 else PLANE
+    if problem.kinematics.has_hoop:
+        possible = AXISYMMETRIC
+    return free_motions(held, links, possible)
+
+
+def _loose(
+    moves: dict[str, list[str]], touching: set[str], excused: Sequence[str]
+) -> Iterator[str]:
+    """What is said of bodies that neither supports nor contact hold; ``excused`` motions of bodies
+    in contact are no fault."""
     for body, motions in moves.items():
-        free = [motion for motion in motions if motion != "rotation" or body not in touching]
+        free = [motion for motion in motions if motion not in excused or body not in touching]
         if not free:
             continue
         others = [name for name, its in moves.items() if name != body and set(free) & set(its)]
@@ -216,28 +225,44 @@ def _loose(
         )
 
 
+def _sliding(problem: Problem, owner: dict[str, str], moves: dict[str, list[str]]) -> Iterator[str]:
+    """Warnings of bodies in contact without friction that nothing keeps from sliding."""
+    smooth = [part for part in problem.interactions if not (part.friction or _is_tied(part))]
+    for body in sorted({owner[name] for part in smooth for name in _surfaces(part)}):
+        axes = [motion for motion in moves[body] if motion in ("x", "y", "z")]
+        if axes:
+            yield (
+                f"only weak springs keep the body {body!r} from sliding along "
+                f"{' and '.join(axes)}, as nothing pushes it there: a [[support]] of one of its "
+                "sets holds it"
+            )
+
+
 def _held_places(
     problem: Problem, whole: MeshArrays, cells: dict[str, str]
 ) -> dict[str, list[tuple[Array, Array]]]:
-    """Where supports and displacements hold each body, and along what: places ``(k, 2)`` and
-    directions ``(k, 2)``."""
+    """Where supports and displacements hold each body, and along what: places ``(k, d)`` and
+    directions ``(k, d)``, or motions ``(1, 6)`` about the point of a coupling in space."""
     facets = {c.name: c.facets for c in problem.couplings}
     given: list[tuple[str, str]] = [(s.on, f) for s in _supports(problem) for f in s.fixed]
     displaced = [load for load in _loads(problem) if load.kind == "displacement"]
     given += [(load.on, str(load.direction)) for load in displaced]
-    axes = {0: "x", 1: "y"}
-    given += [(s.facets, axes[s.axis]) for s in problem.supports if isinstance(s, Dirichlet)]
-    free = [c for c in problem.couplings if (c.name, "rotation") not in given]
-    hinges = {coupling.name: np.array([coupling.point]) for coupling in free}
+    d = whole.dimension
+    given += [(s.facets, "xyz"[s.axis]) for s in problem.supports if isinstance(s, Dirichlet)]
+    hinged = [c for c in problem.couplings if d == 3 or (c.name, "rotation") not in given]
+    hinges = {coupling.name: np.array([coupling.point]) for coupling in hinged}
+    units = {freedom: np.eye(d)[axis] for axis, freedom in enumerate("xyz"[:d])}
+    if d == 3:
+        units |= {SPACE[turn]: np.eye(6)[turn] for turn in (3, 4, 5)}
     inside = {body: _nodes(whole, name, of_cells=True) for body, name in cells.items()}
     held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
     for on, freedom in given:
         nodes = _nodes(whole, facets.get(on, on))
         for body, of_body in inside.items():
             here = np.intersect1d(nodes, of_body)
-            if len(here) and freedom in _ALONG:
+            if len(here) and freedom in units:
                 places = hinges.get(on, whole.x[here])
-                directions = np.tile(_ALONG[freedom], (len(places), 1))
+                directions = np.tile(units[freedom], (len(places), 1))
                 held[body].append((places, directions))
     return held
 
@@ -308,6 +333,11 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
     if wanted and gap > _ADDS * wanted:
         left = max(wanted - gap, 0.0)
         yield f"{said}: of its interference of {wanted:g} only {left:.3g} presses them together"
+
+
+def _corners(whole: MeshArrays, tags: Sequence[int]) -> np.ndarray:
+    """The first corners ``(k, d)``, as many as span a facet, of the facets with these ``tags``."""
+    return whole.facets[np.isin(whole.tags, tags), : whole.dimension]
 
 
 def _nodes(whole: MeshArrays, name: str, of_cells: bool = False) -> np.ndarray:

@@ -19,6 +19,7 @@ from archord.materials.kinematics import kinematics
 from archord.report.errors import InputError
 from archord.scene import parts
 from archord.scene.problem import ProblemScene
+from archord.scene.sections.keys import plain
 from archord.solver.contact.laws.named import LAWS
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.path.system import displacement_space
@@ -29,7 +30,30 @@ def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
     """The problem that ``scene`` states, on a mesh on the ranks of ``comm``. Collective; raises
     `InputError` for a file that is no mesh, and for parts that were given from Python."""
     with as_input_error(mesh_name(scene)):
-        return problem_of(scene, scene_mesh(scene, comm))
+        mesh = scene_mesh(scene, comm)
+        return problem_of(placed(scene, mesh), mesh)
+
+
+def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
+    """The ``scene`` in a plane or in space, as its ``mesh`` is where it does not say. Raises
+    `InputError` for a scene that does not fit the mesh."""
+    plane = scene.analysis.plane
+    in_space = mesh.dimension == 3
+    if "plane" in scene.analysis.model_fields_set:
+        if in_space == (plane == "space"):
+            return scene
+        drawn, allowed = "a plane mesh", '"strain", "stress" or "axisymmetric"'
+        if in_space:
+            drawn, allowed = "a mesh of solids", '"space"'
+        said = f"must be {allowed} for {drawn}"
+        raise InputError(f'{mesh_name(scene)}: analysis.plane = "{plane}" {said}.')
+    if not in_space and not scene.in_space:
+        return scene
+    data = plain(scene)
+    analysis = data.get("analysis", {})
+    data["analysis"] = analysis | {"plane": "space" if in_space else plane}
+    make: Any = ProblemScene
+    return make(mesh_name(scene), None, **data)
 
 
 @contextmanager
@@ -76,10 +100,7 @@ def problem_of(scene: ProblemScene, mesh: TaggedMesh) -> Problem:
         [_interaction(part, analysis) for part in scene.interaction],
         [Support(part.name, part.on, part.fixed) for part in scene.support],
         [_load(load) for load in scene.load],
-        [
-            Coupling(part.name, part.facets, (part.point[0], part.point[1]), part.kind)
-            for part in scene.coupling
-        ],
+        [Coupling(part.name, part.facets, tuple(part.point), part.kind) for part in scene.coupling],
         steps=scene.path.steps,
         fit_steps=scene.path.fit_steps,
         kinematics=kinematics(analysis.plane),
@@ -138,7 +159,7 @@ def _interaction(part: parts.InteractionSection, analysis: Any) -> Interaction:
 def _load(load: parts.LoadSection) -> Load:
     core = None
     if load.core is not None:
-        core = ((load.core.centre[0], load.core.centre[1]), load.core.radius)
+        core = (tuple(load.core.centre), load.core.radius)
     values: dict[str, Any] = {load.kind: load.stages}
     return Load(load.name, load.on, load.direction, core=core, **values)
 

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from archord.scene.parts import (
+    IN_PLANE,
+    IN_SPACE,
     BodySection,
     CouplingSection,
     InteractionSection,
@@ -17,7 +19,6 @@ from archord.scene.sections.analysis import ProblemAnalysis
 from archord.scene.sections.keys import require
 from archord.scene.sections.units import Units
 
-_FREEDOMS = ("x", "y", "rotation")
 Column = tuple[str, str, str, str]  # section and name of a part, what follows the name, unit
 
 
@@ -31,6 +32,10 @@ class Parts(Protocol):
     coupling: list[CouplingSection]
     support: list[SupportSection]
     load: list[LoadSection]
+
+    @property
+    def in_space(self) -> bool:
+        """Whether bodies are in space."""
 
 
 def part_columns(scene: Parts) -> Iterator[Column]:
@@ -113,6 +118,7 @@ def _motions(scene: Parts, coupling: CouplingSection) -> list[str]:
     They are free ones of a rigid coupling, held ones of a distributing one; a load gives its name
     instead.
     """
+    freedoms = IN_SPACE if scene.in_space else IN_PLANE
     loaded = {load.direction for load in scene.load if load.on == coupling.name}
     held = {
         freedom
@@ -120,5 +126,5 @@ def _motions(scene: Parts, coupling: CouplingSection) -> list[str]:
         if support.on == coupling.name
         for freedom in support.fixed
     }
-    solved = held if coupling.kind == "distributing" else {*_FREEDOMS} - held
+    solved = held if coupling.kind == "distributing" else {*freedoms} - held
     return sorted(solved - loaded)

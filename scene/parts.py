@@ -10,10 +10,22 @@ from pydantic import Field, model_validator
 from archord.scene.presets.known import AnyShape
 from archord.scene.sections.bodies import NotNegative, Solid
 from archord.scene.sections.contact import CONTACT_LAWS, PARAMETERS_IN_WORDS, require_parameters
-from archord.scene.sections.keys import Name, Pair, PartName, Positive, Section, given, key, require
+from archord.scene.sections.keys import (
+    Name,
+    Pair,
+    PartName,
+    Place,
+    Positive,
+    Section,
+    given,
+    key,
+    require,
+)
 from archord.scene.sections.loading import Loading, StepCounts, Steps, Targets
 
-Freedom = Literal["x", "y", "rotation"]
+IN_PLANE = ("x", "y", "rotation")  # directions, of couplings alone the rotations
+IN_SPACE = ("x", "y", "z", "rotation x", "rotation y", "rotation z")
+Freedom = Literal["x", "y", "rotation", "z", "rotation x", "rotation y", "rotation z"]
 ContactLawName: Any = Literal[tuple(CONTACT_LAWS)]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
 _RIGHT_ANGLE = 1.5708
@@ -21,10 +33,22 @@ _OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
 
+def turns_about(freedom: str | None) -> bool:
+    """Whether a direction is a rotation."""
+    return freedom is not None and freedom.startswith("rotation")
+
+
 class DiscSection(Section):
     """A rigid disc."""
 
     centre: Pair = key("centre", "length", example=[0.0, 0.0])
+    radius: Positive = key("radius", "length", example=10.0)
+
+
+class CoreSection(Section):
+    """A circle, in space a ball."""
+
+    centre: Place = key("centre", "length", example=[0.0, 0.0])
     radius: Positive = key("radius", "length", example=10.0)
 
 
@@ -188,7 +212,7 @@ class CouplingSection(Section):
 
     name: PartName = key("name of the coupling", example="reference point")
     facets: Name = key("facet set", example="bore")
-    point: Pair = key("the reference point", "length", example=[0.0, 0.0])
+    point: Place = key("the reference point, three numbers in space", "length", example=[0.0, 0.0])
     kind: Literal["rigid", "distributing"] = key(
         "rigid: the facets move as one body; distributing: only on average, forces are spread",
         default="rigid",
@@ -203,7 +227,8 @@ class SupportSection(Section):
         "coupling, or facet, point or cell set: the first with this name", example="clamp"
     )
     fixed: Freedoms = key(
-        "directions held, also at nodes that a load shares; rotation is for couplings only",
+        "directions held, also at nodes that a load shares; z in space; rotation is for couplings "
+        "only, in space rotation x, rotation y and rotation z",
         example=["x", "y"],
     )
 
@@ -218,7 +243,10 @@ class LoadSection(Loading):
         example="flat",
     )
     direction: Freedom | None = key(
-        "of displacement and force; rotation: of couplings", default=None, example="x"
+        "of displacement and force; z in space; rotation (in space rotation x, rotation y and "
+        "rotation z): of couplings",
+        default=None,
+        example="x",
     )
     displacement: Targets | None = key(
         "displacement, up to the size of the mesh (rotation: angle in rad)",
@@ -229,8 +257,8 @@ class LoadSection(Loading):
     force: Targets | None = key(
         "force on the whole or moment; a facet set with it stays straight", "force", other=1e3
     )
-    core: DiscSection | None = key(
-        "circle in which a force on cells is spread, less and less outward",
+    core: CoreSection | None = key(
+        "circle, in space a ball, in which a force on cells is spread, less and less outward",
         other={"centre": [0.0, 0.0], "radius": 1.0},
     )
     pressure: Targets | None = key(
@@ -247,7 +275,7 @@ class LoadSection(Loading):
             else "is not for a pressure, which acts along the normal"
         )
         require(directed, "direction", said)
-        turns = self.direction == "rotation" and self.displacement is not None
+        turns = turns_about(self.direction) and self.displacement is not None
         said = "must be at most 1.5708, a right angle in radians: a coupling turns linearly"
         require(not turns or max(map(abs, self.stages)) <= _RIGHT_ANGLE, "displacement", said)
         return self

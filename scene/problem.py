@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 
 from archord.scene.columns import require_different
 from archord.scene.parts import (
+    IN_PLANE,
+    IN_SPACE,
     BodySection,
     CouplingSection,
     InteractionSection,
@@ -17,6 +19,7 @@ from archord.scene.parts import (
     MeshSection,
     PathSection,
     SupportSection,
+    turns_about,
 )
 from archord.scene.presets.joint import STEPS
 from archord.scene.sections.analysis import ProblemAnalysis, ProblemOutput, Stepping
@@ -137,12 +140,55 @@ class ProblemScene(Checked):
         drawn = self.analysis.plane != "axisymmetric" or self.mesh.shape is None
         said = 'must be "strain" or "stress" for the shape of a preset, which is plane'
         require(drawn, "analysis.plane", said)
+        if self.in_space or "plane" in self.analysis.model_fields_set:
+            self._require_dimension()
         self._directions()
         require_different(self)
         require_solids({("body", name): body for name, body in self.solids.items()})
         self.require_open()
         steps_of(self.path.steps, self.n_stages, "path.steps")
         return self
+
+    @property
+    def in_space(self) -> bool:
+        """Whether bodies are in space: as the scene says, or as its directions and points are."""
+        if "plane" in self.analysis.model_fields_set:
+            return self.analysis.plane == "space"
+        points = [coupling.point for coupling in self.coupling]
+        return not self._used <= {*IN_PLANE} or any(len(point) == 3 for point in points)
+
+    @property
+    def _axes(self) -> str:
+        return '"x", "y" or "z"' if self.in_space else '"x" or "y"'
+
+    @property
+    def _used(self) -> set[str]:
+        """The directions that parts use."""
+        loaded = {load.direction for load in self.load if load.direction}
+        return loaded.union(*(support.fixed for support in self.support))
+
+    def _require_dimension(self) -> None:
+        """Raise `Fault` for a direction, a point or a disc that does not fit analysis.plane."""
+        in_space = self.in_space
+        allowed = IN_SPACE if in_space else IN_PLANE
+        where = "in space" if in_space else "in a plane"
+        used: list[tuple[str, str, str, str | None]] = []
+        used += [("support", s.name, "fixed", f) for s in self.support for f in s.fixed]
+        used += [("load", load.name, "direction", load.direction) for load in self.load]
+        for section, name, at, freedom in used:
+            said = f"must be among {', '.join(allowed)} {where}"
+            require(freedom is None or freedom in allowed, (section, name, at), said)
+        count = 3 if in_space else 2
+        said = f"must be {count} numbers {where}"
+        for coupling in self.coupling:
+            require(len(coupling.point) == count, ("coupling", coupling.name, "point"), said)
+        for load in self.load:
+            place = ("load", load.name, "core", "centre")
+            require(load.core is None or len(load.core.centre) == count, place, said)
+        for part in self.interaction:
+            said = "is not for bodies in space: mesh the stiff body, too"
+            is_drawn = not in_space or part.rigid is None
+            require(is_drawn, ("interaction", part.name, "rigid"), said)
 
     def _directions(self) -> None:
         """Raise `Fault` where one direction of one place is held or loaded twice, or turns what
@@ -154,10 +200,9 @@ class ProblemScene(Checked):
         parts += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
         for section, name, on, freedom in parts:
             at = (section, name, "fixed" if section == "support" else "direction")
-            turns = freedom != "rotation" or on in couplings
-            require(
-                turns, at, f'must be "x" or "y": {on!r} is no coupling, which alone has a rotation'
-            )
+            fits = not turns_about(freedom) or on in couplings
+            said = f"must be {self._axes}: {on!r} is no coupling, which alone has a rotation"
+            require(fits, at, said)
             before = seen.get((on, freedom))
             said = f"repeats {freedom!r} of {on!r}, which {before} holds or loads already"
             require(before is None or on not in couplings | discs, at, said)
@@ -169,9 +214,11 @@ class ProblemScene(Checked):
             )
         for load in (load for load in self.load if load.kind == "pressure"):
             place = ("load", load.name, "on")
-            held = {(load.on, "x"), (load.on, "y")} <= seen.keys()
+            axes = "xyz" if self.in_space else "xy"
+            held = {(load.on, axis) for axis in axes} <= seen.keys()
+            said = f"must not be held in {' and '.join(axes)}: a pressure moves nothing there"
             require(load.on not in couplings | discs, place, "must be a facet set for a pressure")
-            require(not held, place, "must not be held in x and y: a pressure moves nothing there")
+            require(not held, place, said)
 
     @property
     def doubts(self) -> list[str]:

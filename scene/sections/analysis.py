@@ -94,8 +94,9 @@ class Analysis(PresetAnalysis):
 class ProblemAnalysis(Modelling):
     """How a general problem is modelled and solved."""
 
-    plane: Literal["strain", "stress", "axisymmetric"] = key(  # type: ignore[assignment]
-        "plane strain, plane stress, or bodies of revolution about x = 0: x is the radius",
+    plane: Literal["strain", "stress", "axisymmetric", "space"] = key(  # type: ignore[assignment]
+        "plane strain, plane stress, bodies of revolution about x = 0 (x is the radius), or bodies "
+        "in space, the default for a mesh of tetrahedra or hexahedra",
         default="strain",
     )
     symmetry: int = key(
@@ -107,20 +108,23 @@ class ProblemAnalysis(Modelling):
 
     @model_validator(mode="after")
     def _whole_rings(self):
-        is_plane = self.plane != "axisymmetric"
+        is_ring = self.plane == "axisymmetric"
         said = "is for planes: axisymmetric forces are of the whole ring"
-        require(is_plane or self.thickness is None, "thickness", said)
+        require(not is_ring or self.thickness is None, "thickness", said)
+        said = "is for planes: bodies in space are drawn whole"
+        require(self.plane != "space" or self.thickness is None, "thickness", said)
         said = "must be 1, or 2 for a half that is cut across the axis, as bodies are whole rings"
-        require(is_plane or self.symmetry <= 2, "symmetry", said)
+        require(not is_ring or self.symmetry <= 2, "symmetry", said)
         return self
 
     @property
     def depth(self) -> float | None:
         """The thickness that forces are of, None per unit thickness.
 
-        Forces around an axis are of the whole ring, which has no other thickness.
+        Forces around an axis are of the whole ring, which has no other thickness; forces in space
+        are of whole bodies.
         """
-        return 1.0 if self.plane == "axisymmetric" else self.thickness
+        return 1.0 if self.plane in ("axisymmetric", "space") else self.thickness
 
 
 class Stepping(Section):

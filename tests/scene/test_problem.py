@@ -136,7 +136,8 @@ def test_an_interference_has_a_stage_of_its_own():
         ),
         ("body", 5, "body = 5 must be a list"),
         ("body", None, "body is missing"),
-        ("support.0.fixed", ["z"], 'support "clamp".fixed = ."z".: entry 1 must be'),
+        ("support.0.fixed", ["up"], 'support "clamp".fixed = ."up".: entry 1 must be'),
+        ("analysis", {"plane": "flat"}, "analysis.plane = .* must be 'strain', 'stress', 'axi"),
         (
             "support.0.fixed",
             ["rotation"],
@@ -177,7 +178,7 @@ def test_an_interference_has_a_stage_of_its_own():
             ],
             'interaction "b".surfaces = .* must not name .pin., which .a. has already.$',
         ),
-        ("load.1.direction", "z", 'load "side".direction = "z" must be'),
+        ("load.1.direction", "up", 'load "side".direction = "up" must be'),
         (
             "interaction.0.surfaces",
             ["pin"],
@@ -197,7 +198,7 @@ def test_an_interference_has_a_stage_of_its_own():
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
         ("interaction.0.law", "coulomb", "interaction .*friction must be positive where law"),
-        ("analysis", {"plane": "space"}, "analysis.plane = .* must be 'strain', 'stress' or 'axi"),
+        ("analysis", {"plane": "space"}, 'coupling "point".point = .* must be 3 numbers in space'),
         (
             "analysis",
             {"plane": "axisymmetric", "thickness": 2.0},
