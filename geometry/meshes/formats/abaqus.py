@@ -1,9 +1,11 @@
-"""Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file.
+"""Meshes of Abaqus and CalculiX: nodes, elements, sets and surfaces of an .inp file.
 
-Elements are plane: of plane stress, plane strain and axisymmetric problems; which of these is
-solved is for the scene to say. Trusses only name edges, as gmsh writes them. Springs, masses and
-the like name nothing. All else is skipped. meshio's reader of such files knows neither surfaces
-nor plane elements of second order, and forgets all but the last block of nodes.
+The mesh is of solid elements, or, in a file without any, of plane ones: of plane stress, plane
+strain and axisymmetric problems; which of these is solved is for the scene to say. Elements of
+fewer dimensions only name sides or nodes, as gmsh writes them: trusses edges, plane elements faces
+of solid ones. Springs, masses and the like name nothing. All else is skipped. meshio's reader of
+such files knows neither surfaces nor plane elements of second order, and forgets all but the last
+block of nodes.
 """
 
 from __future__ import annotations
@@ -14,12 +16,11 @@ from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
-import basix
 import numpy as np
-from dolfinx.cpp.io import perm_gmsh
+from dolfinx.cpp.io import perm_vtk
 
-from archord.geometry.basis import QUADRILATERAL, TRIANGLE
-from archord.geometry.meshes.cells import in_basix_order, n_sides, outer_sides
+from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE
+from archord.geometry.meshes.cells import in_basix_order, n_corners, outer_sides, side_kind
 from archord.geometry.meshes.formats.abaqus_blocks import (
     Options,
     Rows,
@@ -27,11 +28,33 @@ from archord.geometry.meshes.formats.abaqus_blocks import (
     number_of,
     scoped_blocks,
 )
-from archord.geometry.meshes.mesh_arrays import MeshArrays, one_kind
+from archord.geometry.meshes.mesh_arrays import MeshArrays, one_kind, require_known
 
-# plane stress, plane strain, axisymmetric, trusses; the fourth character is the number of nodes
-_KINDS = re.compile(r"(CP[ES][3468]|CAX[3468]|T[23]D[23])[A-Z]*")
-_SHAPES = {"3": TRIANGLE, "6": TRIANGLE, "4": QUADRILATERAL, "8": QUADRILATERAL}
+# trusses; plane stress, plane strain, axisymmetric; solids: each with the number of nodes
+_KINDS = {
+    1: re.compile(r"T[23]D([23])[A-Z]*"),
+    2: re.compile(r"(?:CP[ES]|CAX)([3468])[A-Z]*"),
+    3: re.compile(r"C3D(4|8|10|20)[A-Z]*"),
+}
+_PRISMS = re.compile(r"C3D(6|15)[A-Z]*")
+_SHAPES = {
+    2: {3: TRIANGLE, 6: TRIANGLE, 4: QUADRILATERAL, 8: QUADRILATERAL},
+    3: {4: TETRAHEDRON, 10: TETRAHEDRON, 8: HEXAHEDRON, 20: HEXAHEDRON},
+}
+# corners of the sides S1, S2, ... of an element
+_SIDES = {
+    TRIANGLE: [[0, 1], [1, 2], [2, 0]],
+    QUADRILATERAL: [[0, 1], [1, 2], [2, 3], [3, 0]],
+    TETRAHEDRON: [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]],
+    HEXAHEDRON: [
+        [0, 1, 2, 3],
+        [4, 7, 6, 5],
+        [0, 4, 5, 1],
+        [1, 5, 6, 2],
+        [2, 6, 7, 3],
+        [3, 7, 4, 0],
+    ],
+}
 _WITHOUT_AREA = re.compile(r"(SPRING|DASHPOT|MASS|ROTARYI|CONN|GAP|DCOUP|R2D2|RB2D2).*")
 _OTHERS = {
     "C3D": "solid elements",
@@ -50,9 +73,8 @@ class _Model:
     """What a file has, by keys (`Scope.key`).
 
     - ``nodes``: places
-    - ``cells``, ``lines``: the nodes of plane elements, and of trusses
-    - ``shapes``: triangles or quadrilaterals, as the plane elements are
-    - ``without_area``: elements that are neither
+    - ``elements``: the nodes of elements by their dimension: trusses, plane and solid ones
+    - ``without_area``: elements that are none of these
     - ``sets``: the keys of sets by kind and by name, as it is first written
     - ``surfaces``: elements and the name of a face, by the surface's name
     - ``internal``: names of sets for the file's own use
@@ -60,9 +82,7 @@ class _Model:
 
     def __init__(self, path: Path) -> None:
         self.nodes: dict[int, list[float]] = {}
-        self.cells: dict[int, list[int]] = {}
-        self.lines: dict[int, list[int]] = {}
-        self.shapes: set[basix.CellType] = set()
+        self.elements: dict[int, dict[int, list[int]]] = {1: {}, 2: {}, 3: {}}
         self.without_area: set[int] = set()
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[tuple[list[int], str]]] = defaultdict(list)
@@ -99,34 +119,36 @@ class _Model:
         if _WITHOUT_AREA.fullmatch(name):
             self.without_area.update(scope.key(row[0]) for row in rows)
             return
-        if not _KINDS.fullmatch(name):
+        if _PRISMS.fullmatch(name):
+            require_known(["prism"])
+        matches = {dim: kind.fullmatch(name) for dim, kind in _KINDS.items()}
+        found = [(dim, int(match[1])) for dim, match in matches.items() if match]
+        if not found:
             starts = (said for start, said in _OTHERS.items() if name.startswith(start))
             what = next(starts, "elements")
             raise ValueError(
-                f"{what} of type {name} are not read, only plane ones: CPS, CPE and CAX of 3, 4, "
-                "6 or 8 nodes"
+                f"{what} of type {name} are not read, only CPS, CPE and CAX of 3, 4, 6 or 8 nodes "
+                "and C3D of 4, 8, 10 or 20 nodes"
             )
-        n_nodes = name[3]
-        size = 1 + int(n_nodes)
+        [(dim, n_nodes)] = found
+        size = 1 + n_nodes
         values = [scope.key(value) for row in rows for value in row if value]
         if len(values) % size:
             raise ValueError(
                 f"elements of type {name} have {len(values)} numbers, no multiple of {size}"
             )
-        found = self.lines
-        if not name.startswith("T"):
-            found = self.cells
-            self.shapes.add(_SHAPES[n_nodes])
         for start in range(0, len(values), size):
             key, *nodes = values[start : start + size]
-            if key in self.cells or key in self.lines:
+            if any(key in of_dim for of_dim in self.elements.values()):
                 raise ValueError(f"the element {number_of(key)} is there twice")
-            found[key] = nodes
+            if dim == 1:  # whose middle node stands between its ends
+                nodes = [nodes[0], nodes[-1], *nodes[1:-1]]
+            self.elements[dim][key] = nodes
         self._add(scope, "ELSET", options.get("ELSET"), values[::size])
 
     def _set(self, scope: Scope, kind: str, options: Options, rows: Rows) -> None:
         if "GENERATE" in options:
-            there = self.nodes.keys() if kind == "NSET" else self.cells.keys() | self.lines
+            there = chain(self.nodes) if kind == "NSET" else chain(*self.elements.values())
             chosen = []
             for first, last, *step in rows:
                 a = scope.key(first)
@@ -178,51 +200,61 @@ class _Model:
 def read_abaqus(path: Path) -> MeshArrays:
     """The mesh of an .inp file. Raises ValueError.
 
-    Its element sets are cell sets. Facet sets are its surfaces, its sets of trusses and what its
-    node sets have of the boundary. Other nodes of the node sets are point sets.
+    Its element sets are cell sets. Facet sets are its surfaces, its sets of elements of one
+    dimension less and what its node sets have of the boundary. Other nodes of the node sets, and
+    the nodes of sets of trusses in space, are point sets.
     """
     model = _Model(path)
-    size = one_kind(set(map(len, model.cells.values())))
-    [kind] = model.shapes
+    d = 3 if model.elements[3] else 2
+    elements = model.elements[d]
+    size = one_kind(set(map(len, elements.values())), d)
+    kind = _SHAPES[d][size]
     node = {key: place for place, key in enumerate(model.nodes)}
-    cell = {key: place for place, key in enumerate(model.cells)}
-    nodes = _places(node, chain(*model.cells.values()), "node").reshape(-1, size)
-    x, cells = in_basix_order(kind, np.array(list(model.nodes.values())), nodes, perm_gmsh)
+    cell = {key: place for place, key in enumerate(elements)}
+    nodes = _places(node, chain(*elements.values()), "node").reshape(-1, size)
+    x, cells = in_basix_order(kind, np.array(list(model.nodes.values())), nodes, perm_vtk)
     cell_sets = {}
     facet_sets = defaultdict[str, list[np.ndarray]](list)
+    point_sets = {}
+    corners = n_corners(side_kind(kind))
+    sides = model.elements[d - 1]
     for name, keys in model.sets["ELSET"].items():
-        trusses = [model.lines[key] for key in keys if key in model.lines]
-        members = sorted(set(keys) - model.lines.keys() - model.without_area)
+        of_sides = [sides[key][:corners] for key in keys if key in sides]
+        of_lines = [model.elements[1][key] for key in keys if d == 3 and key in model.elements[1]]
+        others = chain(model.without_area, *(model.elements[dim] for dim in range(1, d)))
+        members = sorted(set(keys).difference(others))
         of_springs = keys and model.without_area.issuperset(keys)
         named = name not in model.internal and not of_springs
-        if named and (members or not trusses):
+        if named and (members or not (of_sides or of_lines)):
             cell_sets[name] = _places(cell, members, f"element of the set {name!r}")
-        if trusses:
-            ends = [(truss[0], truss[-1]) for truss in trusses]
-            facet_sets[name].append(_places(node, chain(*ends), "node").reshape(-1, 2))
-    count = n_sides(kind)
-    faces = {f"S{k + 1}": [k, (k + 1) % count] for k in range(count)}
+        if of_sides:
+            places = _places(node, chain(*of_sides), "node")
+            facet_sets[name].append(places.reshape(-1, corners))
+        if of_lines:
+            point_sets[name] = np.unique(_places(node, chain(*of_lines), "node"))
+    faces = {f"S{k}": side for k, side in enumerate(_SIDES[kind], 1)}
     for name, parts in model.surfaces.items():
-        for elements, face in parts:
+        for of_surface, face in parts:
             if face not in faces:
                 raise ValueError(
-                    f"the surface {name!r} has the face {face!r}, which is none of S1 to S{count}"
+                    f"the surface {name!r} has the face {face!r}, which is none of S1 to "
+                    f"S{len(faces)}"
                 )
-            places = _places(cell, elements, f"element of the surface {name!r}")
+            places = _places(cell, of_surface, f"element of the surface {name!r}")
             facet_sets[name].append(nodes[places][:, faces[face]])
     boundary, _ = outer_sides(kind, cells)
-    point_sets = {}
+    made = boundary >= len(node)  # in the middle of faces, where the file has no node
     for name, keys in model.sets["NSET"].items():
         if name in facet_sets or name in model.internal:
             continue
         of_set = _places(node, sorted(set(keys)), f"node of the set {name!r}")
-        edges = boundary[np.isin(boundary, of_set).all(axis=1)]
-        if len(edges):
-            facet_sets[name].append(edges[:, :2])
-        rest = np.setdiff1d(of_set, edges)
+        within = boundary[(np.isin(boundary, of_set) | made).all(axis=1)]
+        if len(within):
+            facet_sets[name].append(within[:, :corners])
+        rest = np.setdiff1d(of_set, within)
         if len(rest):
             point_sets[name] = rest
-    facets = {name: np.concatenate(ends) for name, ends in facet_sets.items()}
+    facets = {name: np.concatenate(of_parts) for name, of_parts in facet_sets.items()}
     return MeshArrays.of_sets(kind, x, cells, cell_sets, facets, point_sets)
 
 

@@ -253,7 +253,8 @@ def test_what_an_input_deck_may_look_like(comm, deck, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("cpe8r", "C3D20R", "solid elements of type C3D20R are not read, only plane ones"),
+        ("cpe8r", "C3D27", "solid elements of type C3D27 are not read, only CPS, CPE and CAX"),
+        ("cpe8r", "C3D15", "the mesh has prisms, which are not read: cut them into tetrahedra"),
         ("cpe8r", "CGAX8", "axisymmetric elements with twist of type CGAX8 are not read"),
         ("cpe8r", "CPE4", "type CPE4 have 9 numbers, no multiple of 5"),
         (" Both, S3", " Bath, S3", "there is no .ELSET 'Bath'"),

@@ -112,6 +112,22 @@ def test_every_format_gives_the_same_tube(module, tmp_path, kind, order, nodes):
 
 
 @KINDS
+def test_abaqus_input_has_the_sets_of_gmsh(module, tmp_path, kind, order, nodes):  # noqa: F811
+    """Plane elements name faces, trusses name nodes."""
+    if nodes == 27 or order == 3:
+        pytest.skip("gmsh writes none of these")
+    draw(kind, order, nodes)
+    expected = content(read_mesh(gmsh, MPI.COMM_WORLD))[2]
+    gmsh.write(str(tmp_path / "tube.inp"))
+    mesh = read_mesh(tmp_path / "tube.inp", MPI.COMM_WORLD)
+    found = content(mesh)[2]
+    assert {key: found[key] for key in expected} == like(expected)
+    radii = np.linalg.norm(mesh.point_sets["rim_edge"][:, :2], axis=1)
+    np.testing.assert_allclose(radii, OUTER, rtol=1e-9)
+    assert dimension_of_source(tmp_path / "tube.inp") == 3
+
+
+@KINDS
 def test_nodes_are_in_basix_order(module, kind, order, nodes):  # noqa: F811
     """Nodes of straight cells lie where the corners put them; nodes of the curved faces on the
     cylinders, in the middle of faces, too."""
