@@ -47,6 +47,7 @@ ROOMS = [
     "benchmarks.peers",
     "benchmarks.axisymmetric",
     "benchmarks.outside",
+    "benchmarks.space",
     "benchmarks.cost",
     "commands",
     "archord",

@@ -135,7 +135,7 @@ def _made(
         if order > 2:
             gmsh.model.mesh.setOrder(order)
         mesh = MeshArrays.from_gmsh(gmsh)
-    if order == 2:  # in much less time than gmsh's setOrder
+    if order == 2 and mesh.order == 1:  # in much less time than gmsh's setOrder
         mesh = mesh.second_order()
     mesh = on_circles(mesh, circles)
     return mesh.centred() if quads else mesh

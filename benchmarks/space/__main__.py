@@ -1,0 +1,55 @@
+"""Joints in space against other codes, as a table: ``python3 -m archord.benchmarks.space``.
+
+Names of cases choose among them, numbers are sizes of elements at the contact: ``python3 -m
+archord.benchmarks.space elastic A 1.5 0.9``. Seconds are of the mesh and the solve.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+
+from mpi4py import MPI
+
+from archord.benchmarks.space.case import Solved, solved
+from archord.benchmarks.space.joints import CASES
+from archord.report.table import Table
+
+_HEADINGS = ("case", "quantity", "at", "reference", "+-", "archord", "error [%]")
+_COST = ("dofs", "Newton", "GMRES", "s")
+
+
+def rows(result: Solved) -> Iterator[tuple[str, ...]]:
+    """The rows of a table for a ``result``."""
+    newton = f"{result.newton / result.case.steps:.1f}"
+    krylov = f"{result.krylov / max(result.newton, 1):.1f}"
+    cost = (str(result.n_dofs), newton, krylov, f"{result.seconds:.1f}")
+    for reference, value in result.compared:
+        yield (
+            result.case.name,
+            reference.quantity,
+            f"{reference.displacement:g}",
+            f"{reference.value:.6g}",
+            f"{reference.uncertainty:g}",
+            f"{value:.6g}",
+            f"{100 * (value / reference.value - 1):+.3f}",
+            *cost,
+        )
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the table of the cases and sizes that the ``arguments`` name, of all cases on their own
+    sizes without."""
+    chosen = [CASES[name] for name in arguments if name in CASES] or list(CASES.values())
+    sizes = [float(size) for size in arguments if size not in CASES] or [0.0]
+    table = Table(*_HEADINGS, *_COST, left=2)
+    for case in chosen:
+        for size in sizes:
+            for row in rows(solved(case, size)):
+                table.add(*row)
+    if MPI.COMM_WORLD.rank == 0:
+        print(table)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
