@@ -30,14 +30,14 @@ from archord.report.errors import InputError
     "exports",
     type=Path,
     multiple=True,
-    help="write the fitted law: .py .h .mo .m .json",
+    help="write the fitted law: .py .h .mo .m .mjs .json",
 )
 @click.option(
     "--table",
     "tables",
     type=Path,
     multiple=True,
-    help="write P(delta) of one run, and back: .json .py .h .mo .m",
+    help="write P(delta) of one run, and back: .json .py .h .mo .m .mjs",
 )
 @click.option(
     "--of", help="--table: the load of a general scene that P and delta are of, if it has several"

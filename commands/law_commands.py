@@ -86,8 +86,8 @@ def laws() -> int:
     multiple=True,
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave) or "
-    ".json",
+    help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), "
+    ".mjs (JavaScript) or .json",
 )
 @flag("--force", "overwrite exports")
 @sentences()

@@ -1,9 +1,9 @@
 """The law of one joint as a program of numbers: what ``JointCurve.at`` says, in the few words that
 all languages have.
 
-``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``,
-``while``, ``for`` and ``break``, have one ``return``, of names, at their end, and change no
-parameter. What ``WITH_...`` switches off and what is never called is left out of an export. Tables
+``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``, and
+``for`` with a count that is known before, have one ``return``, of names, at their end, and change
+no parameter. What ``WITH_...`` switches off and what is never called is left out of an export. Tables
 are in the joint's units; an export has its own instead of those below.
 """
 
@@ -23,6 +23,7 @@ WITH_CHORD = False  # a formula for first loading instead of tables
 WITH_PLATEAU = False  # which has a largest pressure
 
 LAST = 1  # index of the last node
+HALVINGS = 1  # of the table, to find an interval
 RANGE = 1.0  # displacement up to which the tables reach
 REACH = 1.0  # the same, with what round-off may add
 LENGTH = 1.0  # clearance dR
@@ -52,19 +53,24 @@ def warn_outside(delta: float) -> None:
     """Say where the law is used beyond its tables: a function of each language's own."""
 
 
+def infinity_less_infinity(value: float, last: float) -> float:
+    """nan, of numbers that are not 0."""
+    big = value
+    bound = last
+    for _ in range(8):
+        big = big * 1e100
+        bound = bound * 1e100
+    nothing = big - bound
+    return nothing
+
+
 def beyond(value: float, last: float) -> float:
-    """0 up to last; nan, by infinity less infinity, beyond and of nan: added to what is unknown
-    there."""
+    """0 up to last; nan beyond and of nan: added to what is unknown there."""
     doubt = 0.0
     if value <= last:
         doubt = 0.0
     else:
-        big = value
-        bound = last
-        for _ in range(8):
-            big = big * 1e100
-            bound = bound * 1e100
-        doubt = big - bound
+        doubt = infinity_less_infinity(value, last)
     return doubt
 
 
@@ -84,10 +90,11 @@ def unknown(delta: float, deepest: float) -> float:
 
 
 def interval(table: Table, value: float) -> int:
-    """The last i below the last node with table[i] <= value, or 0: bisection."""
+    """The last i below the last node with table[i] <= value, or 0: bisection, in as many steps as
+    the table may need."""
     low: int = 0
     high: int = LAST
-    while high - low > 1:
+    for _ in range(HALVINGS):
         middle: int = (low + high) // 2
         if table[middle] <= value:
             low = middle
@@ -197,19 +204,16 @@ def table_displacement(P: float) -> float:
     low = 0.0
     high = 1.0
     t = (P - BACK[i]) / rise
-    for _ in range(60):
+    for _ in range(12):
         miss = BACK[i] + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise))) - P
         slope = d0 + t * (2 * (3 * rise - 2 * d0 - d1) + t * 3 * (d0 + d1 - 2 * rise))
         if miss < 0:
             low = t
         else:
             high = t
-        last = t
-        t = last - miss / max(slope, 1e-100)
+        t = t - miss / max(slope, 1e-100)
         if (t - low) * (high - t) < 0:
             t = (low + high) / 2
-        if abs(t - last) < 1e-12:
-            break
     delta = NODES[i] + width * t
     return delta
 

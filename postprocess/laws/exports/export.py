@@ -28,6 +28,7 @@ import numpy as np
 from archord.postprocess.laws.exports.translate import (
     FUNCTIONS,
     in_c,
+    in_javascript,
     in_modelica,
     in_octave,
     in_python,
@@ -161,6 +162,16 @@ _FORMS = {
         _quoted,
         in_modelica,
     ),
+    ".mjs": _Form(
+        "javascript",
+        "export const {key} = {value};",
+        "export const {key} = {value};",
+        "export const {key} = [\n    {value},\n];",
+        ",\n    ",
+        "export const {key} = {value};",
+        json.dumps,
+        in_javascript,
+    ),
     ".m": _Form(
         "octave",
         "    T.{key} = {value};",
@@ -184,6 +195,7 @@ _SPOKEN = {
     "c": "C or C++",
     "modelica": "Modelica",
     "octave": "Matlab and Octave",
+    "javascript": "JavaScript",
 }
 _UNKNOWN_END = 1e300  # of the range of a law that does not tell it
 _LONGEST = 63  # characters of a name in Matlab, and those that C99 tells apart
@@ -198,7 +210,7 @@ def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
         The law.
     target : Path
         The file, which is not written. Its suffix names the language: .py, .h (C99), .mo
-        (Modelica), .m (Matlab, Octave) or .json. Its stem becomes the name of the law, but in JSON.
+        (Modelica), .m (Matlab, Octave), .mjs (a module of JavaScript) or .json. Its stem becomes the name of the law, but in JSON.
 
     Returns
     -------
@@ -296,8 +308,10 @@ def _of_tables(curve: JointCurve) -> Program:
         "ERROR": curve.error,
         "BACK_ERROR": curve.back_error,
     }
+    last = len(curve.x) - 1
     numbers = {
-        "LAST": len(curve.x) - 1,
+        "LAST": last,
+        "HALVINGS": last.bit_length(),
         "RANGE": float(length * curve.x[-1]),
         "REACH": float(length * curve.reach),
         "LENGTH": length,

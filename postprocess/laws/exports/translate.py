@@ -63,9 +63,8 @@ class Language:
     several: str
     if_: str
     else_: str
-    while_: str
     for_: str
-    ends: tuple[str, str, str]
+    ends: tuple[str, str]
     warning: str
     types: dict[str, str]
     table: str = "{}"
@@ -93,20 +92,12 @@ class Language:
                 other = [self.else_, *self.statements(node.orelse, "    ")] if node.orelse else []
                 test = self.if_.format(self.expression(node.test))
                 return [test, *self.statements(node.body, "    "), *other, self.ends[0]]
-            case ast.While():
+            case ast.For(iter=ast.Call(args=[count])):
                 return [
-                    self.while_.format(self.expression(node.test)),
+                    self.for_.format(self.expression(count)),
                     *self.statements(node.body, "    "),
                     self.ends[1],
                 ]
-            case ast.For(iter=ast.Call(args=[count])):
-                return [
-                    self.for_.format(ast.unparse(count)),
-                    *self.statements(node.body, "    "),
-                    self.ends[2],
-                ]
-            case ast.Break():
-                return ["break;"]
             case ast.Expr(value=ast.Call(args=[delta])):
                 return [self.warning.format(self.expression(delta))] if self.warning else []
         raise TypeError(f"algorithm.py: other languages have no words for {ast.unparse(node)}")
@@ -127,7 +118,9 @@ class _Words(ast.NodeTransformer):
         return ast.Name(word)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        return ast.Constant(math.pi) if node.attr == "pi" else ast.Name(node.attr)
+        if node.attr == "pi":
+            return ast.Constant(math.pi)
+        return ast.Name(self.language.words.get(node.attr, node.attr))
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
@@ -224,6 +217,18 @@ def in_octave(node: ast.FunctionDef, name: str) -> str:
     return head + "".join(f"    {line}\n" for line in lines) + "end"
 
 
+def in_javascript(node: ast.FunctionDef, name: str) -> str:
+    """The function in JavaScript; several results as an array."""
+    f = Signature.of(node)
+    given = {"deepest": " = 0"} if f.name in ("force", "expected_error") else {}
+    inputs = ", ".join(f"{key}{given.get(key, '')}" for key in f.inputs)
+    body = [f"let {', '.join(f.locals)};", *JAVASCRIPT.statements(f.body, "")]
+    results = ", ".join(f.outputs)
+    body.append(f"return [{results}];" if len(f.outputs) > 1 else f"return {results};")
+    lines = [f"export function {f.name}({inputs}) {{", *(f"    {line}" for line in body), "}"]
+    return "\n".join([f"/** {f.doc} */", *lines])
+
+
 def _c(prefix: str) -> Language:
     return Language(
         words={"min": "fmin", "max": "fmax", "abs": "fabs"},
@@ -234,9 +239,8 @@ def _c(prefix: str) -> Language:
         several="{0} = {2}, &{1});",
         if_="if ({}) {{",
         else_="} else {",
-        while_="while ({}) {{",
         for_="for (int k = 0; k < {}; k++) {{",
-        ends=("}", "}", "}"),
+        ends=("}", "}"),
         warning="",
         types={"Table": "const double *", "float": "double ", "int": "int "},
         table=f"{prefix}{{}}",
@@ -253,9 +257,8 @@ MODELICA = Language(
     several="({0}, {1}) := {2});",
     if_="if {} then",
     else_="else",
-    while_="while {} loop",
     for_="for k in 1:{} loop",
-    ends=("end if;", "end while;", "end for;"),
+    ends=("end if;", "end for;"),
     warning='assert({} <= REACH, "delta is beyond the tables of this law", '
     "AssertionLevel.warning);",
     types={"Table": "Real {}[:]", "float": "Real {}", "int": "Integer {}"},
@@ -270,10 +273,30 @@ OCTAVE = Language(
     several="[{0}, {1}] = {2});",
     if_="if {}",
     else_="else",
-    while_="while {}",
     for_="for k = 1:{}",
-    ends=("end", "end", "end"),
+    ends=("end", "end"),
     warning="warn_outside({}, T.REACH);",
     types={},
     table="T.{}",
+)
+
+JAVASCRIPT = Language(
+    words={
+        "min": "Math.min",
+        "max": "Math.max",
+        "abs": "Math.abs",
+        "sqrt": "Math.sqrt",
+        "log": "Math.log",
+    },
+    base=0,
+    entry="{}[{}]",
+    half="Math.floor(({}) / 2)",
+    assign="{} = {};",
+    several="[{0}, {1}] = {2});",
+    if_="if ({}) {{",
+    else_="} else {",
+    for_="for (let k = 0; k < {}; k++) {{",
+    ends=("}", "}"),
+    warning="warn_outside({});",
+    types={},
 )

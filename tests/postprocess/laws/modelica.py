@@ -33,7 +33,7 @@ def functions_of(package: str) -> dict[str, Any]:
 
 
 def _in_python(statement: str) -> str:
-    loop = re.sub(r"for k in 1:(\d+) loop", r"for k in range(\1):", statement)
+    loop = re.sub(r"for k in 1:(\w+) loop", r"for k in range(\1):", statement)
     return re.sub(" (then|loop)$", ":", loop).replace(":=", "=").removesuffix(";") + (
         ":" if statement == "else" else ""
     )
