@@ -1,13 +1,13 @@
 """The law of one joint as a program of numbers: what ``JointCurve.at`` says, in the few words that
 all languages have.
 
-``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``, and
-``for`` with a count that is known before, have one ``return``, of names, at their end, and change
-no parameter. What ``WITH_...`` switches off and what is never called is left out of an export. Tables
-are in the joint's units; an export has its own instead of those below.
+``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``,
+and ``for`` with a count that is known before, have one ``return``, of names, at their end, and
+change no parameter. What ``WITH_...`` switches off and what is never called is left out of an
+export. Tables are in the joint's units; an export has its own instead of those below.
 """
 
-# ruff: noqa: SIM102, SIM300, RUF059 (no "and", and a name for every result: words that all
+# ruff: noqa: SIM102, SIM108, SIM300, RUF059 (no "and", and a name for every result: words that all
 # languages have)
 
 from __future__ import annotations

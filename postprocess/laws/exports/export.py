@@ -210,7 +210,8 @@ def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
         The law.
     target : Path
         The file, which is not written. Its suffix names the language: .py, .h (C99), .mo
-        (Modelica), .m (Matlab, Octave), .mjs (a module of JavaScript) or .json. Its stem becomes the name of the law, but in JSON.
+        (Modelica), .m (Matlab, Octave), .mjs (a module of JavaScript) or .json. Its stem becomes
+        the name of the law, but in JSON.
 
     Returns
     -------
