@@ -48,6 +48,8 @@ def parse_any(
 ) -> AnyScene:
     """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
     preset: Any = next((scene for name, scene in PRESETS.items() if name in data), None)
+    if preset is None and {"joint", "space"} <= data.keys():
+        preset = Scene
     if preset is not None:
         data = preset(source, origin, **data).general()
         origin = None

@@ -35,6 +35,7 @@ _PRESETS: dict[str, dict[str, Any]] = {
 _SHAPED = {
     "pin": '`"half"`, `"whole"` or `"none"`, for a rigid disc',
     "rings": "list of [bore, outer] from the pin outward",
+    "space": "a table with the keys of [space]",
     "core_radius": "ring: radius over R of the core that the force acts on",
 }
 _MEETING = (
@@ -82,7 +83,9 @@ def example(general: bool = False) -> str:
         "scene format\n"
     )
     for section, info in sections.items():
-        text += f"\n{_heading(section, info)}  # {info.description}\n"
+        is_absent = not info.is_required() and info.get_default(call_default_factory=True) is None
+        hidden = "# " if is_absent else ""
+        text += f"\n{hidden}{_heading(section, info)}  # {info.description}\n"
         for name, key, schema in _keys(info):
             default = (
                 ""
@@ -90,7 +93,8 @@ def example(general: bool = False) -> str:
                 else f", default {toml_value(schema['default'])}"
             )
             unit = f" [{schema['unit']}]" if schema["unit"] else ""
-            shown = f"{'# ' if schema['hidden'] else ''}{name} = {toml_value(schema['shown'])}"
+            comment = "# " if schema["hidden"] or is_absent else ""
+            shown = f"{comment}{name} = {toml_value(schema['shown'])}"
             text += f"{shown}  # {key.description}{unit}{default}\n"
     return text
 
@@ -118,9 +122,9 @@ def reference() -> str:
         *_MEETING,
         "## Presets\n",
         f"A scene with {presets} stands for a general scene. `archord scene --expand` prints it. "
-        "If a scene has several of these sections, the first one counts. The section pin is the "
-        "same as for joints. Plates, bushing, sleeves and housing have the same material keys. The "
-        "other sections are the same as for general scenes.\n",
+        "If a scene has several of these sections, the first one counts. The sections pin and "
+        "space are the same as for joints. Plates, bushing, sleeves and housing have the same "
+        "material keys. The other sections are the same as for general scenes.\n",
         *(
             table
             for sections in _PRESETS.values()

@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.sketch import Sketch
+from archord.geometry.shapes.sketch import Place, Sketch
 from archord.geometry.shapes.solids import Depths, mesh_solids, slabs_of
 
 _CUT_ABOVE = (
@@ -40,10 +41,14 @@ def mesh_joint(
     ways). In ``space``, whose keys are the fields of `Depths`, all faces are extruded along z.
     Collective; rank 0 meshes.
     """
+    pins = {
+        name: circle.centre for name, circle in sketch.circles.items() if name.split()[-1] == "pin"
+    }
     if space is not None:
         depths = Depths(**space).over(radius)
         slabs = slabs_of(sketch, depths)
-        return mesh_solids(comm, sketch, slabs, depths, radius=radius, partitioner=partitioner)
+        joint = mesh_solids(comm, sketch, slabs, depths, radius=radius, partitioner=partitioner)
+        return replace(joint, point_sets=_centres(pins, radius, 3))
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -80,13 +85,17 @@ def mesh_joint(
         comm, build, list(sketch.circles.values()), **how, key=tuple(vars(sketch).items())
     )
     joint.mesh.geometry.x[:] *= radius
-    pins = {
-        name: circle.centre for name, circle in sketch.circles.items() if name.split()[-1] == "pin"
-    }
-    centres = {
-        name.removesuffix("pin") + "centre": radius * np.array([at]) for name, at in pins.items()
-    }
-    return replace(joint, point_sets=centres) if centres else joint
+    return replace(joint, point_sets=_centres(pins, radius, 2)) if pins else joint
+
+
+def _centres(pins: Mapping[str, Place], radius: float, dimension: int) -> dict[str, Array]:
+    """The point set of the centre of each pin, whose place is in radii, at z = 0 in space."""
+    sets: dict[str, Array] = {}
+    for name, place in pins.items():
+        centre = np.zeros((1, dimension))
+        centre[0, :2] = place
+        sets[name.removesuffix("pin") + "centre"] = radius * centre
+    return sets
 
 
 def refinements(cells: float) -> int:

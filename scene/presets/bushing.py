@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, PinPart, Preset, Shape
+from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import Solid
 from archord.scene.sections.keys import Pair, Positive, key, require
 
@@ -42,6 +43,7 @@ class BushingShape(Bushing):
 
     rings: list[Pair] = Field(default=[], description="inner and outer radii from the pin outward")
     pin: PinPart = "half"
+    space: Space | None = Field(None, description="lengths along z of a bushing in space")
     kind: Literal["bushing"] = "bushing"
     drawing: ClassVar[str] = "archord.geometry.shapes.bushing:bushing"
 
@@ -88,7 +90,7 @@ class BushingScene(Preset):
             "bore",
         ]
         touching = self.bushing.touching or self.load.force is not None
-        shape = self.bushing.arguments() | {
+        shape = self.arguments() | {
             "kind": "bushing",
             "rings": self._rings,
             "touching": touching,

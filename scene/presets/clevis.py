@@ -96,7 +96,7 @@ class ClevisScene(Preset):
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
         parts: dict[str, list[dict[str, Any]]] = {"interaction": [], "support": [], "load": []}
-        shape = self.clevis.arguments() | {"kind": "clevis"}
+        shape = self.arguments() | {"kind": "clevis"}
         overlap = max(-self.clevis.clearance, 0.0)
         bodies: dict[str, Solid] = {}
         for (name, plate), share in zip(self._plates.items(), (1.0, 0.5), strict=True):

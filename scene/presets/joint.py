@@ -11,7 +11,8 @@ from pydantic import Field, model_validator
 from archord.materials.elasticity import contact_modulus
 from archord.report.errors import InputError
 from archord.scene.presets.joint_geometry import JointGeometry
-from archord.scene.presets.preset import general_scene
+from archord.scene.presets.preset import general_scene, require_solid
+from archord.scene.presets.space import COARSE, Space
 from archord.scene.sections.analysis import Analysis, Output, Stepping
 from archord.scene.sections.bodies import Pin, Solid, require_solids
 from archord.scene.sections.checked import Checked
@@ -91,6 +92,7 @@ class Scene(Checked):
     joint: JointGeometry = Field(description="geometry and mesh")
     pin: Pin = Field(description="material of the pin")
     block: Solid = Field(description="material of the block")
+    space: Space | None = Field(None, description="the joint in space instead of a plane")
     analysis: Analysis = Field(default_factory=Analysis, description="model and solver")
     load: JointLoad = Field(description="loading")
     stepping: Stepping = Field(
@@ -104,6 +106,8 @@ class Scene(Checked):
         pin = self.pin
         load = f"load.{self.load.kind}"
         self.require_open()
+        if self.space is not None:
+            require_solid(self, not joint.is_ring, joint.radius)
         require_solids({(name,): body for name, body in self.solids.items()})
         said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
         require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)
@@ -157,6 +161,8 @@ class Scene(Checked):
         if g.is_ring:
             press["core"] = {"centre": [0.0, 0.0], "radius": load.core_radius * g.radius}
         shape = g.model_dump(exclude_none=True) | {"kind": "joint", "core_radius": load.core_radius}
+        if self.space is not None and not {"element_size", "relative_element_size"} & shape.keys():
+            shape["relative_element_size"] = COARSE
         axis = {"name": "axis", "on": "symmetry", "fixed": ["x"]}
         block = {"name": "block", "on": "block held", "fixed": ["x", "y"]}
         parts = {
@@ -281,6 +287,11 @@ class Scene(Checked):
     def small(self) -> float:
         """The displacement over R up to which P of the chosen theory of strain is good to 1 %."""
         return math.inf if self.analysis.strain == "large" else 0.01 / self.too_low
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of the block, 1 if forces are per unit thickness."""
+        return super().thickness if self.space is None else self.space.thickness
 
     @property
     def load_unit(self) -> float:

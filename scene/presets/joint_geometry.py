@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from archord.scene.presets.preset import PinPart
+from archord.scene.presets.space import Space
 from archord.scene.sections.keys import Positive, Section, given, key, require
 
 _WIDEST = 1e6  # block_size over R
@@ -195,10 +196,17 @@ class JointShape(JointGeometry):
 
     pin: PinPart = "half"
     core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1)
+    space: Space | None = Field(None, description="lengths along z of a joint in space")
     kind: Literal["joint"] = "joint"
     drawing: ClassVar[str] = "archord.geometry.shapes.pin_in_block:pin_joint"
 
     def arguments(self) -> dict[str, Any]:
         """What draws it."""
-        drawn = {"kind": self.kind, "pin": self.pin, "core_radius": self.core_radius}
+        drawn: dict[str, Any] = {
+            "kind": self.kind,
+            "pin": self.pin,
+            "core_radius": self.core_radius,
+        }
+        if self.space is not None:
+            drawn["space"] = self.space.arguments()
         return super().arguments() | drawn

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, BoredShape, PinPart, Preset
+from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import NotNegative, Solid
 from archord.scene.sections.keys import Positive, Section, key, require
 
@@ -102,6 +103,7 @@ class LugShape(Lug):
     """A lug with what a preset says elsewhere."""
 
     pin: PinPart = "half"
+    space: Space | None = Field(None, description="lengths along z of a lug in space")
     kind: Literal["lug"] = "lug"
     drawing: ClassVar[str] = "archord.geometry.shapes.lug:lug"
     wall: Positive | None = key(
@@ -137,7 +139,7 @@ class LugScene(Preset):
 
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
-        shape = self.lug.arguments() | {"kind": "lug"}
+        shape = self.arguments() | {"kind": "lug"}
         sleeve = self.bushing
         if sleeve is None:
             return self.pulled(

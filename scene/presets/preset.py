@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.scene.presets.space import COARSE, Space, solid
 from archord.scene.sections.analysis import PresetAnalysis, ProblemOutput, Stepping
 from archord.scene.sections.bodies import Pin, Solid
 from archord.scene.sections.checked import Checked
@@ -52,7 +53,9 @@ class Shape(Section):
 
     def arguments(self) -> dict[str, Any]:
         """What draws it: lengths, and what is drawn."""
-        return self.model_dump() | {"element_size": self.h}
+        found = self.model_dump(exclude={"space"}) | {"element_size": self.h}
+        space: Space | None = getattr(self, "space", None)
+        return found if space is None else found | {"space": space.arguments()}
 
 
 class BoredShape(Shape):
@@ -101,11 +104,30 @@ class Preset(Checked):
     units: Units = Field(default_factory=Units, description="names of the units")
     pin: Pin = Field(description="material of the pin")
     load: PinLoad = Field(description="loading")
+    space: Space | None = Field(None, description="the joint in space instead of a plane")
     analysis: PresetAnalysis = Field(default_factory=PresetAnalysis, description="model and solver")
     stepping: Stepping = Field(
         default_factory=Stepping, description="control of the steps between outputs"
     )
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
+
+    @model_validator(mode="after")
+    def _in_space(self):
+        if self.space is not None:
+            require_solid(self, self.load.at == "diameter", self.drawn.radius)
+        return self
+
+    @property
+    def drawn(self) -> Shape:
+        """The section that tells the shape."""
+        return getattr(self, self.shape.model_fields["kind"].default)
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws the shape; elements in space are larger by default."""
+        found = self.drawn.arguments()
+        if self.space is not None and self.drawn.element_size is None:
+            found["element_size"] = COARSE * self.drawn.radius
+        return found
 
     @abstractmethod
     def general(self) -> dict[str, Any]:
@@ -195,4 +217,18 @@ def general_scene(
             for n, s in bodies.items()
         ],
     }
-    return said | parts | {"analysis": said["analysis"] | {"symmetry": symmetry}}
+    general = said | parts | {"analysis": said["analysis"] | {"symmetry": symmetry}}
+    return solid(general, scene.space) if scene.space is not None else general
+
+
+def require_solid(scene: Any, on_face: bool, radius: float) -> None:
+    """Raise `Fault` for what a ``scene`` in space cannot have; a load is ``on_face`` if it acts on
+    a face of the pin of this ``radius``."""
+    scene.space.check(radius)
+    analysis = scene.analysis
+    require(not scene.pin.rigid, "pin.rigid", "must be false in space")
+    require(on_face, "load.at", 'must be "diameter" in space')
+    require(analysis.thickness is None, "analysis.thickness", "is for planes; give space.thickness")
+    is_plane = "plane" in analysis.model_fields_set
+    require(not is_plane, "analysis.plane", "is not for a joint in space")
+    require(analysis.degree == 2, "analysis.degree", "must be 2 in space")

@@ -1,0 +1,88 @@
+"""Presets in space: the general scenes that they stand for, what is refused, and their forces."""
+
+import tomllib
+
+import pytest
+from mpi4py import MPI
+
+from archord.presets.problem import general_problem
+from archord.report.errors import InputError
+from archord.scene.file import parse_any, resolved
+from archord.solver.path.system import System
+from tests.scene.test_shapes import BUSHED, BUSHING, LUG, STEEL, changed
+
+SPACE = {"space": {"thickness": 8.0, "pin_length": 12.0, "chamfer": 0.4}}
+JOINT = {
+    "joint": {"radius": 10.0, "clearance": 0.05, "block_size": 30.0},
+    "pin": STEEL,
+    "block": STEEL,
+    "load": {"displacement": 2.0, "steps": 2},
+}
+
+
+@pytest.mark.parametrize(
+    "data", [LUG, BUSHED, BUSHING, JOINT], ids=["lug", "bushed", "bushing", "joint"]
+)
+def test_a_preset_in_space_is_the_general_scene_that_it_prints(data):
+    """Beside the plane's supports the mid-plane is held, and half of its depth is modelled."""
+    plane = parse_any(data) if data is not JOINT else parse_any(parse_any(data).general())
+    scene = parse_any(data | SPACE)
+    assert parse_any(tomllib.loads(resolved(scene))) == scene
+    assert scene.analysis.plane == "space"
+    assert scene.analysis.symmetry == 2 * plane.analysis.symmetry
+    held = [(s.on, s.fixed) for s in plane.support]
+    assert [(s.on, s.fixed) for s in scene.support] == [*held, ("mid-plane", ["z"])]
+    assert scene.units.force_of(scene.analysis.depth) == "N"
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        ("space.thickness", 0.1, "space.thickness = 0.1 must be at least 0.02 R."),
+        ("space.fillet", 0.1, "space.fillet = 0.1 is instead of a chamfer."),
+        ("space.chamfer", 3.0, "space.chamfer = 3.0 must be at most 1.98: 0.2 R, and 0.45 of"),
+        ("space.depth", 3.0, "space.depth = 3.0 is not a known key"),
+        ("pin", {"rigid": True}, "pin.rigid = true must be false in space."),
+        ("load", {"force": 1e3, "at": "centre"}, 'load.at = "centre" must be "diameter" in space'),
+        ("analysis", {"thickness": 3.0}, "analysis.thickness = 3.0 is for planes; give space.th"),
+        ("analysis", {"plane": "stress"}, 'analysis.plane = "stress" is not for a joint in space'),
+    ],
+)
+def test_faults_are_said_in_one_sentence(place, value, said):
+    with pytest.raises(InputError) as error:
+        parse_any(changed(LUG | SPACE, place, value))
+    assert said in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def pulled(data, **depths) -> System:
+    """The solved coarse problem of a preset, in space where it has ``depths``."""
+    shape = next(name for name in ("lug", "bushing") if name in data)
+    coarse = data | {shape: data[shape] | {"element_size": 2.5, "growth": 0.5}}
+    coarse |= {"load": {"displacement": 0.2, "steps": 1}}
+    scene = parse_any(coarse | ({"space": {"rim_ratio": 1.0} | depths} if depths else {}))
+    system = System(general_problem(scene, MPI.COMM_SELF))
+    system.solve(scene.targets)
+    return system
+
+
+def test_the_whole_lug_carries_what_twice_its_half_does():
+    pin = {"pin": STEEL | {"whole": True}}
+    half = pulled(LUG | pin, thickness=8.0)
+    whole = pulled(changed(LUG, "lug.half", False) | pin, thickness=8.0)
+    assert whole.drive_force("pull") == pytest.approx(half.drive_force("pull"), rel=2e-3)
+    assert whole.drive_force("pull") == pytest.approx(-whole.reaction("clamp")[0], rel=1e-6)
+
+
+def test_a_thin_lug_is_in_plane_stress():
+    """As its thickness vanishes."""
+    thin = pulled(LUG, thickness=0.4)
+    plane = pulled(LUG | {"analysis": {"plane": "stress"}})
+    assert thin.drive_force("pull") == pytest.approx(0.4 * plane.drive_force("pull"), rel=5e-3)
+
+
+def test_a_pin_pulls_at_its_bushing():
+    """After the fit, with forces in balance."""
+    system = pulled(BUSHING, thickness=8.0, pin_length=12.0)
+    assert system.drive_force("pull") > 1e4
+    assert system.drive_force("pull") == pytest.approx(-system.reaction("outer edge")[0], rel=1e-6)
