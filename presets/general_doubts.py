@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 from archord.measures.doubts import (
     LARGE,
@@ -18,6 +19,7 @@ from archord.measures.energies import largest_energies
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt
+from archord.scene.parts import IN_PLANE, IN_SPACE, turns
 from archord.scene.problem import ProblemScene
 from archord.solver.path.system import System
 
@@ -40,9 +42,11 @@ PARTED = (
 
 def step_checks(scene: ProblemScene, system: System) -> list[Check]:
     """What to warn of after every step, in this order."""
-    turning = {f"{coupling.name} rotation" for coupling in scene.coupling}
-    turning |= {load.name for load in scene.load if load.direction == "rotation"}
+    motions = product(scene.coupling, IN_SPACE if scene.in_space else IN_PLANE)
+    turning = {f"{coupling.name} {freedom}" for coupling, freedom in motions if turns(freedom)}
+    turning |= {load.name for load in scene.load if turns(load.direction)}
     turning &= set(system.drive_names)
+    turning -= {drive for turn in system.problem.turns for drive in turn.drives}
     small = scene.analysis.strain == "small"
     fixed_partners = scene.analysis.kinematics == "reference"
 
@@ -64,7 +68,7 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
             yield Doubt(text, largest)
         yield from distortion_doubts(system, largest, small=small)
 
-    def turns(state: Accepted, m: Record) -> Iterator[str]:
+    def angles(state: Accepted, m: Record) -> Iterator[str]:
         angle = max((abs(state.driven[name][0]) for name in turning), default=0.0)
         if angle > _FAR_TURN:
             stretch = f"it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
@@ -75,7 +79,7 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
             yield from round_off_doubts(state, scene.analysis.tolerance)
         yield from balance_doubts(m, _UNBALANCED)
 
-    return [surfaces, strains, turns, balances, _spring_doubts]
+    return [surfaces, strains, angles, balances, _spring_doubts]
 
 
 def _facet_doubts(state: Accepted, m: Record, surface: str, pressure: str) -> list[str]:

@@ -244,7 +244,9 @@ def _held_places(
     """Where supports and displacements hold each body, and along what: places ``(k, d)`` and
     directions ``(k, d)``, or motions ``(1, 6)`` about the point of a coupling in space."""
     facets = {c.name: c.facets for c in problem.couplings}
-    given: list[tuple[str, str]] = [(s.on, f) for s in _supports(problem) for f in s.fixed]
+    given: list[tuple[str, str]] = [
+        (s.on, f) for s in _supports(problem) for f in s.held(whole.dimension)
+    ]
     displaced = [load for load in _loads(problem) if load.kind == "displacement"]
     given += [(load.on, str(load.direction)) for load in displaced]
     d = whole.dimension

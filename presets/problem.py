@@ -21,7 +21,7 @@ from archord.scene import parts
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.keys import plain
 from archord.solver.contact.laws.named import LAWS
-from archord.solver.parts import Body, Coupling, Load, Support
+from archord.solver.parts import Body, Coupling, Load, Support, freedoms
 from archord.solver.path.system import displacement_space
 from archord.solver.problem import Interaction, Problem
 
@@ -166,12 +166,13 @@ def _load(load: parts.LoadSection) -> Load:
 
 def require_mirrored(problem: Problem) -> None:
     """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an
-    edge that is held in one direction, as a mirror line is, and could leave that line or turn.
-    Collective."""
+    edge or a face that is held in one direction, as a mirror line or plane is, and could leave it
+    or turn out of it. Collective."""
     fixed: dict[str, set[str]] = {}
     for support in problem.supports:
         if isinstance(support, Support):
-            fixed.setdefault(support.on, set()).update(support.fixed)
+            axes = support.held(problem.mesh.dimension)
+            fixed.setdefault(support.on, set()).update(axes)
     held = {coupling.name: fixed.pop(coupling.name, set()) for coupling in problem.couplings}
     lines = [(on, *axes) for on, axes in fixed.items() if len(axes) == 1]
     rigid = [coupling for coupling in problem.couplings if coupling.kind == "rigid"]
@@ -179,8 +180,10 @@ def require_mirrored(problem: Problem) -> None:
         return
     mesh = problem.mesh
     V = displacement_space(mesh.mesh, problem.degree)
+    turns = [freedom for freedom in freedoms(mesh.dimension) if freedom.startswith("rotation")]
     for coupling, (on, axis) in product(rigid, lines):
-        free = [freedom for freedom in (axis, "rotation") if freedom not in held[coupling.name]]
+        leaving = [axis, *(turn for turn in turns if turn != f"rotation {axis}")]
+        free = [freedom for freedom in leaving if freedom not in held[coupling.name]]
         shared = np.intersect1d(mesh.dofs_in(V, coupling.facets), mesh.dofs_in(V, on))
         if mesh.mesh.comm.allreduce(len(shared)) and free:
             raise ValueError(

@@ -46,13 +46,14 @@ def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str,
                 f"archord.solve: a problem with a {kind} has no run folder; state it by Support, "
                 "Load and Coupling, or solve it by System."
             )
+    dimension = 3 if _plane(problem) == "space" else 2
     return {
         "units": dict(zip(("length", "stress"), problem.units, strict=True)),
         "mesh": _mesh(problem.mesh, mesh_file),
         "body": [_body(body) for body in problem.bodies],
         "interaction": [_interaction(part) for part in problem.interactions],
         "coupling": [vars(coupling) for coupling in problem.couplings],
-        "support": [vars(support) for support in problem.supports],
+        "support": [_support(support, dimension) for support in problem.supports],
         "load": [_load(load) for load in problem.loads if isinstance(load, Load)],
         "path": {"steps": problem.steps, "fit_steps": problem.fit_steps},
         "analysis": _analysis(problem),
@@ -152,6 +153,10 @@ def _law(law: Any) -> dict[str, Any]:
         return {"law": names[type(law)], "parameters": vars(law)}
     units = {name: quantity.unit for name, quantity in law.quantities(law.state(1)).items()}
     return {"own": _own(law) | {"friction": bool(law.has_friction), "quantities": units}}
+
+
+def _support(support: Support, dimension: int) -> dict[str, Any]:
+    return {"name": support.name, "on": support.on, "fixed": support.held(dimension)}
 
 
 def _load(load: Load) -> dict[str, Any]:

@@ -33,7 +33,7 @@ _OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
 
-def turns_about(freedom: str | None) -> bool:
+def turns(freedom: str | None) -> bool:
     """Whether a direction is a rotation."""
     return freedom is not None and freedom.startswith("rotation")
 
@@ -275,9 +275,9 @@ class LoadSection(Loading):
             else "is not for a pressure, which acts along the normal"
         )
         require(directed, "direction", said)
-        turns = turns_about(self.direction) and self.displacement is not None
+        rotated = turns(self.direction) and self.displacement is not None
         said = "must be at most 1.5708, a right angle in radians: a coupling turns linearly"
-        require(not turns or max(map(abs, self.stages)) <= _RIGHT_ANGLE, "displacement", said)
+        require(not rotated or max(map(abs, self.stages)) <= _RIGHT_ANGLE, "displacement", said)
         return self
 
 

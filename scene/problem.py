@@ -19,7 +19,7 @@ from archord.scene.parts import (
     MeshSection,
     PathSection,
     SupportSection,
-    turns_about,
+    turns,
 )
 from archord.scene.presets.joint import STEPS
 from archord.scene.sections.analysis import ProblemAnalysis, ProblemOutput, Stepping
@@ -200,7 +200,7 @@ class ProblemScene(Checked):
         parts += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
         for section, name, on, freedom in parts:
             at = (section, name, "fixed" if section == "support" else "direction")
-            fits = not turns_about(freedom) or on in couplings
+            fits = not turns(freedom) or on in couplings
             said = f"must be {self._axes}: {on!r} is no coupling, which alone has a rotation"
             require(fits, at, said)
             before = seen.get((on, freedom))

@@ -68,6 +68,20 @@ class Dirichlet:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """A finite rotation in space of what the Dirichlet conditions of a ``name`` turn linearly.
+
+    The drives of the rotations about x, y and z, "" without a rotation, make a rotation vector
+    about the ``point``. Their displacements must be prescribed; what is conjugate to them is work,
+    for a rotation about one axis the moment.
+    """
+
+    name: str
+    point: Vector
+    drives: Sequence[str]
+
+
+@dataclass(frozen=True)
 class DeadLoad:
     """A dead load on the cells or the facets of a set, times the value of the ``drive``.
 

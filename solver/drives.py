@@ -26,6 +26,7 @@ from archord.solver.contact.surface import RigidSurface
 from archord.solver.loads import Loads
 from archord.solver.prescribed import Prescribed
 from archord.solver.problem import Body, Problem, Rigid
+from archord.solver.turns import Turns
 
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
 _SAME_PLACE = 1e-9  # of the distance between two anchors
@@ -48,6 +49,7 @@ class Drives:
     moving : (l,) whether the level is a displacement
     unknown : (m,) levels that are solved for
     fixed : (n_local, d) whether a displacement is prescribed
+    turns : finite rotations of what drives turn
     weight : (m,) units of the unknown levels and of their equations
     unknown_rate, unknown_load : (m, n, d) ``rate`` and ``applied`` per unit of the unknown levels
     """
@@ -78,6 +80,7 @@ class Drives:
         self.unknown = np.flatnonzero(self._with_anchors(self._unknown_names()))
         self._move_discs(contact)
         self.fixed = self._holder >= 0
+        self.turns = self._turns()
         self._require_independent()
         largest = self._largest_rates(contact)
         self.weight = np.array([self._weight(level, largest) for level in self.unknown])
@@ -133,6 +136,22 @@ class Drives:
                 disc.rate = np.zeros((len(self.rate), self.dimension))
                 for level, name in enumerate(self.names):
                     disc.rate[level] = rates.get(name, 0.0)
+
+    def _turns(self) -> Turns | None:
+        """The finite rotations, None without any."""
+        turns = self.problem.turns
+        if not turns:
+            return None
+        numbers = {turn.name: self._prescribed.names.index(turn.name) for turn in turns}
+        held = {name: self._holder == number for name, number in numbers.items()}
+        return Turns.of(turns, self.names, self._x, held)
+
+    def displaced(self, levels: Array) -> Array:
+        """The prescribed displacements ``(n_local, d)`` at these ``levels``."""
+        u = np.tensordot(levels, self.rate, 1)
+        if self.turns:
+            self.turns.displace(u, levels)
+        return u
 
     def _require_independent(self) -> None:
         """Raise ValueError where displacements that are free cannot give prescribed means all their

@@ -14,7 +14,7 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import unknown
 from archord.materials.kinematics import PLANE_STRAIN, SPACE
-from archord.solver.conditions import Control, DeadLoad, Dirichlet, Drive, Guess, Mean
+from archord.solver.conditions import Control, DeadLoad, Dirichlet, Drive, Guess, Mean, Turn
 from archord.solver.contact.interaction import Interaction, Rigid
 from archord.solver.core_load import core_density, require_core
 from archord.solver.parts import Coupling, Load, Support, freedoms
@@ -37,7 +37,7 @@ class _Expansion:
     freedoms: the directions by their names, and their numbers
     loaded: the name of the load of each place and direction
     held: the places and directions that supports fix
-    drives, supports, means, loads: the conditions, those that the problem states itself first
+    drives, supports, means, turns, loads: the conditions, those first that the problem states
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -51,11 +51,16 @@ class _Expansion:
         self.given_supports = [part for part in problem.supports if isinstance(part, Support)]
         self.given_loads = [part for part in problem.loads if isinstance(part, Load)]
         self.loaded = {(load.on, str(load.direction)): load.name for load in self.given_loads}
-        self.held = {(part.on, freedom) for part in self.given_supports for freedom in part.fixed}
+        self.held = {
+            (part.on, freedom)
+            for part in self.given_supports
+            for freedom in part.held(self.dimension)
+        }
         self.drives = list(problem.drives)
         self.supports = [part for part in problem.supports if isinstance(part, Dirichlet)]
         self.loads = [part for part in problem.loads if isinstance(part, DeadLoad)]
         self.means = list(problem.means)
+        self.turns: list[Turn] = list(problem.turns)
 
     def problem(self) -> Problem:
         """The problem with all conditions. Raises ValueError."""
@@ -77,6 +82,7 @@ class _Expansion:
             "loads": self.loads,
             "couplings": (),
             "means": self.means,
+            "turns": self.turns,
             "drives": self.drives,
         }
         slide = 0.0
@@ -102,7 +108,7 @@ class _Expansion:
         """Raise ValueError for a direction that the problem lacks, and a point of another
         dimension."""
         used: list[tuple[str, str | None]] = []
-        used += [(f"support {s.name!r}", f) for s in self.given_supports for f in s.fixed]
+        used += [(f"support {s.name!r}", f) for s in self.given_supports for f in s.fixed or ()]
         used += [(f"load {load.name!r}", load.direction) for load in self.given_loads]
         for part, freedom in used:
             if freedom is not None and freedom not in self.freedoms:
@@ -142,8 +148,7 @@ class _Expansion:
         Large strain is stretched some times as far. Collective."""
         lowest, highest = self._box()
         size = float((highest - lowest).max())
-        is_large = any(getattr(body.material, "finite", False) for body in self.stated.bodies)
-        most = _STRETCHED * size if is_large else size
+        most = _STRETCHED * size if self._is_large() else size
         for load in self.given_loads:
             if load.kind != "displacement" or _turns(load.direction):
                 continue
@@ -155,6 +160,9 @@ class _Expansion:
                     "whether both have the same unit"
                 )
         self._require_near_turns(lowest, highest, most)
+
+    def _is_large(self) -> bool:
+        return any(getattr(body.material, "finite", False) for body in self.stated.bodies)
 
     def _box(self) -> tuple[Array, Array]:
         """The lowest and the highest coordinates of mesh and discs' centres. Collective."""
@@ -195,7 +203,7 @@ class _Expansion:
         """What holds a set; couplings take their supports themselves."""
         if support.on in self.couplings:
             return
-        for freedom in support.fixed:
+        for freedom in support.held(self.dimension):
             if _turns(freedom):
                 axes = " and ".join(f'"{axis}"' for axis in "xyz"[: self.dimension])
                 raise ValueError(
@@ -262,6 +270,17 @@ class _Expansion:
             drive = self._drive(coupling.name, freedom, "force")
             for axis, rate in self._rates(freedom, coupling.point):
                 self.supports.append(Dirichlet(coupling.name, coupling.facets, axis, rate, drive))
+        if self.dimension == 3 and self._is_large():
+            self._turn_finitely(coupling)
+
+    def _turn_finitely(self, coupling: Coupling) -> None:
+        """Let the rotations of a ``coupling`` be finite, where all of them are prescribed."""
+        displaced = {load.name for load in self.given_loads if load.kind == "displacement"}
+        places = {(coupling.name, freedom) for freedom in self.freedoms if _turns(freedom)}
+        drives = [self.loaded.get(place, "") for place in sorted(places - self.held)]
+        if drives and displaced.issuperset(drives):
+            drives = [self.loaded.get(place, "") for place in sorted(places)]
+            self.turns.append(Turn(coupling.name, coupling.point, drives))
 
     def _rates(self, freedom: str, point: Sequence[float]) -> list[tuple[int, Rate]]:
         """What a motion of a reference ``point`` displaces along the axes."""
@@ -273,6 +292,11 @@ class _Expansion:
     def _mean_point(self, coupling: Coupling) -> None:
         # with its mirror image an edge moves along the symmetry line alone
         mirrored = self.stated.symmetry > 1
+        if mirrored and self.dimension == 3:
+            raise ValueError(
+                f"the distributing coupling {coupling.name!r} is of a part with mirror images, "
+                "which space does not know yet: take a rigid coupling, a pressure, or the whole"
+            )
         point = None if mirrored else coupling.point
         for freedom, axis in self.freedoms.items():
             if (coupling.name, freedom) not in self.held | self.loaded.keys():

@@ -96,8 +96,9 @@ class Support:
     on : str
         A coupling, or a set of facets, points or cells: the first that has the name.
     fixed : str or sequence of str
-        The directions held: letters such as "xy", in space "xyz"; or a list, which may have the
-        "rotation" of a coupling, in space its "rotation x", "rotation y" and "rotation z".
+        The directions held, by default all axes: letters such as "xy", in space "xyz"; or a list,
+        which may have the "rotation" of a coupling, in space its "rotation x", "rotation y" and
+        "rotation z".
 
     Raises
     ------
@@ -115,7 +116,7 @@ class Support:
 
     name: str
     on: str = ""
-    fixed: str | Sequence[str] = "xy"
+    fixed: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         """Check the parts; raise `InputError`."""
@@ -123,12 +124,18 @@ class Support:
         object.__setattr__(self, "on", self.on or self.name)
         _require_name(self, "on")
         fixed = self.fixed
+        if fixed is None:
+            return
         if isinstance(fixed, str):
             are_letters = {*fixed} <= {*"xyz"}
             fixed = tuple(fixed) if are_letters else (fixed,)
         known = len(fixed) > 0 and all(freedom in FREEDOMS for freedom in fixed)
         require_of(self, known, "fixed", f"must be directions among {_IN_WORDS}")
         object.__setattr__(self, "fixed", tuple(fixed))
+
+    def held(self, dimension: int) -> tuple[str, ...]:
+        """The directions held in a problem of this ``dimension``."""
+        return tuple("xyz"[:dimension]) if self.fixed is None else tuple(self.fixed)
 
 
 @in_sentences

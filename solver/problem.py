@@ -19,7 +19,7 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
 from archord.materials.named import named_material
 from archord.report.errors import InputError, in_sentences
-from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean
+from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean, Turn
 from archord.solver.contact.interaction import Interaction, Rigid
 from archord.solver.parts import Body, Coupling, Load, Support
 
@@ -35,6 +35,7 @@ _PARTS = {
     "loads": (Load, DeadLoad),
     "couplings": (Coupling,),
     "means": (Mean,),
+    "turns": (Turn,),
     "drives": (Drive,),
 }
 _DIFFERENT = ("bodies", "interactions", "drives", "couplings")
@@ -60,8 +61,8 @@ class Problem:
         What moves or presses. `DeadLoad` may stand beside them.
     couplings : sequence of Coupling
         Reference points.
-    means, drives : sequence of Mean, sequence of Drive
-        Mean motions, and the drives of conditions that are stated one by one.
+    means, turns, drives : sequence of Mean, sequence of Turn, sequence of Drive
+        Mean motions, finite rotations, and the drives of conditions that are stated one by one.
     steps : int or sequence of int
         Output steps of each stage of the path: one number for all stages, or a number for each.
     fit_steps : int
@@ -133,6 +134,7 @@ class Problem:
     loads: Sequence[Any] = ()
     couplings: Sequence[Coupling] = ()
     means: Sequence[Mean] = ()
+    turns: Sequence[Turn] = ()
     drives: Sequence[Drive] = ()
     steps: int | Sequence[int] = 20
     fit_steps: int = 1

@@ -125,7 +125,7 @@ class RigidMotions:
         u = state[:n].reshape(self._modes[0].shape).copy()
         levels = drives.values(load)
         levels[drives.unknown] = state[n:][drives.unknown]
-        prescribed = np.tensordot(levels, drives.rate, 1)
+        prescribed = drives.displaced(levels)
         lacking = (prescribed - u)[drives.fixed]
         followed = self._follow @ self.comm.allreduce(self._prescribed.T @ lacking)
         u += np.tensordot(followed[: len(self._modes)], self._modes, 1)

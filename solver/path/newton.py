@@ -210,6 +210,7 @@ class NewtonSolver:
     def _begin(self, goal: float) -> None:
         self._goal = goal or self.tolerance
         self._result = Newton(False, "", 0, [])
+        self._norms: list[float] = []
         self._failure = ""
         self._raised = None
         self._renewed = True  # the last factorisation is of another matrix
@@ -296,6 +297,7 @@ class NewtonSolver:
         norm = norms[2]
         reaction = max(evaluation.reaction_norm, self.equilibrium.largest_reaction)
         result.active_set_changes.append(evaluation.changes)
+        self._norms.append(norm)
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
         self.watch(self.equilibrium.load, result)
         if self._is_singular():
@@ -311,13 +313,15 @@ class NewtonSolver:
         return _R.DIVERGED_MAX_IT if iteration >= self.max_iterations else _R.ITERATING
 
     def _stagnates(self) -> bool:
-        """Whether the residual has not halved in as many iterations as it is given."""
-        residuals = self._result.residuals
+        """Whether the residual has not halved in as many iterations as it is given, neither itself
+        nor over the reaction, which falls with it where a body only turns."""
         has_changes = any(self._result.active_set_changes[-CIRCLING:])
         patience = _PATIENCE if has_changes else CIRCLING
-        recent = residuals[-patience:]
-        earlier = residuals[:-patience]
-        return bool(earlier) and min(recent) > 0.5 * min(earlier)
+        for residuals in (self._result.residuals, self._norms):
+            earlier = residuals[:-patience]
+            if not earlier or min(residuals[-patience:]) <= 0.5 * min(earlier):
+                return False
+        return True
 
     def _singular_mode(self) -> str:
         """What is singular, in words."""

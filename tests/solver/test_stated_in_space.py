@@ -11,6 +11,7 @@ from archord import Body, Coupling, Interaction, Load, Problem, Support
 from archord.materials.elasticity import Elastic
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
+from tests.materials.test_space import ASKEW
 from tests.solver.contact.blocks_in_space import bodies, tagged
 from tests.solver.space import E, box
 
@@ -19,10 +20,10 @@ AREA = SIZE[0] * SIZE[1]
 MIDDLE = (0.5, 1.0, 1.5)
 NO_NU = Elastic(E, 0.0)
 ROLLERS = [Support(side, fixed=side[0]) for side in ("x0", "y0", "z0")]
-WALL = [Support("wall", "z0", "xyz")]
+WALL = [Support("wall", "z0")]
 
 
-def solved(comm, loads, supports, couplings=(), **options) -> System:
+def solved(comm, loads, supports, couplings=(), loads_at=(1.0,), **options) -> System:
     """The body "box", without contraction across, under these ``loads``; no step is cut."""
     problem = Problem(
         box(comm, (2, 2, 2), SIZE),
@@ -30,11 +31,10 @@ def solved(comm, loads, supports, couplings=(), **options) -> System:
         supports=supports,
         loads=loads,
         couplings=couplings,
-        kinematics="space",
         **options,
     )
     system = System(problem)
-    system.solve([1.0], StepRules(minimum=1.0))
+    system.solve(loads_at, StepRules(minimum=1.0))
     return system
 
 
@@ -164,6 +164,10 @@ def test_a_tie_pulls(comm):
 
 
 REFUSED = {
+    "the distributing coupling 'end' is of a part with mirror images": {
+        "couplings": [Coupling("end", "z1", MIDDLE, "distributing")],
+        "symmetry": 2,
+    },
     "'rotation' has the direction 'rotation', but here are x, y, z, rotation x": {
         "loads": [Load("rotation", on="end", direction="rotation", force=1.0)]
     },
@@ -208,3 +212,52 @@ def test_what_does_not_fit_a_plane_is_refused():
     problem = Problem(mesh, [Body("block", NO_NU)], loads=[load])
     with pytest.raises(ValueError, match="load 'press' has the direction 'z', but here are x, y"):
         System(problem)
+
+
+ANGLE = np.radians(37.0)
+ABOUT = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+TURNS = ("rotation x", "rotation y", "rotation z")
+
+
+@pytest.mark.mpi
+def test_a_finite_rotation_leaves_no_stress_at_large_strain(comm):
+    """By 37 degrees about (1, 2, 3), of a side of a body that nothing else holds."""
+    loads = [
+        Load(name, on="arm", direction=name, displacement=float(angle))
+        for name, angle in zip(TURNS, ANGLE * ABOUT, strict=True)
+    ]
+    point = np.array([0.3, -0.2, 2.0])
+    held = [Support("arm held", on="arm", fixed="xyz")]
+    coupling = [Coupling("arm", "z1", tuple(point))]
+    system = solved(comm, loads, held, coupling, loads_at=np.arange(1, 9) / 8, strain="large")
+    arm = system.V.tabulate_dof_coordinates() - point
+    expected = arm @ (ASKEW - np.eye(3)).T
+    np.testing.assert_allclose(system.equilibrium.displacement(), expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(system.driven()[0], ANGLE * ABOUT, rtol=1e-12)
+    np.testing.assert_allclose(system.driven()[1], 0, atol=1e-8 * E)
+    assert system.energies()[0] < 1e-12 * E
+
+
+@pytest.mark.mpi
+def test_the_moment_of_a_finite_rotation_does_its_work(comm):
+    """The energy of a twisted box is the integral of the moment over the angle (Simpson's rule)."""
+    load = Load("twist", on="end", direction="rotation z", displacement=0.5)
+    held = [Support("guide", on="end", fixed=["x", "y", "z", "rotation x", "rotation y"])]
+    end = [Coupling("end", "z1", MIDDLE)]
+    problem = Problem(
+        box(comm, (2, 2, 2), SIZE),
+        [Body("box", NO_NU)],
+        supports=[*WALL, *held],
+        loads=[load],
+        couplings=end,
+        strain="large",
+        tolerance=1e-11,
+    )
+    system = System(problem)
+    moments = [0.0]
+    for k in range(1, 9):
+        system.solve([k / 8])
+        moments.append(system.drive_force("twist"))
+    weights = np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) * 0.5 / 24
+    assert system.energies()[0] == pytest.approx(weights @ moments, rel=1e-4)
+    assert system.drive_displacement("twist") == 0.5
