@@ -13,7 +13,9 @@ quadrilaterals the mean of the corners.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
+import basix
 import numpy as np
 
 from archord.geometry.basis import Array
@@ -24,8 +26,8 @@ _SINGULAR = 1e-13  # of patches with fewer points than coefficients, which get t
 
 
 class PatchRecovery:
-    """From the ``points`` ``(m, q, 2)`` of ``cells`` ``(m, k)``, their corners in turn, to
-    ``nodes`` ``(n, 2)``.
+    """From the ``points`` ``(m, q, d)`` of ``cells`` ``(m, k)`` of a ``kind``, given by their
+    corners, to ``nodes`` ``(n, d)``.
 
     The first nodes are the vertices; ``between`` are the vertices ``(i, e)`` that the further nodes
     lie between, one array after the other. Bodies share no vertex, so that nothing is smoothed over
@@ -33,8 +35,8 @@ class PatchRecovery:
 
     Attributes
     ----------
-    _powers : array (c, 2)
-        The powers of x and y in the monomials of the polynomials.
+    _powers : array (c, d)
+        The powers of the coordinates in the monomials of the polynomials.
     _cell : array (p,)
         The cells of all patches, one patch after the other.
     _first : array (patches,)
@@ -55,6 +57,7 @@ class PatchRecovery:
 
     def __init__(
         self,
+        kind: basix.CellType,
         nodes: Array,
         cells: np.ndarray,
         between: Sequence[np.ndarray],
@@ -62,14 +65,14 @@ class PatchRecovery:
         degree: int,
     ) -> None:
         n_vertices = len(nodes) - sum(map(len, between))
-        edges, outside = _boundary(cells, n_vertices)
+        edges, outside = _boundary(kind, cells, n_vertices)
         inward = _inward(edges, outside)
         alone = outside.copy()  # on the boundary, without a neighbour inside
         alone[inward[:, 0]] = False
         own = np.flatnonzero(~outside | alone)
         wanted, source = np.concatenate([inward, np.column_stack([own, own])]).T
 
-        self._powers = np.array([[i - j, j] for i in range(degree + 1) for j in range(i + 1)])
+        self._powers = _powers(degree, nodes.shape[1])
         vertex, self._cell = _patches(cells, outside, alone)
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
         self._patch = np.zeros(n_vertices, dtype=np.int64)
@@ -79,7 +82,7 @@ class PatchRecovery:
         self._mean_of_vertices(nodes, between, wanted, source)
 
     def _fit_patches(self, ray: Array, patch: np.ndarray, wide: np.ndarray) -> None:
-        """The fits of all patches by the ``ray`` ``(p, q, 2)`` from their vertices to their points;
+        """The fits of all patches by the ``ray`` ``(p, q, d)`` from their vertices to their points;
         in ``wide`` ones ``(p,)`` near points count more."""
         square = (ray**2).sum(axis=-1)
         size = np.maximum.reduceat(square.max(axis=1), self._first)
@@ -118,7 +121,11 @@ class PatchRecovery:
     def _monomials(self, y: Array) -> Array:
         powers = np.ones((self._powers.max() + 1, *y.shape))
         np.cumprod(np.broadcast_to(y, powers[1:].shape), axis=0, out=powers[1:])
-        return np.stack([powers[i, ..., 0] * powers[j, ..., 1] for i, j in self._powers], axis=-1)
+        monomials = []
+        for of_axes in self._powers:
+            factors = [powers[power, ..., axis] for axis, power in enumerate(of_axes)]
+            monomials.append(reduce(np.multiply, factors))
+        return np.stack(monomials, axis=-1)
 
     def __call__(self, values: Array) -> Array:
         """Values ``(n, c)`` at the nodes from ``values`` ``(m, q, c)`` at the points."""
@@ -127,16 +134,33 @@ class PatchRecovery:
         return np.add.reduceat(parts[:, 0], self._start)
 
 
-def _boundary(cells: np.ndarray, n_vertices: int) -> tuple[np.ndarray, np.ndarray]:
+def _powers(degree: int, dimension: int) -> np.ndarray:
+    """The powers ``(c, d)`` of all monomials up to a ``degree``, the lower degrees first."""
+    powers = np.indices((degree + 1,) * dimension).reshape(dimension, -1).T
+    total = powers.sum(axis=1)
+    order = np.lexsort((*-powers.T[::-1], total))
+    return powers[order[total[order] <= degree]]
+
+
+def _boundary(
+    kind: basix.CellType, cells: np.ndarray, n_vertices: int
+) -> tuple[np.ndarray, np.ndarray]:
     """The edges ``(e, 2)`` between vertices, and which vertices ``(n_vertices,)`` lie on the
     boundary."""
-    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1)
-    low, high = np.sort(sides.reshape(-1, 2), axis=1).T
-    number, count = np.unique(low * n_vertices + high, return_counts=True)
-    edges = np.column_stack(np.divmod(number, n_vertices))
+    topology = basix.topology(kind)
+    edges, _ = _distinct(cells, topology[1])
+    sides, count = _distinct(cells, topology[-2])
     outside = np.zeros(n_vertices, dtype=bool)
-    outside[edges[count == 1]] = True
+    outside[sides[count == 1]] = True
     return edges, outside
+
+
+def _distinct(cells: np.ndarray, parts: list[list[int]]) -> tuple[np.ndarray, np.ndarray]:
+    """The edges or faces ``(e, v)`` that ``cells`` have as these ``parts``, by their vertices in
+    rising order, and how many cells ``(e,)`` have each."""
+    vertices = cells[:, np.array(parts)]
+    rising = np.sort(vertices.reshape(-1, vertices.shape[-1]), axis=1)
+    return np.unique(rising, axis=0, return_counts=True)
 
 
 def _inward(edges: np.ndarray, outside: np.ndarray) -> np.ndarray:

@@ -82,7 +82,8 @@ class Patches:
 
     X : (nodes, 3) the nodes
     connectivity : (n_facets, k) the nodes of each facet, in the order of basix
-    corners : (n_facets, e) its vertices, counted on, in the order in which its edges follow
+    vertices : (n_facets, e) its vertices, in the order in which its edges follow
+    corners : (n_facets, e) the same, counted on, in the order in which its edges follow
     beyond : (n_facets, e) the facet across each edge, -1 at a free border; the edge leads from the
         corner of its number to the next one
     """
@@ -93,9 +94,9 @@ class Patches:
         self.degree = degree
         self.connectivity = connectivity.astype(np.int32)
         self.n_facets = len(connectivity)
-        vertices = self.connectivity[:, list(_CORNERS[cell])]
-        _, corners = np.unique(vertices, return_inverse=True)
-        self.corners = corners.reshape(vertices.shape).astype(np.int32)
+        self.vertices = self.connectivity[:, list(_CORNERS[cell])]
+        _, corners = np.unique(self.vertices, return_inverse=True)
+        self.corners = corners.reshape(self.vertices.shape).astype(np.int32)
         self.beyond = self._across_edges()
         self._exponents, self._coefficients = _monomials(cell, degree)
         edges = _TRIANGLE_EDGES if cell == basix.CellType.triangle else _SQUARE_EDGES

@@ -7,14 +7,16 @@ not: what is reported is built from them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
+    from archord.solver.contact.pair import Pair
+    from archord.solver.contact.surface import Surface
     from archord.solver.path.system import System
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
@@ -22,27 +24,32 @@ _ON_CONE = 1e-6  # of the largest shear: what comes as close slides
 OF_FRICTION = ("shear", "sticks")  # of one with friction also
 
 
-@dataclass(frozen=True)
-class EdgeProfile:
-    """One surface's contact state at ``q`` points of its ``n`` facets, on every rank."""
+@dataclass(frozen=True, kw_only=True)
+class ContactProfile:
+    """One surface's contact state at ``q`` points of its ``n`` facets, on every rank.
 
-    s: Array  # (n, q) arc length along the curve
-    weight: Array  # (n, q) measure
-    coordinates: Array  # (n, q, 2) deformed
-    # (n, q) positive in compression; projected: linear on each facet, with the facet's force
+    weight : (n, q) measure
+    coordinates : (n, q, d) deformed
+    pressure : (n, q) positive in compression; projected: linear on each facet, with the facet's
+        force
+    raw_pressure : (n, q) as integrated by the solver
+    gap : (n, q) positive when open
+    shear : (n, q) on the surface, positive along s; in space (n, q, 3); with friction, else None
+    sticks : (n, q) 1 where points touch and stick; with friction, else None
+    """
+
+    weight: Array
+    coordinates: Array
     pressure: Array
-    raw_pressure: Array  # (n, q) as integrated by the solver
-    gap: Array  # (n, q) positive when open
-    shear: Array | None = field(
-        default=None, kw_only=True
-    )  # (n, q) with friction: on the surface, positive along s
-    sticks: Array | None = field(
-        default=None, kw_only=True
-    )  # (n, q) with friction: 1 where points touch and stick
+    raw_pressure: Array
+    gap: Array
+    shear: Array | None = None
+    sticks: Array | None = None
 
     @property
     def width(self) -> Array:
-        """Measure ``(n,)`` of each facet: a length in a plane, an area around an axis."""
+        """Measure ``(n,)`` of each facet: a length in a plane, an area around an axis and in
+        space."""
         return self.weight.sum(axis=1)
 
     @property
@@ -57,35 +64,73 @@ class EdgeProfile:
 
     @property
     def contact_length(self) -> float:
-        """Measure of the surface under pressure: a length in a plane, an area around an axis."""
+        """Measure of the surface under pressure: a length in a plane, an area around an axis and
+        in space."""
         return float((self.in_contact * self.width).sum())
 
 
-@dataclass(frozen=True)
-class SurfaceProfile(EdgeProfile):
-    """As `EdgeProfile`, with the undeformed points and how far they slid along the opposite surface
-    (`Pair.slip`)."""
+@dataclass(frozen=True, kw_only=True)
+class EdgeProfile(ContactProfile):
+    """The contact state of an edge, in a plane or around an axis.
 
-    X: Array  # (n, q, 2)
-    slip: Array  # (n, q)
+    s : (n, q) arc length along the curve
+    """
+
+    s: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Displaced(ContactProfile):
+    """A contact state with the undeformed points, and how far they slid.
+
+    X : (n, q, d)
+    slip : (n, q) see `Pair.slip`; in space (n, q, 3)
+    """
+
+    X: Array
+    slip: Array
 
     @property
     def largest_slip(self) -> float:
         """Largest slip, whichever way, where there is pressure."""
-        return float(np.abs(self.slip[self.raw_pressure > 0]).max(initial=0.0))
+        return float(_size(self.slip)[self.raw_pressure > 0].max(initial=0.0))
 
     @property
     def largest_shear(self) -> float:
         """Largest shear, whichever way, on a surface with friction."""
-        return float(np.abs(self.shear).max()) if self.shear is not None else 0.0
+        return float(_size(self.shear).max()) if self.shear is not None else 0.0
 
     @property
     def largest(self) -> tuple[float, Array]:
-        """Largest projected pressure, and the undeformed place ``(2,)`` where it is."""
+        """Largest projected pressure, and the undeformed place ``(d,)`` where it is."""
         at = np.unravel_index(
             np.argmax(np.where(self.raw_pressure > 0, self.pressure, 0.0)), self.pressure.shape
         )
         return max(float(self.pressure[at]), 0.0), self.X[at]
+
+
+def _size(values: Array) -> Array:
+    """The size of scalars ``(n, q)``, or of vectors ``(n, q, 3)``."""
+    return np.abs(values) if values.ndim == 2 else np.linalg.norm(values, axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PatchProfile(_Displaced):
+    """The contact state of a surface in space.
+
+    normal : (n, q, 3) outward, undeformed
+    corners : (n, c, 3) the undeformed corners of the facets, one after the other around them
+    facet_pressure : (n,) mean pressure
+    """
+
+    normal: Array
+    corners: Array
+    facet_pressure: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceProfile(EdgeProfile, _Displaced):
+    """The contact state of an edge with its undeformed points."""
 
     @property
     def n_arcs(self) -> int:
@@ -104,38 +149,95 @@ class SurfaceProfile(EdgeProfile):
         return arcs
 
 
+AnyProfile = SurfaceProfile | PatchProfile
+
+
+def fixed(system: System) -> tuple[str, ...]:
+    """Names of the arrays of contact.h5 that do not change."""
+    in_space = system.problem.kinematics.dimension == 3
+    return ("weight", "X", "normal", "corners") if in_space else ("s", "weight", "X")
+
+
 def per_step(system: System) -> tuple[str, ...]:
     """Names of the arrays of contact.h5 that change."""
-    return PER_STEP + OF_FRICTION if system.contact.has_friction else PER_STEP
+    names = PER_STEP + OF_FRICTION if system.contact.has_friction else PER_STEP
+    in_space = system.problem.kinematics.dimension == 3
+    return (*names, "facet_pressure") if in_space else names
 
 
-def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
+def surface_profiles(system: System) -> dict[str, Any]:
     """Contact state along the integrated surfaces, by name, at the last evaluation. Collective."""
     u, found = system.equilibrium.displacement(), {}
     for name, side in system.sides.items():
         pair = system.contact.pair_of(side)
-        if pair is None or side.in_space:  # it is not integrated, or no edge
+        if pair is None:  # it is not integrated
             continue
-        displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-        local = np.zeros((side.n_facets, side.weight.shape[1], 10))
-        # the frame's tangent runs along the opposite surface, which this one meets the other way
-        # round
-        shear = 0.0 - pair.shear
-        sticks = np.abs(shear) < (1 - _ON_CONE) * getattr(pair.law, "friction", 0.0) * pair.pressure
-        values = np.stack(
-            [side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1
-        )
-        local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
-        whole = side.sum_over_ranks(local)
-        weight, raw, gap, slip, *of_friction = np.moveaxis(whole[..., :6], -1, 0)
-        coordinates, X, s = whole[..., 6:8], whole[..., 8:], side.arc_length(side.curve_xi)
-        more = (
-            dict(zip(OF_FRICTION, of_friction, strict=True)) if system.contact.has_friction else {}
-        )
-        found[name] = SurfaceProfile(
-            s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip, **more
-        )
+        whole = _of_all_ranks(side, pair, u)
+        has_friction = system.contact.has_friction
+        more = {name: whole[name] for name in OF_FRICTION if has_friction}
+        make = _patch_profile if side.in_space else _edge_profile
+        del whole["shear"], whole["sticks"]
+        found[name] = make(side, **whole, **more)
     return found
+
+
+def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> dict[str, Array]:
+    """The arrays ``(n, q)`` and ``(n, q, d)`` of a profile at all facets of the ``side``.
+    Collective."""
+    displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
+    # the frame's tangent runs along the opposite surface, which this one meets the other way round
+    shear = 0.0 - pair.shear
+    strength = getattr(pair.law, "friction", 0.0) * pair.pressure
+    here = {
+        "weight": side.weight,
+        "raw_pressure": pair.pressure,
+        "gap": pair.distance,
+        "slip": pair.slip,
+        "shear": shear,
+        "sticks": np.abs(shear) < (1 - _ON_CONE) * strength,
+        "coordinates": displaced,
+        "X": side.point,
+    }
+    if side.in_space:
+        here |= {"slip": pair.slips, "shear": pair.shears, "normal": side.outward}
+    columns = [np.atleast_3d(values) for values in here.values()]
+    together = np.concatenate(columns, axis=-1)
+    local = np.zeros((side.n_facets, *together.shape[1:]))
+    local[side.facet] = together
+    whole = side.sum_over_ranks(local)
+    ends = np.cumsum([column.shape[-1] for column in columns])[:-1]
+    parts = zip(here.items(), np.split(whole, ends, axis=-1), strict=True)
+    return {name: part if old.ndim == 3 else part[..., 0] for (name, old), part in parts}
+
+
+def _edge_profile(side: Surface, weight: Array, raw_pressure: Array, **others: Any) -> Any:
+    s = side.arc_length(side.curve_xi)
+    pressure = project(raw_pressure, s, weight)
+    return SurfaceProfile(
+        s=s, weight=weight, pressure=pressure, raw_pressure=raw_pressure, **others
+    )
+
+
+def _patch_profile(side: Surface, weight: Array, raw_pressure: Array, **others: Any) -> Any:
+    patches: Any = side.curve
+    return PatchProfile(
+        weight=weight,
+        pressure=project_on_patches(raw_pressure, side.curve_xi, weight),
+        raw_pressure=raw_pressure,
+        corners=patches.X[patches.vertices],
+        facet_pressure=(weight * raw_pressure).sum(axis=1) / weight.sum(axis=1),
+        **others,
+    )
+
+
+def project_on_patches(pressure: Array, xi: Array, weight: Array) -> Array:
+    """L2 projection ``(n, q)`` of ``pressure`` onto one function a facet that is linear in the
+    places ``xi`` ``(n, q, 2)`` on it; facet integrals are kept exactly."""
+    functions = np.concatenate([np.ones((*weight.shape, 1)), xi], axis=-1)
+    weighted = functions * weight[..., None]
+    moments = weighted.swapaxes(1, 2) @ functions
+    right = weighted.swapaxes(1, 2) @ pressure[..., None]
+    return (functions @ np.linalg.solve(moments, right))[..., 0]
 
 
 def project(pressure: Array, s: Array, weight: Array) -> Array:

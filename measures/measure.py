@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from archord.solver.path.system import System
 
 Column = tuple[str, Callable[[Record], Any]]  # heading, and its value of a step
-Place = tuple[float, ...]  # a largest value, and its place x, y
-_ORIGIN = (0.0, 0.0)
+Place = tuple[float, ...]  # a largest value, and the coordinates of its place
 
 
 @dataclass(frozen=True)
@@ -56,9 +55,14 @@ class Accepted:
         self.before = before
         self.residual = residual
         self.reaction: Callable[[str], Array] = cache(system.reaction)
-        self.reaction_moment = cache(lambda name: system.reaction_moment(name, _ORIGIN))
+        origin = [0.0] * system.problem.kinematics.dimension
+        self.reaction_moments: Callable[[str], Array] = cache(
+            lambda name: system.reaction_moments(name, origin)
+        )
         self.contact_force: Callable[[str], Array] = cache(system.contact_force)
-        self.contact_moment = cache(lambda name: system.contact_moment(name, _ORIGIN))
+        self.contact_moments: Callable[[str], Array] = cache(
+            lambda name: system.contact_moments(name, origin)
+        )
         self.quantities = cache(lambda name: system.contact.interface(name).quantities())
         self.largest_peeq: Callable[[str], Place] = cache(self._largest_peeq)
         self._found: dict[str, Any] = {}
@@ -72,6 +76,11 @@ class Accepted:
     def _largest_peeq(self, body: str) -> Place:
         found = next(given for given in self.system.problem.bodies if given.name == body)
         return self.system.largest_peeq(found)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The names of the coordinates."""
+        return self.system.problem.kinematics.axes
 
     @cached_property
     def driven(self) -> dict[str, tuple[float, float]]:
@@ -97,7 +106,7 @@ class Accepted:
 
     @cached_property
     def contact_area(self) -> float:
-        """Length of the surfaces in contact: of each interaction the mean of its sides."""
+        """Length or area of the surfaces in contact: of each interaction the mean of its sides."""
         met = self.met.values()
         return float(sum(np.mean([p.contact_length for p in profiles]) for profiles in met))
 

@@ -8,27 +8,37 @@ from typing import Any
 
 import numpy as np
 
-from archord.measures.edge import SurfaceProfile
+from archord.measures.edge import AnyProfile
 from archord.measures.measure import Accepted, Measure
 from archord.scene.columns import part_columns
 from archord.scene.problem import ProblemScene
 
 Value = Callable[[Accepted, str], float]  # of a part by its name
 
-_AXES = {"x": 0, "y": 1, "r": 0, "z": 1}  # in a plane, and of a body of revolution
+_AXES = ("x", "y", "z", "r")
 
 
-def _component(k: int, vector: Callable[[Accepted, str], Any]) -> Value:
-    return lambda state, part: vector(state, part)[k]
+def _component(axis: str, vector: Callable[[Accepted, str], Any], first: int) -> Value:
+    return lambda state, part: vector(state, part)[first + state.axes.index(axis)]
 
 
 def _along(prefix: str, vector: Callable[[Accepted, str], Any], first: int = 0) -> dict[str, Value]:
-    """The components of a ``vector`` by the names of their axes after a ``prefix``."""
-    return {f"{prefix}{axis}": _component(first + k, vector) for axis, k in _AXES.items()}
+    """The components of a ``vector``, the ``first`` and those after it, by the names of their axes
+    after a ``prefix``."""
+    return {f"{prefix}{axis}": _component(axis, vector, first) for axis in _AXES}
+
+
+def _moments(moments: Callable[[Accepted, str], Any]) -> dict[str, Value]:
+    """The one moment of a plane, and the moments about the axes of space."""
+    return {"moment": lambda state, part: moments(state, part)[-1], **_along("moment ", moments)}
 
 
 def _contact_length(state: Accepted, contact: str) -> float:
     return float(np.mean([profile.contact_length for profile in state.met[contact]]))
+
+
+def _contact_fraction(state: Accepted, contact: str) -> float:
+    return float(np.mean([p.contact_length / p.width.sum() for p in state.met[contact]]))
 
 
 _LOAD: dict[str, Value] = {
@@ -37,15 +47,16 @@ _LOAD: dict[str, Value] = {
 }
 _SUPPORT: dict[str, Value] = {
     **_along("", lambda state, support: state.reaction(support)),
-    "moment": lambda state, support: state.reaction_moment(support),
+    **_moments(lambda state, support: state.reaction_moments(support)),
 }
 _INTERACTION: dict[str, Value] = {
     **_along("force ", lambda state, contact: state.contact_force(contact)),
-    "moment": lambda state, contact: state.contact_moment(contact),
+    **_moments(lambda state, contact: state.contact_moments(contact)),
     "largest pressure": lambda state, contact: _most_pressed(state, contact).largest[0],
     **_along("at ", lambda state, contact: _most_pressed(state, contact).largest[1]),
     "contact length": _contact_length,
-    "contact area": _contact_length,  # of a ring, whose measure has 2 pi r
+    "contact area": _contact_length,  # of a ring, whose measure has 2 pi r, and in space
+    "contact fraction": _contact_fraction,
     "largest slip": lambda state, contact: max(p.largest_slip for p in state.met[contact]),
     "arcs": lambda state, contact: state.met[contact][-1].n_arcs,
     "largest shear": lambda state, contact: max(p.largest_shear for p in state.met[contact]),
@@ -81,6 +92,6 @@ def _of_law(quantity: str) -> Value:
     return lambda state, contact: state.quantities(contact)[quantity][0]
 
 
-def _most_pressed(state: Accepted, contact: str) -> SurfaceProfile:
+def _most_pressed(state: Accepted, contact: str) -> AnyProfile:
     """The surface of an interaction with the largest pressure."""
     return max(state.met[contact], key=lambda profile: profile.largest[0])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.materials.elasticity import mean_stress, von_mises
-from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN
+from archord.materials.kinematics import AXISYMMETRIC, SPACE
 from archord.materials.material import Array
 from archord.report.errors import InputError
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # what else fields.h5 and exports have
 _TAKEN = ("accepted", "load", "mesh", "edges", "points", "cells", "body", "displacement")
-_COMPONENTS = ("nodal", *PLANE_STRAIN.names, *AXISYMMETRIC.names)
+_COMPONENTS = ("nodal", *SPACE.names, *AXISYMMETRIC.names)  # of a plane, too
 _NAME = re.compile(r"\w[\w .()-]*")
 _ALLOWED = "it may have letters, digits, spaces and any of _ . ( ) -"
 
@@ -37,8 +37,9 @@ class CellField:
     - ``label``, ``unit``: in pictures; the unit may be "{stress}" or "{length}", the scene's, and
       "%" makes percents of fractions
     - ``values``: a function of a body's `PointFields` that returns values ``(n, q)`` or tensors
-      ``(n, q, 4)``; where it is ``on_contact``, of a `Pair`, values ``(f, q)`` on its surface
-    - ``on_contact``: whether it is the mean over the cell's edges in contact surfaces, 0 without
+      ``(n, q, 4)``, in space ``(n, q, 6)``; where it is ``on_contact``, of a `Pair`, values
+      ``(f, q)`` on its surface
+    - ``on_contact``: whether it is the mean over the cell's facets in contact surfaces, 0 without
     - ``of_yielding``: whether only problems in which a body can yield have it
     - ``nodal``: whether it is recovered at the nodes, too (``output.fields = "nodes"``), and kept
       at the integration points (``"points"``)
@@ -114,8 +115,8 @@ def own_rows(own: Mapping[str, Callable[[Any], Array]]) -> list[CellField]:
 def cell_means(
     system: System, parts: Sequence[PointFields], rows: Sequence[CellField]
 ) -> dict[str, Array]:
-    """The means ``(n_cells,)`` or ``(n_cells, 4)`` of this rank's cells by name, from the ``parts``
-    at the integration points."""
+    """The means ``(n_cells,)``, or ``(n_cells, 4)`` and in space ``(n_cells, 6)``, of this rank's
+    cells by name, from the ``parts`` at the integration points."""
     found = {}
     for row in rows:
         if row.on_contact:

@@ -22,6 +22,7 @@ from archord.geometry.patch_recovery import PatchRecovery
 from archord.output.cell_fields import CELL_FIELDS, CellField, cell_means
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import StepFile, times
+from archord.output.files.vtkhdf import in_space
 from archord.output.files.xdmf import CELLS, step_grid, steps_text
 from archord.solver.path.mesh_order import Arrays, MeshOrder
 
@@ -29,8 +30,8 @@ from archord.solver.path.mesh_order import Arrays, MeshOrder
 def collect_mesh(order: MeshOrder, at_points: bool = True) -> Arrays:
     """What does not change, on rank 0; nothing elsewhere. Collective.
 
-    "mesh/body" ``(m,)`` of the cells; "edges/NAME" ``(k, 2)`` of every named set of facets, their
-    vertices as nodes of the mesh; "points/coordinates" ``(m, q, 2)`` of the integration points.
+    "mesh/body" ``(m,)`` of the cells; "edges/NAME" ``(k, v)`` of every named set of facets, their
+    vertices as nodes of the mesh; "points/coordinates" ``(m, q, d)`` of the integration points.
     """
     found = {"mesh/body": order.bodies()}
     for name, ends in order.facet_sets().items():
@@ -46,10 +47,10 @@ def collect_fields(
 ) -> Arrays:
     """The last accepted state of the whole mesh by name, on rank 0; nothing elsewhere. Collective.
 
-    "displacement" ``(n, 2)`` of the nodes. Means of the cells by the rows of `CELL_FIELDS` and the
-    user's ``own``: scalars ``(m,)``, and tensors "cells/NAME" ``(m, 4)``. With ``at_points`` also
-    those values at the integration points that are recovered at nodes, "points/NAME"
-    ``(m, q, ...)``.
+    "displacement" ``(n, d)`` of the nodes. Means of the cells by the rows of `CELL_FIELDS` and the
+    user's ``own``: scalars ``(m,)``, and tensors "cells/NAME" ``(m, 4)``, in space ``(m, 6)``. With
+    ``at_points`` also those values at the integration points that are recovered at nodes,
+    "points/NAME" ``(m, q, ...)``.
     """
     system = order.system
     u = system.equilibrium.displacement()
@@ -94,14 +95,17 @@ class FieldWriter:
         self._grids: list[str] = []  # of the steps so far, as fields.xdmf has them
         self._recovery = None
         if "points/coordinates" in mesh:
-            vertices = cells[:, : second.corners]
+            corners = second.cells[:, : second.corners]
             places = mesh["points/coordinates"]
             degree = order.system.problem.degree
-            self._recovery = PatchRecovery(x[:, :2], vertices, second.between, places, degree)
+            nodes = x[:, : places.shape[-1]]
+            self._recovery = PatchRecovery(
+                order.kind, nodes, corners, second.between, places, degree
+            )
         fixed = {"mesh/coordinates": x, "mesh/cells": cells}
         for name, values in mesh.items():
             if name.startswith("edges/"):
-                fixed[name] = second.along(values)
+                fixed[name] = self._in_vtk_order(second.sides(values))
             elif points or not name.startswith("points/"):
                 fixed[name] = values
         self._file = StepFile(folder / "fields.h5", fixed, after, apart=True)
@@ -110,7 +114,7 @@ class FieldWriter:
         """Add a step, reached at ``load``, with what `collect_fields` returned. Raises
         `OSError`."""
         displacement = self._second(fields["displacement"])
-        arrays = {"displacement": np.pad(displacement, ((0, 0), (0, 1)))}
+        arrays = {"displacement": in_space(displacement)}
         at_points = {name: v for name, v in fields.items() if name.startswith("points/")}
         of_nodes = self._at_nodes(at_points)
         arrays |= of_nodes
@@ -120,6 +124,12 @@ class FieldWriter:
         self._file.write(load, arrays)
         of_cells = [name for name in fields if "/" not in name and name != "displacement"]
         self._write_xdmf(list(of_nodes), of_cells)
+
+    def _in_vtk_order(self, sides: np.ndarray) -> np.ndarray:
+        """Nodes ``(k, b)`` of faces in VTK's order, from basix'; edges as they are."""
+        if sides.shape[1] not in CELLS:
+            return sides
+        return sides[:, CELLS[sides.shape[1]][1]]
 
     def _at_nodes(self, at_points: Arrays) -> Arrays:
         """Nodal ``(n,)`` components of tensors, as "stress_xx", and scalars, as "peeq_nodal", from

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from archord.materials.material import Array
-from archord.measures.edge import SurfaceProfile
+from archord.measures.edge import AnyProfile, PatchProfile, SurfaceProfile
 from archord.output.files.seal import require_intact
 from archord.output.files.step_file import step_name
 from archord.presets.arc import ArcProfile
@@ -41,7 +41,8 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
 
 def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
     """The integrated surfaces of the run of ``scene`` at ``step`` (from 1): `SurfaceProfile` by
-    name, of a joint `ArcProfile` of "pin" and "hole". Raises `InputError` as `opened`."""
+    name, in space `PatchProfile`, of a joint `ArcProfile` of "pin" and "hole". Raises `InputError`
+    as `opened`."""
     with opened(folder, "contact", step) as file:
         found = {
             name: _arrays_of(group, step)
@@ -49,7 +50,9 @@ def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
             if isinstance(group, h5py.Group)
         }
         if not any("angle" in arrays for arrays in found.values()):
-            return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}
+            in_space = scene.analysis.plane == "space"
+            make: Any = PatchProfile if in_space else SurfaceProfile
+            return {name: make(**arrays) for name, arrays in found.items()}
         profiles = {}
         for name in _OF_ARCS:
             if name in found:
@@ -69,14 +72,14 @@ def _arrays_of(surface: h5py.Group, step: int) -> dict[str, Array]:
     }
 
 
-def undeformed(profile: ArcProfile | SurfaceProfile, side: str, scene: Any) -> Array:
-    """Points ``(n, q, 2)`` of a surface before it is loaded; of a joint's ``side`` on its circle,
+def undeformed(profile: ArcProfile | AnyProfile, side: str, scene: Any) -> Array:
+    """Points ``(n, q, d)`` of a surface before it is loaded; of a joint's ``side`` on its circle,
     in the mesh's frame.
 
     The hole's centre is the origin. So is the pin's in a ring; in a block it touches the hole,
     ``(0, -dR)``.
     """
-    if isinstance(profile, SurfaceProfile):
+    if isinstance(profile, AnyProfile):
         return profile.X
     centre = -scene.joint.pin_depth if side == "pin" else 0.0
     x = profile.radius * np.sin(profile.angle)

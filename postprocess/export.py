@@ -2,9 +2,9 @@
 (ParaView, pyvista).
 
 In VTK the bodies keep their curved second-order cells, as fields.h5 has them. The contact is a line
-through the integration points of each facet; the integration points of the bodies, where the run
-kept them, are vertices. All hold undeformed points and their displacement, so that the same filters
-deform them.
+through the integration points of each facet, in space a vertex at each of them; the integration
+points of the bodies, where the run kept them, are vertices. All hold undeformed points and their
+displacement, so that the same filters deform them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from archord.output.files.vtkhdf import (
     VERTEX,
     Arrays,
     Grid,
+    in_space,
     write_vtkhdf,
 )
 from archord.output.files.xdmf import CELLS
@@ -82,11 +83,11 @@ def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     """All bodies, and their data at a step."""
     mesh = run.fields(step)
     kind = SECOND_ORDER[mesh.cells.shape[1]]
-    grid = Grid(_in_space(mesh.coordinates), mesh.cells, kind, {"CellData/body": mesh.body})
+    grid = Grid(in_space(mesh.coordinates), mesh.cells, kind, {"CellData/body": mesh.body})
 
     def values(step: int) -> Arrays:
         fields = run.fields(step)
-        found = {"PointData/displacement": _in_space(fields.displacement)}
+        found = {"PointData/displacement": in_space(fields.displacement)}
         for name, nodal in (fields.nodal | fields.nodal_fields()).items():
             found[f"PointData/{name}"] = _for_vtk(nodal)
         for name, means in fields.cell.items():
@@ -97,18 +98,24 @@ def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
 
 
 def _contact(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
-    """The integration points of the surfaces, joined by lines within each facet, and their data at
-    a step; ``side`` counts the surfaces from 1, of a joint pin and hole."""
+    """The integration points of the surfaces, in a plane joined by lines within each facet, and
+    their data at a step; ``side`` counts the surfaces from 1, of a joint pin and hole."""
     table = run.pressure(step)
     facet = table["facet"].to_numpy()
     side = table["side"].map(run.sides.index).to_numpy(np.int8) + 1
-    first = np.flatnonzero((np.diff(facet) == 0) & (np.diff(side) == 0))
-    lines = np.stack([first, first + 1], axis=1)
-    grid = Grid(_in_space(table[["x", "y"]].to_numpy()), lines, LINE, {"PointData/side": side})
+    axes = [axis for axis in "xyz" if axis in table]
+    if len(axes) == 3:
+        cells = np.arange(len(table))[:, None]
+    else:
+        first = np.flatnonzero((np.diff(facet) == 0) & (np.diff(side) == 0))
+        cells = np.stack([first, first + 1], axis=1)
+    kind = VERTEX if len(axes) == 3 else LINE
+    grid = Grid(in_space(table[axes].to_numpy()), cells, kind, {"PointData/side": side})
+    displacements = [f"u{axis}" for axis in axes]
 
     def values(step: int) -> Arrays:
         table = run.pressure(step)
-        found = {"PointData/displacement": _in_space(table[["ux", "uy"]].to_numpy())}
+        found = {"PointData/displacement": in_space(table[displacements].to_numpy())}
         for name in _OF_CONTACT:
             if name in table:
                 found[f"PointData/{name}"] = table[name].to_numpy()
@@ -120,24 +127,32 @@ def _contact(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
 def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     """A vertex for each integration point, and their data at a step; they move as the second-order
     cells around them."""
-    from archord.geometry.basis import QUADRILATERAL, TRIANGLE, bulk_quadrature, tabulate
+    from archord.geometry.basis import (
+        HEXAHEDRON,
+        QUADRILATERAL,
+        TETRAHEDRON,
+        TRIANGLE,
+        bulk_quadrature,
+        tabulate,
+    )
 
     mesh = run.fields(step)
     x = run.points(step)["coordinates"]
-    m, q, _ = x.shape
-    kind = {6: TRIANGLE, 9: QUADRILATERAL}[mesh.cells.shape[1]]
+    m, q, d = x.shape
+    kinds = {6: TRIANGLE, 9: QUADRILATERAL, 10: TETRAHEDRON, 27: HEXAHEDRON}
+    kind = kinds[mesh.cells.shape[1]]
     reference, _ = bulk_quadrature(kind, run.scene.analysis.degree)
     _, in_vtk_order = CELLS[mesh.cells.shape[1]]
     cells = mesh.cells[:, np.argsort(in_vtk_order)]
     shape = tabulate(kind, 2, reference)[0]
     vertices = np.arange(m * q)[:, None]
     body = np.repeat(mesh.body, q)
-    grid = Grid(_in_space(x.reshape(m * q, 2)), vertices, VERTEX, {"CellData/body": body})
+    grid = Grid(in_space(x.reshape(m * q, d)), vertices, VERTEX, {"CellData/body": body})
 
     def values(step: int) -> Arrays:
         nodal = run.fields(step).displacement[cells]
-        displacement = np.einsum("qa,mak->mqk", shape, nodal).reshape(m * q, 2)
-        found = {"PointData/displacement": _in_space(displacement)}
+        displacement = np.einsum("qa,mak->mqk", shape, nodal).reshape(m * q, d)
+        found = {"PointData/displacement": in_space(displacement)}
         at_points = run.points(step)
         del at_points["coordinates"]
         for name, array in at_points.items():
@@ -147,13 +162,9 @@ def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     return grid, values
 
 
-def _in_space(values: Array) -> Array:
-    return np.pad(values, ((0, 0), (0, 1)))
-
-
 def _for_vtk(values: Array) -> Array:
-    """Tensors ``(n, 4)`` with the components of VTK: xx, yy, zz, xy, yz, xz; others as they
-    are."""
+    """Tensors ``(n, 4)`` with the components of VTK: xx, yy, zz, xy, yz, xz, as tensors in space
+    have them; others as they are."""
     return np.pad(values, ((0, 0), (0, 2))) if values.shape[1:] == (4,) else values
 
 

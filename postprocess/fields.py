@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from archord.materials.elasticity import principal_stresses, von_mises
-from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN
+from archord.materials.kinematics import PLANE_STRAIN, kinematics
 from archord.materials.material import Array
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
@@ -175,10 +175,11 @@ def read_fields(
     """
     _require(bool(scene.output.fields), folder, scene, "fields")
     with opened(folder, "fields", step) as file:
-        components = AXISYMMETRIC.names if "stress_rr" in file else PLANE_STRAIN.names
+        kind = kinematics(scene.analysis.plane)
+        components = kind.names
         body = file["mesh/body"][()]
         arrays = _arrays_at(file, step)
-        displacement = arrays.pop("displacement")[:, :2]
+        displacement = arrays.pop("displacement")[:, : kind.dimension]
         cell = {name: values for name, values in arrays.items() if len(values) == len(body)}
         if "cells" in file:
             cell |= _arrays_at(file["cells"], step)
@@ -186,7 +187,7 @@ def read_fields(
         return Fields(
             step=step,
             delta=float(file["load"][step - 1]),
-            coordinates=file["mesh/coordinates"][:, :2],
+            coordinates=file["mesh/coordinates"][:, : kind.dimension],
             cells=file["mesh/cells"][()],
             body=body,
             displacement=displacement,

@@ -15,7 +15,9 @@ from archord.postprocess.arc import undeformed
 from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
-_LENGTHS = ("s", "weight", "gap", "x", "y", "ux", "uy")
+_VECTORS = ("normal", "slip", "shear")  # at points in space
+_LENGTHS = ("s", "weight", "gap", "x", "y", "z", "ux", "uy", "uz", "slip_x", "slip_y", "slip_z")
+_STRESSES = ("pressure", "raw_pressure", "shear_x", "shear_y", "shear_z")
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
 
 
@@ -62,19 +64,27 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
     undeformed.
 
     ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both
-    positive in compression; ``weight`` is arc length; ``gap`` is positive when open.
+    positive in compression; ``weight`` is arc length, in space area; ``gap`` is positive when
+    open. Slip, shear and the normal have components in space.
     """
     units = dict.fromkeys(_LENGTHS, scene.units.length)
     units["angle"] = "rad"
-    units |= dict.fromkeys(("pressure", "raw_pressure"), scene.units.stress)
+    units |= dict.fromkeys(_STRESSES, scene.units.stress)
     parts = []
+    axes = "xyz" if scene.analysis.plane == "space" else "xy"
     for side, arc in arcs.items():
         X = undeformed(arc, side, scene)
         u = arc.coordinates - X
         facet = np.arange(1, len(X) + 1)[:, None]
         columns = {"facet": np.broadcast_to(facet, X.shape[:2])}
         columns |= {name: getattr(arc, name) for name in _OF_POINTS if hasattr(arc, name)}
-        columns |= {"x": X[..., 0], "y": X[..., 1], "ux": u[..., 0], "uy": u[..., 1]}
+        vectors = {"": X, "u": u}
+        if len(axes) == 3:
+            units["weight"] = f"{scene.units.length}2"
+            given = {f"{name}_": getattr(arc, name) for name in _VECTORS}
+            vectors |= {name: values for name, values in given.items() if values is not None}
+        for name, values in vectors.items():
+            columns |= {f"{name}{axis}": values[..., k] for k, axis in enumerate(axes)}
         flat = {name: values.ravel() for name, values in columns.items()}
         parts.append(pd.DataFrame({"side": side} | flat))
     return frame_of(pd.concat(parts, ignore_index=True), units)

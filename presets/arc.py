@@ -22,7 +22,7 @@ _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of th
 _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ArcProfile(EdgeProfile):
     """One side's contact state on an arc of ``radius``, its facets ordered from the contact axis.
 

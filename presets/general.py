@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from archord.measures.account import Account, Driven, Values, sizes
 from archord.measures.doubts import contrast_doubts, stiff_quadrilaterals
-from archord.measures.edge import per_step, surface_profiles
+from archord.measures.edge import fixed, per_step, surface_profiles
 from archord.measures.energies import ENERGIES
 from archord.measures.measure import Accepted, Column, column
 from archord.measures.parts import part_measures
@@ -82,7 +83,7 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         [*by_factor, *(measure.column for measure in measures), *_last_columns(scene, system)],
         driven=partial(_driven, system, [load.name for load in scene.load]),
         profiles=partial(surface_profiles, system),
-        fixed=("s", "weight", "X"),
+        fixed=fixed(system),
         per_step=(*per_step(system), "slip"),
         balance=_balance_of(scene, system.problem.kinematics.axes),
         facts=partial(_facts, scene, system, file),
@@ -114,10 +115,11 @@ def _balance_of(scene: ProblemScene, axes: Sequence[str]) -> Callable[[Accepted,
     """How far forces are from balance, over the largest force of the run so far."""
     names = [f"{name} " for name in supporting(scene)]
     names += [f"{part.name} force " for part in scene.interaction]
-    forces = [(name + axes[0], name + axes[1]) for name in names]
+    forces = [[name + axis for axis in axes] for name in names]
 
     def balance(state: Accepted, values: Values) -> float:
-        before = [np.hypot(m[x], m[y]) for m in state.before for x, y in forces]
+        steps = product(state.before, forces)
+        before = [math.hypot(*(m[component] for component in force)) for m, force in steps]
         return state.system.force_balance(float(max(before, default=0.0)))
 
     return balance

@@ -56,7 +56,7 @@ class ProblemView:
         pulling = {
             load.name
             for load in self.scene.load
-            if load.pressure is None and load.direction != "rotation"
+            if load.pressure is None and not str(load.direction).startswith("rotation")
         }
         return {name: column for name, column in self.forces.items() if name in pulling}
 
@@ -241,7 +241,7 @@ def _peeq_at_contact(m: Record) -> float:
 def plane_words(scene: Any) -> str:
     """The kinematics of a ``scene`` in words."""
     plane = scene.analysis.plane
-    return plane if plane == "axisymmetric" else f"plane {plane}"
+    return plane if plane in ("axisymmetric", "space") else f"plane {plane}"
 
 
 def given(part: Any) -> str:

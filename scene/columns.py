@@ -42,31 +42,41 @@ def part_columns(scene: Parts) -> Iterator[Column]:
     """The columns of loads, supports, interactions and bodies of ``scene``, in order."""
     units = scene.units
     length = units.length
-    ring = scene.analysis.plane == "axisymmetric"
+    plane = scene.analysis.plane
     depth = scene.analysis.depth
     force = units.force_of(depth)
     moment = units.energy_of(depth)
     volume = f"{length}{3 if depth else 2}"  # displaced; per unit thickness an area
-    axes = "rz" if ring else "xy"
+    axes = {"axisymmetric": "rz", "space": "xyz"}.get(plane, "xy")
     for load in scene.load:
-        moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)
+        turns = (load.direction or "").startswith("rotation")
+        moved, by = ("rad", moment) if turns else (length, force)
         if load.kind == "pressure":
             moved = volume
             by = units.stress
         yield "load", load.name, "displacement", moved
         yield "load", load.name, "force", by
     couplings = {coupling.name for coupling in scene.coupling}
-    turned = {} if ring else {"moment": moment}  # a ring has none
+    turned = {"moment": moment}
+    if plane == "axisymmetric":
+        turned = {}  # a ring has none
+    elif plane == "space":
+        turned = {f"moment {axis}": moment for axis in axes}
     for name in supporting(scene):
         section = "coupling" if name in couplings else "support"
         for what, unit in (dict.fromkeys(axes, force) | turned).items():
             yield section, name, what, unit
     places = [f"at {axis}" for axis in axes]
-    touching = {"contact area": f"{length}2"} if ring else {"contact length": length}
+    touching = {"contact length": length, "largest slip": length, "arcs": ""}
+    if plane == "axisymmetric":
+        touching = {"contact area": f"{length}2", "largest slip": length, "arcs": ""}
+    elif plane == "space":
+        touching = {"contact area": f"{length}2", "contact fraction": "", "largest slip": length}
     for interaction in scene.interaction:
         measured = {f"force {axis}": force for axis in axes}
+        measured |= turned if plane == "space" else {}
         measured |= {"largest pressure": units.stress} | dict.fromkeys(places, length)
-        measured |= touching | {"largest slip": length, "arcs": ""}
+        measured |= touching
         if interaction.has_friction:
             measured |= turned | {"largest shear": units.stress}
         for what, unit in (measured | interaction.quantities).items():

@@ -7,7 +7,13 @@ import basix
 import numpy as np
 
 from archord.geometry.basis import Array, dimension_of, order_of, tabulate
-from archord.geometry.meshes.cells import distinct, entities_of, n_corners
+from archord.geometry.meshes.cells import (
+    distinct,
+    entities_of,
+    n_corners,
+    sides_between,
+    sides_of,
+)
 
 
 class SecondOrder:
@@ -24,6 +30,7 @@ class SecondOrder:
 
     def __init__(self, kind: basix.CellType, nodes: np.ndarray) -> None:
         order = order_of(kind, nodes.shape[1])
+        self._kind = kind
         m = len(nodes)
         self.corners = n_corners(kind)
         self._vertices, vertex = np.unique(nodes[:, : self.corners], return_inverse=True)
@@ -56,11 +63,13 @@ class SecondOrder:
         ]
         return np.concatenate([values[self._vertices], *middles])
 
-    def along(self, ends: np.ndarray) -> np.ndarray:
-        """Nodes ``(k, 3)`` of edges with the vertices ``ends`` ``(k, 2)``: the first one, the
-        middle, the last one."""
-        edges = self.between[0]
-        wanted = np.searchsorted(self._vertices, ends)
-        first, which = distinct(np.concatenate([edges, wanted]))
-        middle = len(self._vertices) + first[which[len(edges) :]]
-        return np.column_stack([wanted[:, 0], middle, wanted[:, 1]])
+    def sides(self, corners: np.ndarray) -> np.ndarray:
+        """Nodes of the sides of cells with the vertices ``corners`` ``(k, c)``: of edges ``(k, 3)``
+        the first one, the middle, the last one; of faces ``(k, 6)`` or ``(k, 9)`` in basix'
+        order."""
+        wanted = np.searchsorted(self._vertices, corners)
+        found = sides_between(self._kind, self.cells, wanted)
+        sides = sides_of(self._kind, self.cells)[found]
+        if corners.shape[1] > 2:
+            return sides
+        return np.column_stack([wanted[:, 0], sides[:, 2], wanted[:, 1]])

@@ -16,7 +16,7 @@ Arrays = dict[str, np.ndarray]
 # VTK's numbers of cells; of curved ones of second order by the number of their nodes
 VERTEX = 1
 LINE = 3
-SECOND_ORDER = {6: 22, 9: 28}
+SECOND_ORDER = {6: 22, 9: 28, 10: 24, 27: 29}
 _COUNTED = {"Points": "Points", "Cells": "Types", "ConnectivityIds": "Connectivity"}
 
 
@@ -76,6 +76,11 @@ def write_vtkhdf(
                         steps[_offsets(name)] = np.arange(n) * rows
                     root[name][k * rows : (k + 1) * rows] = array
         target.require_written()
+
+
+def in_space(vectors: np.ndarray) -> np.ndarray:
+    """Vectors ``(n, d)`` with three components."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _offsets(name: str) -> str:

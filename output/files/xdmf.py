@@ -7,10 +7,15 @@ from collections.abc import Sequence
 from archord.output.files.step_file import step_name
 
 # By nodes of second-order cells: XDMF's name, and VTK's order of basix' nodes, which counts both
-# corners and edges all around
+# corners and edges all around; of hexahedra below, above, and between, then the faces
+_CORNERS = [0, 1, 3, 2, 4, 5, 7, 6]
+_MIDDLES = [8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 15, 14]
+_FACES = [22, 23, 21, 24, 20, 25]
 CELLS = {
     6: ("Triangle_6", [0, 1, 2, 5, 3, 4]),
     9: ("Quadrilateral_9", [0, 1, 3, 2, 4, 6, 7, 5, 8]),
+    10: ("Tetrahedron_10", [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]),
+    27: ("Hexahedron_27", [*_CORNERS, *_MIDDLES, *_FACES, 26]),
 }
 
 

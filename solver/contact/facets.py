@@ -21,6 +21,7 @@ class BoundaryFacets:
     """
 
     cells: np.ndarray  # (n,) the cell behind each facet
+    number: np.ndarray  # (n,) the same on any number of ranks, by the cells as they were given
     trace: np.ndarray  # (n, k) nodes on the facet within the cell
     origin: Array  # (n, d) in the reference cell
     axes: Array  # (n, d - 1, d) from there to where each axis ends
@@ -63,7 +64,18 @@ def boundary_facets(V: fem.FunctionSpace, facets: np.ndarray) -> BoundaryFacets:
     on_facet = origin[:, None] + facet_nodes(facet_kind(kind), degree) @ axes
     in_cell = lagrange_element(kind, degree).points
     distance = np.linalg.norm(on_facet[:, :, None] - in_cell, axis=-1)
-    return BoundaryFacets(cells, distance.argmin(axis=-1), origin, axes, within)
+    number = _given_number(V.mesh)[cells] * len(vertices_of_facets) + local_facets
+    return BoundaryFacets(cells, number, distance.argmin(axis=-1), origin, axes, within)
+
+
+def _given_number(mesh: Mesh) -> np.ndarray:
+    """The numbers of this rank's cells in the mesh as it was given; of a submesh, which does not
+    know them, in the mesh on all ranks."""
+    index_map = mesh.topology.index_map(mesh.topology.dim)
+    try:
+        return np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+    except RuntimeError:
+        return index_map.local_range[0] + np.arange(index_map.size_local)
 
 
 def _owned_facets(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -222,6 +222,11 @@ class Pair:
         return self._by_facets(_along_surface(slips))
 
     @property
+    def slips(self) -> Array:
+        """The same ``(n, q, d)`` as vectors."""
+        return self._on_surface(self._in_frame(self._moved_apart()))
+
+    @property
     def pressure(self) -> Array:
         """Pressure ``(n, q)`` at the points of this rank's facets."""
         return self._by_facets(self.traction[:, 0])
@@ -231,6 +236,17 @@ class Pair:
         """Shear ``(n, q)`` on the own surface, positive along the tangent of the frame; its size in
         space."""
         return self._by_facets(_along_surface(list(self.traction[:, 1:].T)))
+
+    @property
+    def shears(self) -> Array:
+        """The same ``(n, q, d)`` as vectors."""
+        return self._on_surface(self.traction)
+
+    def _on_surface(self, components: Array) -> Array:
+        """The part ``(n, q, d)`` along the tangents of vectors with these ``components``
+        ``(m, d)``."""
+        vectors = np.einsum("mki,mk->mi", self.frame[:, 1:], components[:, 1:])
+        return vectors.reshape(self.surface.point.shape)
 
     def _by_facets(self, values: Array) -> Array:
         """Values ``(m,)`` of the points as those ``(n, q)`` of facets."""

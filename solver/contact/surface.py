@@ -109,9 +109,9 @@ class Surface:
         own_dofs = np.take_along_axis(cell_global, found.trace, axis=1)
         own_x = nodes[np.take_along_axis(cell_dofs, found.trace, axis=1)]
 
-        of_ranks = self.comm.allgather((own_dofs, own_x, found.within))
-        dofs, x, within = (np.concatenate(parts) for parts in zip(*of_ranks, strict=True))
-        order = self._ordered(dofs, x, within)
+        of_ranks = self.comm.allgather((own_dofs, own_x, found.within, found.number))
+        dofs, x, within, number = (np.concatenate(parts) for parts in zip(*of_ranks, strict=True))
+        order = self._ordered(dofs, x, within, number)
         unique, first, node = np.unique(dofs[order], return_index=True, return_inverse=True)
         along = np.argsort(first)  # the nodes in the order of the facets
         self.curve_dofs = unique[along]
@@ -132,15 +132,17 @@ class Surface:
         self._origin = found.origin
         self._axes = found.axes
 
-    def _ordered(self, dofs: np.ndarray, x: Array, within: np.ndarray) -> np.ndarray:
+    def _ordered(
+        self, dofs: np.ndarray, x: Array, within: np.ndarray, number: np.ndarray
+    ) -> np.ndarray:
         """The order of the facets with nodes ``dofs`` ``(n, k)`` at ``x`` ``(n, k, d)``: along
-        curves, as they come in space. Raises ValueError for what is no boundary."""
+        curves, in space by their ``number`` ``(n,)``. Raises ValueError for what is no boundary."""
         kind = facet_kind(self.V.mesh.basix_cell())
         if kind != basix.CellType.interval:
             n_corners = len(basix.geometry(kind))
             middle = x[:, :n_corners].mean(axis=1)
             refuse_all_but_a_boundary(self.name, dofs[:, :n_corners], middle, within)
-            return np.arange(len(dofs))
+            return np.argsort(number)
         refuse_all_but_a_boundary(self.name, dofs[:, [0, -1]], x.mean(axis=1), within)
         refuse_branches(self.name, dofs, x)
         return in_pieces(dofs[:, 0], dofs[:, -1], x[:, 0] @ _ASKEW)

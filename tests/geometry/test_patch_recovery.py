@@ -1,6 +1,8 @@
 """Nodal values from those at integration points: what is reproduced, and how fast the error falls,
 also at edges."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -37,8 +39,8 @@ def test_polynomials_of_the_degree_are_reproduced_at_every_node(degree, size, qu
     nodes = SecondOrder(order.kind, order.nodes_of_cell)
     x = nodes(order.coordinates)[:, :2]
     places = collect_mesh(order)["points/coordinates"]
-    corners = [0, 1, 3, 2] if quads else [0, 1, 2]
-    recovery = PatchRecovery(x, nodes.cells[:, corners], nodes.between, places, degree)
+    corners = nodes.cells[:, : nodes.corners]
+    recovery = PatchRecovery(order.kind, x, corners, nodes.between, places, degree)
 
     def polynomial(x):
         powers = [
@@ -56,8 +58,13 @@ def recovered(system, folder):
     order = MeshOrder(system)
     writer = FieldWriter(folder, order, collect_mesh(order))
     writer.write(1.0, collect_fields(order))
-    scene = type("Scene", (), {"output": type("Output", (), {"fields": True})})
-    return read_fields(folder, scene, 1)
+    return read_fields(folder, of_run(system), 1)
+
+
+def of_run(system):
+    """What readers ask of the scene of a run."""
+    analysis = SimpleNamespace(plane=system.problem.kinematics.name)
+    return SimpleNamespace(output=SimpleNamespace(fields=True), analysis=analysis)
 
 
 @pytest.mark.parametrize("quads", [False, True])
@@ -133,9 +140,7 @@ def test_all_ranks_together_write_what_one_writes(comm, tmp_path_factory):
         for folder, (m, f, o) in zip(folders, found, strict=True):
             writer = FieldWriter(folder, o, m, points=True)
             writer.write(1.0, f)
-            read.append(
-                read_fields(folder, type("S", (), {"output": type("O", (), {"fields": True})}), 1)
-            )
+            read.append(read_fields(folder, of_run(system), 1))
         np.testing.assert_allclose(read[0].stress, read[1].stress, atol=1e-9)
         np.testing.assert_array_equal(read[0].edges["inner"], read[1].edges["inner"])
 
@@ -148,8 +153,8 @@ def test_at_corners_near_points_count_more():
     nodes = SecondOrder(order.kind, order.nodes_of_cell)
     x = nodes(order.coordinates)[:, :2]
     places = collect_mesh(order)["points/coordinates"]
-    cells = nodes.cells[:, [0, 1, 3, 2]]
-    recovery = PatchRecovery(x, cells, nodes.between, places, 2)
+    cells = nodes.cells[:, : nodes.corners]
+    recovery = PatchRecovery(order.kind, x, cells, nodes.between, places, 2)
     found = recovery((places**3).sum(axis=-1)[..., None])[:, 0]
     for end in ((A, 0), (B, 0), (0, A), (0, B)):
         corner = np.linalg.norm(x - end, axis=1).argmin()

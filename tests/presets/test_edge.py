@@ -18,7 +18,16 @@ def profile(chords: list[tuple[float, float]], pressed: list[bool]) -> SurfacePr
     weight = np.abs(np.diff(ends, axis=1)) / 2 * np.ones(2)
     raw = np.where(pressed, 1.0, 0.0)[:, None] * np.ones(2)
     zero = np.zeros_like(raw)
-    return SurfaceProfile(ends, weight, X, raw, raw, zero, X, zero)
+    return SurfaceProfile(
+        s=ends,
+        weight=weight,
+        coordinates=X,
+        pressure=raw,
+        raw_pressure=raw,
+        gap=zero,
+        X=X,
+        slip=zero,
+    )
 
 
 ONE_PIECE = [(0, 1), (1, 2), (2, 3), (3, 4)]

@@ -36,7 +36,7 @@ def test_the_largest_peeq_is_told_with_its_place():
     """In the columns of their names, of each body that can yield."""
     scene = load_scene(Path(__file__).parents[2] / "scenes" / "lug.toml")
     places = {body.name: (0.1 + k, 2.0 + k, 3.0 + k) for k, body in enumerate(scene.body)}
-    state = SimpleNamespace(largest_peeq=places.get)
+    state = SimpleNamespace(largest_peeq=places.get, axes=("x", "y"))
     told = {measure.name: measure for measure in part_measures(scene)}
     yielding = [body.name for body in scene.body if body.plastic]
     assert yielding

@@ -1,0 +1,210 @@
+"""Runs of problems in space: what their folders hold, on any number of ranks, and after a kill."""
+
+from __future__ import annotations
+
+import signal
+
+import h5py
+import numpy as np
+import pytest
+from dolfinx.mesh import CellType
+from vtkmodules.vtkCommonCore import reference
+
+import archord
+from archord import Body, Elastic, Interaction, Load, Problem, Support
+from archord.commands.progress import Progress
+from archord.materials.hardening import LinearHardening
+from archord.materials.j2 import J2Material
+from archord.output.files.step_file import all_arrays
+from archord.postprocess.export import export_vtk
+from tests.postprocess.vtk_reader import VtkFile
+from tests.solver.contact.blocks_in_space import bodies, tagged
+from tests.solver.space import KINDS
+
+STEEL = J2Material(210e3, 0.3, hardening=LinearHardening(300.0, 2100.0))
+SOFT = Elastic(70e3, 0.3)
+
+
+def pressed(comm, kind=CellType.tetrahedron, friction=0.2, down=-0.01) -> Problem:
+    """A soft block that is pressed on a block of steel, which yields."""
+    return Problem(
+        tagged(bodies(comm, kind=kind)),
+        [Body("lower", STEEL), Body("upper", SOFT)],
+        [Interaction("joint", ("lower", "upper"), friction=friction)],
+        supports=[
+            Support("base", fixed=["x", "y", "z"]),
+            Support("left", fixed="x"),
+            Support("front", fixed="y"),
+        ],
+        loads=[Load("press", on="lid", direction="z", displacement=down)],
+        steps=2,
+        kinematics="space",
+    )
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """The runs of tetrahedra and of hexahedra on one rank, by the kind."""
+    from mpi4py import MPI
+
+    found = {}
+    for kind in (CellType.tetrahedron, CellType.hexahedron):
+        found[kind] = tmp_path_factory.mktemp("space") / kind.name
+        problem = pressed(MPI.COMM_SELF, kind)
+        archord.solve(problem, found[kind], fields="points", comm=MPI.COMM_SELF)
+    return found
+
+
+@KINDS
+def test_the_history_has_forces_and_moments_about_three_axes(folders, kind):
+    """They balance: what the lid presses, the joint carries and the base takes up."""
+    run = archord.load(folders[kind])
+    assert run.status == "done"
+    last = {name: values[-1] for name, values in run.columns.items()}
+    assert run.units["joint moment x"] == "N mm"
+    assert run.units["joint force z"] == run.units["press force"] == "N"
+    assert run.units["joint contact area"] == "mm2"
+    assert "joint contact length" not in last
+    force = last["press force"]
+    assert force < -50
+    assert last["base z"] == pytest.approx(-force, rel=1e-8)
+    joint = np.array([last[f"joint force {axis}"] for axis in "xyz"])
+    assert joint[2] == pytest.approx(-force, rel=1e-6)
+    moment = np.array([last[f"joint moment {axis}"] for axis in "xyz"])
+    held = ["left", "front"]
+    assert moment[0] > 0 > moment[1]
+    assert np.abs(moment[:2]).max() < np.abs(joint[2])
+    assert {f"{name} moment z" for name in held} <= last.keys()
+    assert 0 < last["joint contact area"] <= 1 + 1e-9
+    assert last["joint contact fraction"] == pytest.approx(last["joint contact area"], rel=1e-9)
+    assert last["lower peeq_max"] > 1e-3
+    assert all(0 <= last[f"lower at {axis}"] <= 1 for axis in "xy")
+    assert last["joint largest shear"] <= 0.2 * last["joint largest pressure"] * (1 + 1e-2)
+
+
+@KINDS
+def test_contact_holds_points_facets_and_vectors(folders, kind):
+    """The pressure is the force of the history, the shears lie in the surface."""
+    run = archord.load(folders[kind])
+    contact = run.contact()
+    assert [*contact] == ["lower", "upper"]
+    carried = {}
+    for name, profile in contact.items():
+        n, q = profile.weight.shape
+        assert profile.X.shape == profile.normal.shape == profile.shear.shape == (n, q, 3)
+        assert profile.corners.shape == (n, 4 if kind == CellType.hexahedron else 3, 3)
+        np.testing.assert_allclose(profile.X[..., 2], 0.0, rtol=0, atol=1e-12)
+        assert profile.width.sum() == pytest.approx(1.0)
+        outward = 1.0 if name == "lower" else -1.0
+        np.testing.assert_allclose(profile.normal[..., 2], outward)
+        carried[name] = (profile.facet_pressure * profile.width).sum()
+        projected = (profile.weight * profile.pressure).sum(axis=1)
+        np.testing.assert_allclose(projected, profile.facet_force, rtol=0, atol=1e-10)
+        along = np.abs(profile.shear[..., 2])
+        assert along.max() < 0.1 * profile.largest_shear
+    force = run.columns["joint force z"][-1]
+    shares = run.summary["model"]["contact_shares"]["joint"]
+    assert np.dot(shares, [*carried.values()]) == pytest.approx(force, rel=1e-4)
+    a, b = (profile.shear.sum(axis=(0, 1)) for profile in contact.values())
+    assert a @ b < 0  # action and reaction
+
+
+@KINDS
+def test_fields_have_six_components_on_quadratic_cells(folders, kind, tmp_path):
+    """As VTK reads them: the volume, and the displacement between the nodes, are the run's."""
+    run = archord.load(folders[kind])
+    fields = run.fields()
+    nodes = 27 if kind == CellType.hexahedron else 10
+    assert fields.cells.shape[1] == nodes
+    assert fields.components == ("xx", "yy", "zz", "xy", "yz", "zx")
+    assert fields.stress.shape == (len(fields.coordinates), 6)
+    assert fields.cell["stress"].shape == (len(fields.cells), 6)
+    assert fields.peeq.max() > 1e-3
+    assert fields.edges["lower"].shape[1] == {10: 6, 27: 9}[nodes]
+    files = export_vtk(run, tmp_path)
+    grid = VtkFile(files[0]).at(run.steps)
+    assert (grid.celltypes == {10: 24, 27: 29}[nodes]).all()
+    lid = fields.coordinates[:, 2] > 1 - 1e-9
+    np.testing.assert_allclose(grid["displacement"][lid, 2], -0.01, rtol=1e-12)
+    smooth = quadratic(fields.coordinates)
+    volume = 0.0
+    for k in range(grid.n_cells):
+        cell = grid.GetCell(k)
+        ids = grid.get_cell(k).point_ids
+        at = [
+            located(cell, place) for place in np.vstack([np.full((1, 3), 0.2), 0.2 + np.eye(3) / 4])
+        ]
+        for x, weights in at:
+            assert weights @ smooth[ids] == pytest.approx(quadratic(x), abs=1e-9)
+        x = np.array([place for place, _ in at])
+        volume += np.abs(np.linalg.det(4 * (x[1:] - x[0]))) / {10: 6, 27: 1}[nodes]
+    assert volume == pytest.approx(2.0, rel=1e-9)
+
+
+def quadratic(x):
+    return x[..., 0] ** 2 + 2 * x[..., 1] * x[..., 2] - x[..., 2] ** 2 + 0.3 * x[..., 1]
+
+
+def located(cell, place):
+    """Where VTK has a ``place`` of the reference cell, and the weights of the cell's nodes."""
+    x = [0.0] * 3
+    weights = [0.0] * cell.GetNumberOfPoints()
+    cell.EvaluateLocation(reference(0), place, x, weights)
+    return np.array(x), np.array(weights)
+
+
+@pytest.mark.mpi
+@KINDS
+def test_the_numbers_are_the_same_on_any_number_of_ranks(kind, comm, tmp_path_factory):
+    """All tables, contact and fields, in the same order."""
+    shared = comm.bcast(str(tmp_path_factory.mktemp("ranks")) if comm.rank == 0 else None)
+    archord.solve(pressed(comm, kind), f"{shared}/all", comm=comm, fields="points")
+    if comm.rank == 0:
+        from mpi4py import MPI
+
+        archord.solve(
+            pressed(MPI.COMM_SELF, kind), f"{shared}/one", comm=MPI.COMM_SELF, fields="points"
+        )
+        same(f"{shared}/all", f"{shared}/one", 1e-8)
+    comm.barrier()
+
+
+def same(one, other, tolerance, at_points=0.0):
+    """All numbers of two runs agree, relative to the largest of their kind; those of points maybe
+    only to another tolerance."""
+    a, b = archord.load(one).columns, archord.load(other).columns
+    assert a.keys() == b.keys()
+    for name in a.keys() - {"seconds", "force_balance"}:
+        close(name, a[name], b[name], tolerance)
+    for name in ("fields", "contact"):
+        with h5py.File(f"{one}/{name}.h5") as first, h5py.File(f"{other}/{name}.h5") as second:
+            arrays = [dict(all_arrays(file)) for file in (first, second)]
+        assert arrays[0].keys() == arrays[1].keys()
+        for key, values in arrays[0].items():
+            close(key, values, arrays[1][key], at_points or tolerance)
+
+
+def close(name, a, b, tolerance):
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    off = np.abs(a - b).max(initial=0.0)
+    assert off <= tolerance * np.abs(a).max(initial=0.0), (name, off)
+
+
+def test_a_restart_is_bit_identical(tmp_path, monkeypatch):
+    """After an interruption behind the first step."""
+    from mpi4py import MPI
+
+    def problem():
+        return pressed(MPI.COMM_SELF)
+
+    archord.solve(problem(), tmp_path / "whole", comm=MPI.COMM_SELF)
+
+    def stop(progress, record):
+        signal.raise_signal(signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Progress, "step", stop)
+        with pytest.raises(KeyboardInterrupt):
+            archord.solve(problem(), tmp_path / "halted", comm=MPI.COMM_SELF, progress=True)
+    archord.solve(problem(), tmp_path / "halted", restart=True, comm=MPI.COMM_SELF)
+    same(tmp_path / "whole", tmp_path / "halted", 0.0, 1e-14)
