@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.meshes.formats.source import Mesh, circles_in
+from archord.geometry.meshes.formats.source import CHANGES, Mesh, circles_in
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.kinematics import kinematics
 from archord.report.errors import InputError
@@ -86,7 +86,8 @@ def scene_mesh(scene: Any, comm: MPI.Comm) -> TaggedMesh:
         draw = resolve_name(mesh.shape.drawing)
         return draw(comm, degree=scene.analysis.degree, **shape)
     circles = circles_in(mesh.circle)
-    return Mesh(mesh.file, mesh.scale, mesh.order, mesh.refine, circles).on(comm)
+    changes = {name: getattr(mesh, name) for name in CHANGES}
+    return Mesh(mesh.file, circles=circles, **changes).on(comm)
 
 
 def problem_of(scene: ProblemScene, mesh: TaggedMesh) -> Problem:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.geometry.meshes.formats.source import Mesh
+from archord.geometry.meshes.formats.source import CHANGES, Mesh
 from archord.materials.elasticity import Elastic
 from archord.materials.finite import LargeStrain
 from archord.materials.hardening import Hardening, LinearHardening, TabularHardening
@@ -69,8 +69,8 @@ def _mesh(mesh: Any, file: str) -> dict[str, Any]:
         {"facets": facets, "centre": list(centre), "radius": radius}
         for facets, (centre, radius) in (mesh.circles or {}).items()
     ]
-    changes = {"scale": mesh.scale, "order": mesh.order, "refine": mesh.refine, "circle": circles}
-    return {"file": mesh.file or file} | changes
+    changes = {name: getattr(mesh, name) for name in CHANGES}
+    return {"file": mesh.file or file, "circle": circles} | changes
 
 
 def _body(body: Body) -> dict[str, Any]:

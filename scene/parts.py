@@ -62,7 +62,8 @@ class MeshSection(Section):
     """Where the mesh comes from: a file, or the shape of a preset."""
 
     file: Name | None = key(
-        "gmsh (.msh), Abaqus, CalculiX (.inp), dolfinx (.xdmf), archord (.npz) file",
+        "file of gmsh (.msh), Abaqus, CalculiX (.inp), dolfinx (.xdmf), archord (.npz), "
+        "CAD (.step, .stp, .brep)",
         default=None,
         example="a.msh",
     )
@@ -70,7 +71,16 @@ class MeshSection(Section):
     order: Literal[1, 2, 3] | None = key(
         "order of the geometry, the file's if absent; 2 for circles", other=2
     )
-    refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
+    refine: int = key("how often the edges of every cell are cut in two", default=0, ge=0, le=6)
+    size: Positive | None = key(
+        "of CAD: largest element size, a tenth of the extent if absent", "length", other=2.0
+    )
+    sizes: dict[str, Positive] = key(
+        "of CAD: element size on faces, {hole = 0.5}; it grows away from them", "length", default={}
+    )
+    sets: dict[str, list[str]] = key(
+        'new facet sets, made of others: {hole = ["face 7", "face 8"]}', default={}
+    )
     circle: list[CircleSection] = Field(
         default_factory=list, description="circles that facet sets lie on"
     )
@@ -81,7 +91,8 @@ class MeshSection(Section):
     @model_validator(mode="after")
     def _one_source(self) -> MeshSection:
         given(self, ("file", "shape"))
-        for name in ("scale", "order", "refine", "circle") if self.shape is not None else ():
+        of_file = ("scale", "order", "refine", "circle", "size", "sizes", "sets")
+        for name in of_file if self.shape is not None else ():
             unsaid = getattr(self, name) == type(self).model_fields[name].get_default(
                 call_default_factory=True
             )

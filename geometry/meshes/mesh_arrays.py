@@ -4,7 +4,7 @@ it."""
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from archord.geometry.meshes.cells import (
     sides_of,
     with_middle_nodes,
 )
+from archord.geometry.meshes.tagged_mesh import tags_of
 
 _FAR = 1e30  # coordinates beyond overflow
 _INCOMPLETE = 20  # gmsh's number of triangles of third order without a node inside
@@ -158,6 +159,15 @@ class MeshArrays:
     def facets_of(self, name: str) -> np.ndarray:
         """Nodes ``(k, b)`` of the facets of a set; none if there is no such set."""
         return self.facets[np.isin(self.tags, self.facet_sets.get(name, ()))]
+
+    def with_sets(self, sets: Mapping[str, Sequence[str]]) -> MeshArrays:
+        """This mesh with more facet ``sets``, each made of others. Raises ValueError for others
+        that are not there."""
+        facet_sets = dict(self.facet_sets)
+        for name, others in sets.items():
+            tags = [tags_of("facet", self.facet_sets, other) for other in others]
+            facet_sets[name] = tuple(sorted(set().union(*tags)))
+        return replace(self, facet_sets=facet_sets)
 
     def second_order(self) -> MeshArrays:
         """This mesh of straight cells with nodes on the middles of edges, of quadrilaterals and of

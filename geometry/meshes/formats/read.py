@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -17,7 +18,9 @@ from dolfinx.mesh import Mesh, MeshTags, meshtags
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
+from archord.geometry.meshes.formats import step
 from archord.geometry.meshes.formats.abaqus import read_abaqus
+from archord.geometry.meshes.formats.step import Sizes
 from archord.geometry.meshes.formats.xdmf import read_xdmf
 from archord.geometry.meshes.mesh_arrays import (
     MeshArrays,
@@ -44,15 +47,19 @@ def read_mesh(
     order: int | None = None,
     circles: Sequence[Circle] = (),
     refine: int = 0,
+    sizes: Sizes | None = None,
+    sets: Mapping[str, Sequence[str]] | None = None,
     partitioner=None,
 ) -> TaggedMesh:
     """The mesh of ``source`` times ``scale``, `refined` with ``circles`` in scaled lengths, on the
     ranks of ``comm``.
 
     A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx,
-    an .npz file of archord, the module gmsh with a model on rank 0, or a mesh as `tagged` returns
-    it. Sets have the names of physical groups, of sets and surfaces, or the values of tags.
-    Collective; raises ValueError on all ranks for what is no mesh of cells of one kind.
+    an .npz file of archord, a STEP or BREP file of CAD, which is meshed with elements of these
+    ``sizes``, the module gmsh with a model on rank 0, or a mesh as `tagged` returns it. New facet
+    ``sets`` are made of others. Sets have the names of physical groups, of sets and surfaces, or
+    the values of tags. Collective; raises ValueError on all ranks for what is no mesh of cells of
+    one kind.
     """
     made: Any = gathered(source) if isinstance(source, TaggedMesh) else None
     failure = ""
@@ -60,8 +67,9 @@ def read_mesh(
         name = str(source) if isinstance(source, str | Path) else "the mesh"
         try:
             if not isinstance(source, TaggedMesh):
-                made = _read(source, order or 2)
-            made = refined(replace(made, x=made.x * scale), refine, order, circles)
+                made = _read(source, order or 2, sizes or Sizes())
+            made = replace(made, x=made.x * scale).with_sets(sets or {})
+            made = refined(made, refine, order, circles)
             failure = next(iter(faults(made)), "")
         except Exception as error:  # whatever a damaged file makes of it, raised on all ranks below
             failure = getattr(error, "strerror", None) or str(error) or type(error).__name__
@@ -73,12 +81,12 @@ def read_mesh(
     return distribute(comm, made, partitioner, strips)
 
 
-def arrays_of(source: Source, comm: MPI.Comm, order: int | None) -> MeshArrays | None:
+def arrays_of(source: Source, comm: MPI.Comm, order: int | None, sizes: Sizes) -> MeshArrays | None:
     """The mesh of ``source``, of this ``order`` where a model is yet to be meshed: on rank 0, None
     elsewhere. Collective for a mesh of dolfinx; raises what a damaged file makes of it."""
     if isinstance(source, TaggedMesh):
         return gathered(source)
-    return _read(source, order or 2) if comm.rank == 0 else None
+    return _read(source, order or 2, sizes) if comm.rank == 0 else None
 
 
 def dimension_of_source(source: Any) -> int:
@@ -94,7 +102,9 @@ def dimension_of_source(source: Any) -> int:
         named = _NAMED.search(Path(source).read_bytes())
         if Path(source).suffix.lower() == ".msh" and named:
             return 3 if re.search(rb"^3 ", named[1], re.MULTILINE) else 2
-        return _read(source, 1).dimension
+        if Path(source).suffix.lower() in step.SUFFIXES:
+            return 3
+        return _read(source, 1, Sizes()).dimension
     except Exception:  # whatever a damaged file makes of it is raised where it is used
         return 2
 
@@ -147,7 +157,7 @@ def _named(comm: MPI.Comm, tags: MeshTags, names: Mapping[str, int] | None) -> S
     return {name: (tag,) if tag in values else () for name, tag in names.items()}
 
 
-def _read(source: str | Path | ModuleType, order: int) -> MeshArrays:
+def _read(source: str | Path | ModuleType, order: int, sizes: Sizes) -> MeshArrays:
     if isinstance(source, ModuleType):
         d = gmsh_dimension(source)
         if not len(source.model.mesh.getElementTypes(d)):
@@ -155,7 +165,13 @@ def _read(source: str | Path | ModuleType, order: int) -> MeshArrays:
             source.model.mesh.setOrder(order)
         return MeshArrays.from_gmsh(source)
     path = Path(source)
-    readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf, ".npz": stored_mesh}
+    readers: dict[str, Callable[[Path], MeshArrays]] = {
+        ".msh": _read_gmsh,
+        ".inp": read_abaqus,
+        ".xdmf": read_xdmf,
+        ".npz": stored_mesh,
+    }
+    readers |= dict.fromkeys(step.SUFFIXES, partial(_mesh_solids, order=order, sizes=sizes))
     if path.suffix.lower() not in readers:
         raise ValueError(f"is none of the files of meshes that are read: {', '.join(readers)}")
     with require_file(path).open("rb"):
@@ -165,18 +181,33 @@ def _read(source: str | Path | ModuleType, order: int) -> MeshArrays:
     return readers[path.suffix.lower()](path)
 
 
+def _mesh_solids(path: Path, order: int, sizes: Sizes) -> MeshArrays:
+    """The mesh of solids of CAD."""
+
+    def build(gmsh) -> None:
+        step.mesh_step(gmsh, path, order, sizes)
+
+    return _apart(build)
+
+
 def _read_gmsh(path: Path) -> MeshArrays:
-    """What gmsh reads in a process of its own, as it ends the process on some damaged files."""
+    """The mesh of a file of gmsh."""
     with path.open("rb") as file:
         if not file.read(20).startswith(_HEADERS):  # gmsh would run it as a script
             raise ValueError("is no mesh of gmsh: it must begin with $MeshFormat")
+    return _apart(lambda gmsh: gmsh.merge(str(path)))
+
+
+def _apart(build: Callable[[Any], None]) -> MeshArrays:
+    """The mesh that ``build(gmsh)`` makes in a process of its own, as gmsh ends the process on some
+    damaged files."""
     with TemporaryDirectory() as folder:
         found = Path(folder) / "mesh.npz"
         said = Path(folder) / "error"
         # not by multiprocessing, whose daemons, as the workers of a pool, may have no children
         child = os.fork()
         if child == 0:
-            _merge(path, found, said)
+            _build(build, found, said)
         _, status = os.waitpid(child, 0)
         if said.exists():
             raise ValueError(said.read_text(encoding="utf-8"))
@@ -185,8 +216,8 @@ def _read_gmsh(path: Path) -> MeshArrays:
         return stored_mesh(found)
 
 
-def _merge(path: Path, found: Path, said: Path) -> NoReturn:
-    """Write the mesh that gmsh has of ``path`` to ``found``, or to ``said`` why there is none, and
+def _build(build: Callable[[Any], None], found: Path, said: Path) -> NoReturn:
+    """Write the mesh that ``build(gmsh)`` makes to ``found``, or to ``said`` why there is none, and
     end the process."""
     status = 1
     try:
@@ -196,7 +227,7 @@ def _merge(path: Path, found: Path, said: Path) -> NoReturn:
         for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
         with own_gmsh() as gmsh:
-            gmsh.merge(str(path))
+            build(gmsh)
             mesh = MeshArrays.from_gmsh(gmsh)
         with found.open("wb") as file:
             store_mesh(mesh, file)

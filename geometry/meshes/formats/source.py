@@ -4,8 +4,8 @@ before it is used."""
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from archord.geometry.meshes.mesh_arrays import MeshArrays
     from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
-_KINDS = "a mesh file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
+_KINDS = "a mesh or CAD file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
 _LONGEST = 40  # characters of a value in a message
+CHANGES = ("scale", "order", "refine", "size", "sizes", "sets")  # but for the circles
 Disc = tuple[tuple[float, float], float]  # centre and radius
 
 
@@ -30,7 +31,8 @@ class Mesh:
     Parameters
     ----------
     source : str, Path, module, tuple or TaggedMesh
-        A file (.msh of gmsh, .inp of Abaqus and CalculiX, .xdmf of dolfinx, .npz of archord); the
+        A file (.msh of gmsh, .inp of Abaqus and CalculiX, .xdmf of dolfinx, .npz of archord, .step,
+        .stp and .brep of CAD); the
         module gmsh with a model, meshed or not; a dolfinx mesh with its tags, as (mesh, cells,
         facets); or what `gmsh_to_mesh` returns.
     scale : float
@@ -41,6 +43,12 @@ class Mesh:
         How often every cell is cut in four.
     circles : dict
         The circles ((x, y), radius) on which the nodes of facet sets are put, by the sets.
+    size : float
+        Of CAD: the largest size of elements, a tenth of the largest extent by default.
+    sizes : dict
+        Of CAD: the size of elements on faces by the names of these; it grows away from them.
+    sets : dict
+        New facet sets, each made of others: ``{"hole": ["face 7", "face 8"]}``.
 
     Raises
     ------
@@ -59,6 +67,9 @@ class Mesh:
     order: int | None = None
     refine: int = 0
     circles: dict[str, Disc] | None = None
+    size: float | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the source; raise `InputError`."""
@@ -116,13 +127,21 @@ class Mesh:
             scale=self.scale,
             order=self.order,
             refine=self.refine,
+            sizes=self._sizes,
+            sets=self.sets,
         )
 
     def plain(self, comm: MPI.Comm) -> MeshArrays | None:
         """The mesh before it is scaled and refined: on rank 0, None elsewhere. Collective."""
         from archord.geometry.meshes.formats.read import arrays_of
 
-        return arrays_of(self._tagged(), comm, self.order)
+        return arrays_of(self._tagged(), comm, self.order, self._sizes)
+
+    @property
+    def _sizes(self) -> Any:
+        from archord.geometry.meshes.formats.step import Sizes
+
+        return Sizes(self.size, self.sizes)
 
     def _tagged(self) -> Any:
         from archord.geometry.meshes.formats.read import tagged
