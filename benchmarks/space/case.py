@@ -14,13 +14,13 @@ from archord.solver.problem import Problem
 
 E = 210e3
 NU = 0.3
-DRIVE = "press"
+PRESS = "press"
 Quantity = Callable[[System], float]
 
 
 def force(system: System) -> float:
     """The force of the whole joint, positive."""
-    return abs(system.drive_force(DRIVE))
+    return abs(system.drive_force(PRESS))
 
 
 class Reference(NamedTuple):
