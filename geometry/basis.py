@@ -1,8 +1,10 @@
-"""Lagrange bases and their physical gradients at points of curved cells, as arrays."""
+"""Bases by values at nodes, and their physical gradients at points of curved cells, as arrays."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 from typing import TYPE_CHECKING
 
 import basix
@@ -27,6 +29,8 @@ _NODES = {  # of cells of order 1, 2 and 3
     TETRAHEDRON: (4, 10, 20),
     HEXAHEDRON: (8, 27, 64),
 }
+_SERENDIPITY = {QUADRILATERAL: 8, HEXAHEDRON: 20}
+_HIGHEST = 6  # degree: twice the highest order of meshes, while their cells are cut
 _KNOWN = {  # by the dimension
     2: "triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16",
     3: "tetrahedra have 4, 10 or 20, hexahedra 8, 27 or 64",
@@ -44,6 +48,61 @@ def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.
     return basix.create_element(
         basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.equispaced
     )
+
+
+@cache
+def serendipity_element(cell: basix.CellType) -> basix.finite_element.FiniteElement:
+    """Element of second order on a quadrilateral (8 nodes) or a hexahedron (20 nodes) without nodes
+    within faces and cells.
+
+    It spans the monomials whose powers above the first add up to two at most (Arnold and Awanou
+    2011). Its nodes come as they do first in the Lagrange element of second order.
+    """
+    powers = product(range(3), repeat=dimension_of(cell))
+    span = [power for power in powers if sum(k for k in power if k > 1) <= 2]
+    x, weight = basix.make_quadrature(cell, 4)
+    monomials = np.array([np.prod(x**power, axis=1) for power in span])
+    orthonormal = basix.tabulate_polynomials(basix.PolynomialType.legendre, cell, 2, x)
+    corners = basix.geometry(cell)
+    nodes: list[list[Array]] = []
+    values: list[list[Array]] = []
+    for dim in range(4):
+        entities = basix.topology(cell)[dim] if dim <= dimension_of(cell) else []
+        own = slice(1 if dim < 2 else 0)
+        nodes.append([corners[entity].mean(axis=0)[None][own] for entity in entities])
+        values.append([np.ones((1, 1, 1, 1))[own, :, own] for _ in entities])
+    return basix.create_custom_element(
+        cell,
+        value_shape=(),
+        wcoeffs=weight * monomials @ orthonormal.T,
+        x=nodes,
+        M=values,
+        interpolation_nderivs=0,
+        map_type=basix.MapType.identity,
+        sobolev_space=basix.SobolevSpace.H1,
+        discontinuous=False,
+        embedded_subdegree=1,
+        embedded_superdegree=2,
+        poly_type=basix.PolysetType.standard,
+    )
+
+
+def displacement_element(cell: basix.CellType, degree: int) -> basix.finite_element.FiniteElement:
+    """Element of displacements: Lagrange's, on hexahedra of degree 2 the one of 20 nodes."""
+    if cell == HEXAHEDRON and degree == 2:
+        return serendipity_element(cell)
+    return lagrange_element(cell, degree)
+
+
+def element_of(cell: basix.CellType, nodes: int) -> basix.finite_element.FiniteElement:
+    """Element on the reference ``cell`` that has so many ``nodes``. Raises ValueError."""
+    if nodes == _SERENDIPITY.get(cell):
+        return serendipity_element(cell)
+    for degree in range(1, 1 + _HIGHEST):
+        element = lagrange_element(cell, degree)
+        if element.dim == nodes:
+            return element
+    raise ValueError(f"no element on a {cell.name} has {nodes} nodes")
 
 
 def order_of(cell: basix.CellType, nodes: int) -> int:
@@ -74,7 +133,7 @@ def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) 
     """Basis of the given ``degree`` at the reference points ``X`` ``(q, d)`` of ``cells``, or ``(n,
     q, d)`` of each."""
     geometry = tabulate(mesh.basix_cell(), cell_degree(mesh), X)
-    table = tabulate(mesh.basix_cell(), degree, X)
+    table = _tabulate(displacement_element(mesh.basix_cell(), degree), X)
     nodes = mesh.geometry.x[cell_nodes(mesh)[cells], : X.shape[-1]]
     at = "qa" if X.ndim == 2 else "nqa"
     point = np.einsum(f"{at},nai->nqi", geometry[0], nodes)
@@ -104,8 +163,11 @@ def _inverse(J: Array) -> tuple[Array, Array]:
 
 
 def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
-    """Values and derivatives ``(1 + d, ..., a)`` of the basis at ``X`` ``(..., d)``."""
-    element = lagrange_element(cell, degree)
+    """Values and derivatives ``(1 + d, ..., a)`` of the Lagrange basis at ``X`` ``(..., d)``."""
+    return _tabulate(lagrange_element(cell, degree), X)
+
+
+def _tabulate(element: basix.finite_element.FiniteElement, X: Array) -> Array:
     d = X.shape[-1]
     if not X.size:  # basix ends the process
         return np.zeros((1 + d, *X.shape[:-1], element.dim))
@@ -113,9 +175,9 @@ def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
     return table.reshape(1 + d, *X.shape[:-1], table.shape[-1])
 
 
-def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
+def bulk_quadrature_degree(cell: basix.CellType, degree: int, *, full: bool = False) -> int:
     """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no
-    volumetric locking.
+    volumetric locking; of the ``full`` rule where that needs more points.
 
     Plastic flow in plane strain keeps the volume at every point, which must be fewer conditions
     than a mesh has dofs (Nagtegaal, Parks and Rice 1974). A quadrilateral of degree p adds ``2
@@ -132,10 +194,20 @@ def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
 
     A tetrahedron of degree 2 has 4 points with 6 strains each: as many as its 30 dofs without the 6
     rigid motions.
+
+    A hexahedron of 20 nodes has 8 points. One alone would have 6 deformations without energy, but
+    neighbours suppress them. A traction does not: where it follows the displacements, as in
+    contact, cells need the ``full`` rule of 27 points.
     """
-    return 2 * degree - 2 if cell in (TRIANGLE, TETRAHEDRON) else 2 * degree
+    if cell in (TRIANGLE, TETRAHEDRON):
+        return 2 * degree - 2
+    if displacement_element(cell, degree).dim == _SERENDIPITY.get(cell) and not full:
+        return 2 * degree - 1
+    return 2 * degree
 
 
-def bulk_quadrature(cell: basix.CellType, degree: int) -> tuple[Array, Array]:
+def bulk_quadrature(
+    cell: basix.CellType, degree: int, *, full: bool = False
+) -> tuple[Array, Array]:
     """Points ``(q, d)`` and weights ``(q,)`` of the bulk rule on the reference ``cell``."""
-    return basix.make_quadrature(cell, bulk_quadrature_degree(cell, degree))
+    return basix.make_quadrature(cell, bulk_quadrature_degree(cell, degree, full=full))

@@ -27,7 +27,7 @@ _SINGULAR = 1e-13  # of patches with fewer points than coefficients, which get t
 
 class PatchRecovery:
     """From the ``points`` ``(m, q, d)`` of ``cells`` ``(m, k)`` of a ``kind``, given by their
-    corners, to ``nodes`` ``(n, d)``.
+    corners, to ``nodes`` ``(n, d)``. Cells with fewer points than others have NaN behind them.
 
     The first nodes are the vertices; ``between`` are the vertices ``(i, e)`` that the further nodes
     lie between, one array after the other. Bodies share no vertex, so that nothing is smoothed over
@@ -35,6 +35,8 @@ class PatchRecovery:
 
     Attributes
     ----------
+    _is_point : array (m, q)
+        Whether a cell has the point.
     _powers : array (c, d)
         The powers of the coordinates in the monomials of the polynomials.
     _cell : array (p,)
@@ -73,6 +75,8 @@ class PatchRecovery:
         wanted, source = np.concatenate([inward, np.column_stack([own, own])]).T
 
         self._powers = _powers(degree, nodes.shape[1])
+        self._is_point: np.ndarray = ~np.isnan(points).any(axis=-1)
+        points = np.where(self._is_point[..., None], points, 0.0)
         vertex, self._cell = _patches(cells, outside, alone)
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
         self._patch = np.zeros(n_vertices, dtype=np.int64)
@@ -84,11 +88,12 @@ class PatchRecovery:
     def _fit_patches(self, ray: Array, patch: np.ndarray, wide: np.ndarray) -> None:
         """The fits of all patches by the ``ray`` ``(p, q, d)`` from their vertices to their points;
         in ``wide`` ones ``(p,)`` near points count more."""
-        square = (ray**2).sum(axis=-1)
+        is_point = self._is_point[self._cell]
+        square = np.where(is_point, (ray**2).sum(axis=-1), 0.0)
         size = np.maximum.reduceat(square.max(axis=1), self._first)
         self._scale = np.sqrt(size)
         near = 1 / (_CORE + square / size[patch][:, None])
-        weight = np.where(wide[:, None], near, 1.0)
+        weight = np.where(wide[:, None], near, 1.0) * is_point
         monomials = self._monomials(ray / self._scale[patch][:, None, None])
         weighted = np.swapaxes(monomials * weight[..., None], 1, 2)
         moments = np.add.reduceat(weighted @ monomials, self._first)
@@ -129,6 +134,7 @@ class PatchRecovery:
 
     def __call__(self, values: Array) -> Array:
         """Values ``(n, c)`` at the nodes from ``values`` ``(m, q, c)`` at the points."""
+        values = np.where(self._is_point[..., None], values, 0.0)
         fitted = np.add.reduceat(self._fit @ values[self._cell], self._first)
         parts = self._value[:, None] @ fitted[self._source]
         return np.add.reduceat(parts[:, 0], self._start)

@@ -14,7 +14,7 @@ import basix
 import numpy as np
 import numpy.typing as npt
 
-from archord.geometry.basis import Array, lagrange_element
+from archord.geometry.basis import Array, element_of
 from archord.geometry.curve import Index, ProjectionError
 from archord.kernels.compiled import library, pointer, structure
 
@@ -98,7 +98,8 @@ class Patches:
         _, corners = np.unique(self.vertices, return_inverse=True)
         self.corners = corners.reshape(self.vertices.shape).astype(np.int32)
         self.beyond = self._across_edges()
-        self._exponents, self._coefficients = _monomials(cell, degree)
+        self._element = element_of(cell, connectivity.shape[1])
+        self._exponents, self._coefficients = _monomials(self._element)
         edges = _TRIANGLE_EDGES if cell == basix.CellType.triangle else _SQUARE_EDGES
         self._lines = np.array(edges, dtype=float)
         in_turn = np.argsort(self.corners.ravel(), kind="stable")
@@ -126,8 +127,7 @@ class Patches:
 
     def shapes(self, xi: Array) -> tuple[Array, Array]:
         """Shape functions ``(m, k)`` and their derivatives ``(m, 2, k)`` at ``xi`` ``(m, 2)``."""
-        element = lagrange_element(self.cell, self.degree)
-        value, by_s, by_t = element.tabulate(1, np.ascontiguousarray(xi))[..., 0]
+        value, by_s, by_t = self._element.tabulate(1, np.ascontiguousarray(xi))[..., 0]
         return value, np.stack([by_s, by_t], axis=1)
 
     def areas(self) -> Array:
@@ -239,13 +239,16 @@ class Patches:
         return partners
 
 
-def _monomials(cell: basix.CellType, degree: int) -> tuple[Index, Array]:
+def _monomials(element: basix.finite_element.FiniteElement) -> tuple[Index, Array]:
     """Exponents ``(k, 2)`` of the monomials of a facet, and their coefficients ``(k, k)`` in its
     shape functions."""
+    degree = element.degree
     powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1)]
-    if cell == basix.CellType.triangle:
+    if element.cell_type == basix.CellType.triangle:
         powers = [(i, j) for i, j in powers if i + j <= degree]
+    elif element.dim < len(powers):  # without a node inside
+        powers = [(i, j) for i, j in powers if min(i, j) < 2]
     exponents = np.array(powers, dtype=np.int32)
-    nodes = lagrange_element(cell, degree).points
+    nodes = element.points
     values = np.prod(nodes[:, None] ** exponents, axis=-1)
     return exponents, np.ascontiguousarray(np.linalg.inv(values).T)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import basix
 import numpy as np
 from dolfinx import fem
 
-from archord.geometry.basis import Array, bulk_quadrature, cell_basis
+from archord.geometry.basis import Array, cell_basis
 from archord.geometry.strain import PointStrain
 from archord.materials.kinematics import Kinematics
 from archord.materials.material import Material, Points
@@ -36,8 +37,8 @@ class PointFields(NamedTuple):
 
 
 class BodyPoints:
-    """The ``q`` integration points of each of ``n`` cells of a body, with ``k`` components of
-    strain.
+    """The ``q`` integration points of each of ``n`` cells of a body, by the ``rule`` of a degree,
+    with ``k`` components of strain.
 
     - ``cells`` ``(n,)``: local numbers
     - ``point`` ``(n, q, d)``: coordinates
@@ -49,11 +50,15 @@ class BodyPoints:
     """
 
     def __init__(
-        self, V: fem.FunctionSpace, cells: np.ndarray, material: Material, kinematics: Kinematics
+        self,
+        V: fem.FunctionSpace,
+        cells: np.ndarray,
+        material: Material,
+        kinematics: Kinematics,
+        rule: int,
     ) -> None:
-        degree = V.element.basix_element.degree
-        X, w = bulk_quadrature(V.mesh.basix_cell(), degree)
-        basis = cell_basis(V.mesh, degree, cells, X)
+        X, w = basix.make_quadrature(V.mesh.basix_cell(), rule)
+        basis = cell_basis(V.mesh, V.element.basix_element.degree, cells, X)
         large = material.finite
         self.cells = cells
         self.point = basis.point

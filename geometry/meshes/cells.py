@@ -21,6 +21,7 @@ from archord.geometry.basis import (
     TRIANGLE,
     Array,
     dimension_of,
+    element_of,
     lagrange_element,
     order_of,
 )
@@ -65,10 +66,7 @@ def entities_of(kind: basix.CellType, cells: np.ndarray, dim: int) -> np.ndarray
 @cache
 def _closures(kind: basix.CellType, nodes: int) -> list[np.ndarray]:
     """For each dimension the nodes ``(s, b)`` of the entities of a cell of so many ``nodes``."""
-    orders = range(1, 2 * _HIGHEST + 1)  # twice the highest one while cells are cut
-    elements = [lagrange_element(kind, order) for order in orders]
-    [element] = [element for element in elements if element.dim == nodes]
-    return [np.array(of_dim) for of_dim in element.entity_closure_dofs]
+    return [np.array(of_dim) for of_dim in element_of(kind, nodes).entity_closure_dofs]
 
 
 def sides_of(kind: basix.CellType, cells: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import basix
 import numpy as np
 
-from archord.geometry.basis import Array, dimension_of, order_of, tabulate
+from archord.geometry.basis import Array, dimension_of, element_of
 from archord.geometry.meshes.cells import (
     distinct,
     entities_of,
@@ -29,7 +29,6 @@ class SecondOrder:
     """
 
     def __init__(self, kind: basix.CellType, nodes: np.ndarray) -> None:
-        order = order_of(kind, nodes.shape[1])
         self._kind = kind
         m = len(nodes)
         self.corners = n_corners(kind)
@@ -49,7 +48,8 @@ class SecondOrder:
             if dim < dimension_of(kind):
                 first, which = distinct(around)
             middle = np.full((1, dim), 0.5)
-            self._middles.append((entities[first], tabulate(of_dim, order, middle)[0, 0]))
+            at_middle = element_of(of_dim, entities.shape[1]).tabulate(0, middle)[0, 0, :, 0]
+            self._middles.append((entities[first], at_middle))
             self.between.append(np.searchsorted(self._vertices, around[first]))
             parts.append((n_nodes + which).reshape(m, -1))
             n_nodes += len(first)

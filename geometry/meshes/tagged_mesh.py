@@ -94,14 +94,15 @@ class TaggedMesh:
             )
         return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
 
+    def cells_behind(self, name: str) -> np.ndarray:
+        """Cells ``(n,)`` of this rank at the facets of the set ``name``, ghosts included."""
+        d = self.dimension
+        self.mesh.topology.create_connectivity(d - 1, d)
+        return compute_incident_entities(self.mesh.topology, self.facets_in(name), d - 1, d)
+
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
-        topology = self.mesh.topology
-        facet_dim = self.dimension - 1
-        topology.create_connectivity(facet_dim, self.dimension)
-        behind = compute_incident_entities(
-            topology, self.facets_in(name), facet_dim, self.dimension
-        )
+        behind = self.cells_behind(name)
         here = np.unique(self.cells.values[np.isin(self.cells.indices, behind)]).tolist()
         parts: list[list[int]] = self.mesh.comm.allgather(here)
         return set().union(*parts)

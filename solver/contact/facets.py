@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
-from archord.geometry.basis import Array, cell_basis, lagrange_element
+from archord.geometry.basis import Array, cell_basis, displacement_element, element_of
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,14 @@ def facet_kind(cell: basix.CellType) -> basix.CellType:
     return basix.cell.subentity_types(cell)[-2][0]
 
 
-def facet_nodes(facet: basix.CellType, degree: int) -> Array:
-    """The nodes ``(k, d - 1)`` of the reference ``facet``: along an interval, in the order of basix
-    on others."""
+def facet_nodes(cell: basix.CellType, degree: int) -> Array:
+    """The nodes ``(k, d - 1)`` of the displacements on a reference facet of a ``cell``: along an
+    interval, in the order of basix on others."""
+    facet = facet_kind(cell)
     if facet == basix.CellType.interval:
         return np.linspace(0.0, 1.0, degree + 1)[:, None]
-    return lagrange_element(facet, degree).points
+    on_facet = displacement_element(cell, degree).entity_closure_dofs[2][0]
+    return element_of(facet, len(on_facet)).points
 
 
 def boundary_facets(V: fem.FunctionSpace, facets: np.ndarray) -> BoundaryFacets:
@@ -61,8 +63,8 @@ def boundary_facets(V: fem.FunctionSpace, facets: np.ndarray) -> BoundaryFacets:
     corners[inwards, -2:] = corners[inwards, -2:][:, ::-1]
     origin = corners[:, 0]
     axes = corners[:, 1:] - origin[:, None]
-    on_facet = origin[:, None] + facet_nodes(facet_kind(kind), degree) @ axes
-    in_cell = lagrange_element(kind, degree).points
+    on_facet = origin[:, None] + facet_nodes(kind, degree) @ axes
+    in_cell = displacement_element(kind, degree).points
     distance = np.linalg.norm(on_facet[:, :, None] - in_cell, axis=-1)
     number = _given_number(V.mesh)[cells] * len(vertices_of_facets) + local_facets
     return BoundaryFacets(cells, number, distance.argmin(axis=-1), origin, axes, within)

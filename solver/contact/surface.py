@@ -18,7 +18,7 @@ from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_
 from archord.geometry.curve import Curve, RigidCircle, in_pieces
 from archord.geometry.patches import Patches
 from archord.geometry.strain import PointStrain
-from archord.kernels.compat import cell_degree
+from archord.kernels.compat import cell_nodes
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.materials.material import Material, Points
 from archord.solver.contact.facets import (
@@ -183,7 +183,7 @@ class Surface:
         self.outward = normal / length[..., None]
         self.shape = np.ascontiguousarray(basis.shape)
         self.point = basis.point
-        if cell_degree(self.V.mesh) > self.degree:
+        if cell_nodes(self.V.mesh).shape[1] > self.shape.shape[-1]:
             self.point = self.shape @ self._nodes  # on the curve
         self.weight = length * w[self.facet] * self.kinematics.measure(self.point)
         n, q = self.weight.shape
@@ -202,7 +202,7 @@ class Surface:
 
     def _trace_constants(self) -> tuple[Array, Array]:
         """Constants ``(n,)`` of the trace inequality, of normal stress and shear."""
-        X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree)
+        X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree, full=True)
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         strain = PointStrain(self.kinematics, basis, self.cell_dofs)
         weight = basis.measure * w * self.kinematics.measure(basis.point)

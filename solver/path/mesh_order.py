@@ -71,12 +71,17 @@ class MeshOrder:
         self._cell_index = np.asarray(mesh.topology.original_cell_index)[: self.n_cells]
         self.cells = Gather(system.comm, self._cell_index)
         self._take_geometry()
-        if V.element.basix_element.degree != cell_degree(mesh):
+        if not self._has_nodes_of_mesh():
             self._number_nodes_by_cells()
         self._nodes = Gather(system.comm, self._index[: self._n_owned])
         corners = slice(len(basix.topology(mesh.basix_cell())[0]))  # come first in every cell
         self._dof_of_vertex = np.zeros(len(mesh.geometry.x), dtype=np.int64)
         self._dof_of_vertex[cell_nodes(mesh)[:, corners]] = V.dofmap.list[:, corners]
+
+    def _has_nodes_of_mesh(self) -> bool:
+        """Whether cells have the same nodes in the displacement and in the geometry."""
+        V = self.system.V
+        return V.dofmap.list.shape[1] == cell_nodes(V.mesh).shape[1]
 
     def _take_geometry(self) -> None:
         """The geometry's nodes and cells, and for the displacement's nodes ``_index`` the numbers
@@ -91,7 +96,7 @@ class MeshOrder:
         if self.system.comm.rank == 0:
             self.nodes_of_cell = np.searchsorted(nodes.unique, self.nodes_of_cell)
         self._index = np.zeros(self._n_local, dtype=np.int64)
-        if self.system.V.element.basix_element.degree == cell_degree(mesh):
+        if self._has_nodes_of_mesh():
             self._index[self.system.V.dofmap.list] = of_cells
 
     def _number_nodes_by_cells(self) -> None:
@@ -150,10 +155,15 @@ class MeshOrder:
     def at_points(
         self, values_of: Callable[[PointFields], Array], parts: Iterable[PointFields]
     ) -> np.ndarray:
-        """The ``values_of`` all ``parts``, of all cells ``(n, q, ...)`` on rank 0. Collective."""
-        cells, values = zip(*((part.cells, values_of(part)) for part in parts), strict=True)
-        whole = np.zeros((self.n_cells, *values[0].shape[1:]))
-        whole[np.concatenate(cells)] = np.concatenate(values)
+        """The ``values_of`` all ``parts``, of all cells ``(n, q, ...)`` on rank 0; NaN where a cell
+        has fewer than ``q`` points. Collective."""
+        found = [(part.cells, values_of(part)) for part in parts]
+        most = max(values.shape[1] for _, values in found)
+        whole = np.zeros((self.n_cells, most, *found[0][1].shape[2:]))
+        for cells, values in found:
+            q = values.shape[1]
+            whole[cells, :q] = values
+            whole[cells, q:] = np.nan
         return self.cells(whole)
 
     def collect(self, u: Array) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
-from archord.geometry.basis import Array
-from archord.kernels.compat import cell_degree
+from archord.geometry.basis import Array, displacement_element, lagrange_element
+from archord.kernels.compat import cell_degree, cell_nodes
 from archord.report.timer import Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
@@ -26,18 +26,26 @@ from archord.solver.path.stepping import StepRules, march
 from archord.solver.path.totals import Totals
 from archord.solver.problem import Body, Problem
 
+_NO_CELLS = np.zeros(0, dtype=np.int32)
+
 
 def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:
     """Displacements of ``degree`` on ``mesh``, by their values at evenly spaced nodes.
-    Collective."""
-    element = basix.ufl.element(
-        "P",
-        mesh.basix_cell(),
-        degree,
-        shape=(mesh.topology.dim,),
-        lagrange_variant=basix.LagrangeVariant.equispaced,
-    )
-    return fem.functionspace(mesh, element)
+    Collective.
+
+    Where displacements have no nodes within faces and cells, the mesh's nodes there are moved to
+    where its nodes on edges want them: else no displacement would turn a curved cell rigidly.
+    """
+    element = displacement_element(mesh.basix_cell(), degree)
+    nodes = cell_nodes(mesh)
+    if cell_degree(mesh) == degree and element.dim < nodes.shape[1]:
+        settled = element.tabulate(0, lagrange_element(mesh.basix_cell(), degree).points)[0, ..., 0]
+        on_edges = mesh.geometry.x[nodes[:, : element.dim]]
+        inner = slice(element.dim, None)
+        mesh.geometry.x[nodes[:, inner]] = np.einsum("ba,nai->nbi", settled[inner], on_edges)
+    of_axis = basix.ufl.wrap_element(element)
+    blocked = basix.ufl.blocked_element(of_axis, shape=(mesh.topology.dim,))
+    return fem.functionspace(mesh, blocked)
 
 
 class System(Totals):
@@ -111,7 +119,11 @@ class System(Totals):
         problem = self.problem
         cells = {problem.tag(body): problem.cells_of(body) for body in problem.bodies}
         materials = {problem.tag(body): body.material for body in problem.bodies}
-        return Bulk(self.V, cells, materials, self.problem.kinematics)
+        surfaces = [given for i in problem.interactions for given in i.surfaces]
+        names = [given for given in surfaces if not isinstance(given, Rigid)]
+        behind = [problem.mesh.cells_behind(name) for name in names]
+        in_contact = np.unique(np.concatenate([_NO_CELLS, *behind]))
+        return Bulk(self.V, cells, materials, problem.kinematics, in_contact)
 
     def _interface(self, interaction: Interaction) -> Interface:
         surfaces = [self._surface(given, interaction.name) for given in interaction.surfaces]

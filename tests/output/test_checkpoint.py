@@ -57,7 +57,7 @@ def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         if kind == "contact":
             x = joint.sides[name].point
         else:
-            cells = joint.bulk.histories()[int(name)][0]
+            cells = joint.bulk.histories()[name][0]
             x = cell_basis(joint.V.mesh, 2, cells, bulk_quadrature(TRIANGLE, 2)[0]).point
         here[place] = number, x.reshape(-1, 2)
     parts = joint.comm.allgather(here)

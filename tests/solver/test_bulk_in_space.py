@@ -38,7 +38,7 @@ def warped(comm, kind) -> Callable[[Material], Bulk]:
     x += 2 * inside * np.stack([np.sin(5 * x[:, 1]), np.cos(4 * x[:, 2]), x[:, 0]], axis=1)
     V = displacement_space(mesh, 2)
     every = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
-    return lambda material: Bulk(V, {1: every}, {1: material.under(SPACE)}, SPACE)
+    return lambda material: Bulk(V, {1: every}, {1: material.under(SPACE)}, SPACE, every[:3])
 
 
 def internal_force(bulk: Bulk, u: np.ndarray) -> np.ndarray:
@@ -88,7 +88,7 @@ def test_patch(material, kind, comm):
     strain = SPACE.small @ [A[i, j] for i, j in SPACE.terms]
     expected = m.update(strain[None], m.state(1))[0]
     inside = ((x > 1e-9) & (x < 1 - 1e-9)).all(axis=1)
-    assert inside.sum() > 20
+    assert inside.sum() > 6
     assert np.abs(force[inside]).max() < 1e-13 * E
     for part in bulk.at_points(x @ A.T):
         np.testing.assert_allclose(
@@ -113,8 +113,8 @@ def test_the_tangent_is_the_derivative_of_the_internal_force(material, kind, com
     u = u + 1e-5 * rng.normal(size=u.shape)
     bulk.update(u)
     if material.yields:
-        ((_, points),) = bulk.histories().values()
-        assert 0.1 < (points.trial.peeq > points.state.peeq).mean() < 0.9
+        flows = [p.trial.peeq > p.state.peeq for _, p in bulk.histories().values()]
+        assert 0.1 < np.concatenate(flows).mean() < 0.9
     K = stiffness(bulk)
     h = 1e-9
     for _ in range(3):
@@ -162,7 +162,7 @@ def test_the_trace_constants_bound_the_tractions_of_any_displacement(kind, comm)
     V = bulk.V
     cells = np.arange(bulk.n_cells, dtype=np.int32)
     moduli = bulk.materials[1].elastic_tangent
-    X, w = bulk_quadrature(V.mesh.basix_cell(), 2)
+    X, w = bulk_quadrature(V.mesh.basix_cell(), 2, full=True)
     basis = cell_basis(V.mesh, 2, cells, X)
     in_cell = PointStrain(SPACE, basis, V.dofmap.list), basis.measure * w
     X, w = on_first_facet(V.mesh.basix_cell())

@@ -15,7 +15,7 @@ MIDDLE = PIN_RADIUS - HOLE_RADIUS  # of the pin: it touches the hole
 WIDTH = 20.0
 DEPTH = 30.0
 THICKNESS = 10.0
-_GROWTH = 0.5  # of elements, per unit of distance from the contact
+_GROWTH = 0.3  # of elements, per unit of distance from the contact
 
 
 def joint(
@@ -79,6 +79,5 @@ def _draw(gmsh, size: float) -> None:
         gmsh.model.addPhysicalGroup(1, [number], name=name)
     from_arc = f"Abs(Sqrt(x*x + y*y) - {HOLE_RADIUS!r})"
     field = gmsh.model.mesh.field.add("MathEval")
-    # elements are recombined, and then cut in four
-    gmsh.model.mesh.field.setString(field, "F", f"2 * ({size!r} + {_GROWTH!r} * {from_arc})")
+    gmsh.model.mesh.field.setString(field, "F", f"{size!r} + {_GROWTH!r} * {from_arc}")
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
