@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from archord.kernels.compiled import library, pointer
 from archord.materials.material import Array
+from archord.report.errors import is_number, require_between, require_of
 
 Index = npt.NDArray[np.integer]
 
@@ -309,6 +310,11 @@ class RigidCircle:
     radius : float
         The radius.
 
+    Raises
+    ------
+    InputError
+        For a centre that is not two numbers, and a radius that is not positive.
+
     Examples
     --------
     >>> import numpy as np
@@ -326,8 +332,12 @@ class RigidCircle:
     n_facets = 1
 
     def __init__(self, centre: Array, radius: float) -> None:
-        self.centre = np.asarray(centre, dtype=float)
+        self.centre = np.asarray(centre)
         self.radius = radius
+        is_place = self.centre.shape == (2,) and all(map(is_number, self.centre.ravel()))
+        require_of(self, is_place, "centre", "must be two numbers")
+        require_between(self, "radius", 0, np.inf, "must be positive and finite")
+        self.centre = self.centre.astype(float)
         self.X = self.centre[None]
         self.connectivity = np.zeros((1, 1), dtype=np.int32)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import inspect
 import json
+import math
+from numbers import Real
 from typing import Any
 
 _LONGEST = 40  # characters of a value in a message
@@ -52,6 +54,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
+def is_number(value: Any) -> bool:
+    """Whether ``value`` is a finite number."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def require_of(part: Any, holds: bool, key: str, said: str) -> None:
     """Raise `InputError` unless it ``holds`` what is ``said`` of the ``key`` of ``part``."""
     if not holds:
@@ -59,3 +66,13 @@ def require_of(part: Any, holds: bool, key: str, said: str) -> None:
         place = f'{kind.lower()} "{part.name}".{key}' if hasattr(part, "name") else key
         value = shown(getattr(part, key))
         raise InputError(f"archord.{kind}: {place} = {value} {said}.")
+
+
+def require_between(
+    part: Any, key: str, low: float, high: float, said: str, *, least: bool = False
+) -> None:
+    """Raise `InputError`, with what is ``said``, unless the ``key`` of ``part`` is a finite number
+    above ``low`` (or ``low`` itself where it is the ``least``) and below ``high``."""
+    value = getattr(part, key)
+    inside = is_number(value) and (low < value < high or (least and value == low))
+    require_of(part, inside, key, said)

@@ -129,6 +129,7 @@ class Support:
         if isinstance(fixed, str):
             are_letters = {*fixed} <= {*"xyz"}
             fixed = tuple(fixed) if are_letters else (fixed,)
+        fixed = fixed if isinstance(fixed, (tuple, list)) else ()
         known = len(fixed) > 0 and all(freedom in FREEDOMS for freedom in fixed)
         require_of(self, known, "fixed", f"must be directions among {_IN_WORDS}")
         object.__setattr__(self, "fixed", tuple(fixed))
@@ -197,8 +198,8 @@ class Load:
         others = " and ".join(given[1:])
         said = f"must not be given together with {others}"
         require_of(self, len(given) == 1, given[0], said)
-        values = np.ravel(getattr(self, self.kind))
-        numbers = len(values) > 0 and all(map(_is_number, values))
+        values = np.atleast_1d(getattr(self, self.kind))
+        numbers = values.ndim == 1 and len(values) > 0 and all(map(_is_number, values))
         require_of(self, numbers, self.kind, "must be a number, or a list of numbers")
         wanted = (None,) if self.kind == "pressure" else FREEDOMS
         said = f"must be {_IN_WORDS}, and None for a pressure, which acts along the normal"

@@ -16,9 +16,16 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.materials.faults import fault_of
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
 from archord.materials.named import named_material
-from archord.report.errors import InputError, in_sentences
+from archord.report.errors import (
+    InputError,
+    in_sentences,
+    is_number,
+    require_between,
+    require_of,
+)
 from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean, Turn
 from archord.solver.contact.interaction import Interaction, Rigid
 from archord.solver.parts import Body, Coupling, Load, Support
@@ -159,6 +166,7 @@ class Problem:
         """Check the parts, their names, which must be unique, and the drives."""
         if not isinstance(self.mesh, TaggedMesh):
             object.__setattr__(self, "mesh", Mesh.of(self.mesh))
+        self._require_numbers()
         for kind, classes in _PARTS.items():
             _require_parts(kind, getattr(self, kind), classes)
         if self.strain not in ("small", "large"):
@@ -175,6 +183,7 @@ class Problem:
             names = [part.name for part in getattr(self, kind)]
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} must have different names, these are {', '.join(names)}")
+        self._require_pairs_once()
         for load in self.loads:
             if isinstance(load, DeadLoad):
                 load.check()
@@ -187,6 +196,31 @@ class Problem:
         if kinematics.is_plane and kinematics.thickness != 1:
             object.__setattr__(self, "thickness", kinematics.thickness)
         self._require_fitting_mesh()
+
+    def _require_pairs_once(self) -> None:
+        """Raise `InputError` where two interactions let the same surfaces carry twice."""
+        found: dict[frozenset, str] = {}
+        for part in self.interactions:
+            if not isinstance(part.surfaces[0], str):
+                continue
+            other = found.setdefault(frozenset(part.surfaces), part.name)
+            if other != part.name:
+                said = f'interactions "{other}" and "{part.name}" are of the same surfaces'
+                raise InputError(f"archord.Problem: {said}.")
+
+    def _require_numbers(self) -> None:
+        """Raise `InputError` for numbers and units with which no problem can be solved."""
+        said = "must be a number, and 1 at least"
+        require_between(self, "symmetry", 1, np.inf, said, least=True)
+        require_between(self, "tolerance", 0, 1, "must be a number between 0 and 1")
+        for key, most in (("degree", 3), ("max_iterations", np.inf)):
+            value = getattr(self, key)
+            is_whole = is_number(value) and value == int(value) and 1 <= value <= most
+            said = f"must be a whole number between 1 and {most:g}"
+            require_of(self, is_whole, key, said)
+        names = self.units if isinstance(self.units, (tuple, list)) else ()
+        are_names = len(names) == 2 and all(isinstance(name, str) for name in names)
+        require_of(self, are_names, "units", "must be two names, of a length and of a stress")
 
     def _require_fitting_mesh(self) -> None:
         """Raise `InputError` for a mesh of other kinematics, and for contact that space lacks."""
@@ -241,6 +275,8 @@ class Problem:
         """The material of the ``body`` under the problem's kinematics, or as it is while these wait
         for the mesh."""
         material = body.material
+        if not isinstance(material, str) and (fault := fault_of(material)):
+            raise InputError(f'archord.Problem: body "{body.name}".{fault}.')
         if isinstance(material, str):
             try:
                 material = named_material(material, self.units[1])
@@ -364,7 +400,7 @@ def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
         given = kinematics(given.removeprefix("plane "))
     if thickness is None:
         return given
-    if not thickness > 0:
+    if not (is_number(thickness) and thickness > 0):
         raise InputError(f"archord.Problem: thickness must be positive, not {thickness!r}.")
     try:
         return given.with_thickness(thickness)

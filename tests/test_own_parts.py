@@ -238,11 +238,88 @@ def test_what_does_not_fit_the_kinematics_is_a_sentence(given, said):
     [
         ({"kinematics": "curent"}, 'kinematics = "curent" must be "current" or "reference"'),
         ({"gamma_factor": 0.0}, "gamma_factor = 0.0 must be positive"),
+        ({"gamma_factor": np.inf}, "gamma_factor = Infinity must be positive"),
+        ({"gamma_factor": "1"}, 'gamma_factor = "1" must be positive'),
+        ({"friction": -0.1}, "friction = -0.1 must not be negative"),
+        ({"friction": "0.1"}, 'friction = "0.1" must not be negative'),
+        ({"friction": 0.1, "law": "tied"}, 'interaction "contact": friction must be positive, of'),
+        ({"slide": -1.0}, "slide = -1.0 must not be negative"),
+        ({"interference": np.inf}, "interference = Infinity must not be negative, and be finite"),
     ],
 )
 def test_an_interaction_refuses_what_it_would_not_heed(given, said):
     with pytest.raises(archord.InputError, match=said):
         archord.Interaction("contact", ("bolt", "hole"), **given)
+
+
+def hardened(hardening) -> dict:
+    return {"bodies": [archord.Body("slab", archord.J2Material(210e3, 0.3, hardening=hardening))]}
+
+
+def elastic(*numbers) -> dict:
+    return {"bodies": [archord.Body("slab", archord.Elastic(*numbers))]}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (elastic(-210e3, 0.3), 'body "slab".E = -210000.0 must be a number between'),
+        (elastic(np.nan, 0.3), 'body "slab".E = NaN must be a number between'),
+        (elastic("210e3", 0.3), 'body "slab".E = "210e3" must be a number between'),
+        (elastic(True, 0.3), 'body "slab".E = true must be a number between'),
+        (elastic(210e3, 0.5), 'body "slab".nu = 0.5 must be a number between -1 and 0.5'),
+        (hardened(300.0), 'body "slab".hardening = 300.0 must be a hardening law'),
+        (hardened(archord.LinearHardening(-1.0)), 'body "slab".hardening: yield stresses must be'),
+        (hardened(archord.LinearHardening(np.nan)), 'body "slab".hardening: yield stresses'),
+        (hardened(archord.LinearHardening(300.0, np.nan)), 'body "slab".hardening: yield'),
+        (hardened(archord.LinearHardening(300.0, -1e6)), 'body "slab".hardening: yield'),
+        (hardened(archord.VoceHardening(300.0, 400.0, -10.0)), 'body "slab".hardening: yield'),
+        ({"symmetry": 0}, "symmetry = 0 must be a number, and 1 at least"),
+        ({"symmetry": np.nan}, "symmetry = NaN must be a number, and 1 at least"),
+        ({"symmetry": "2"}, 'symmetry = "2" must be a number, and 1 at least'),
+        ({"thickness": "5"}, "thickness must be positive, not '5'"),
+        ({"thickness": np.inf}, "thickness must be positive, not inf"),
+        ({"degree": 9}, "degree = 9 must be a whole number between 1 and 3"),
+        ({"tolerance": 0.0}, "tolerance = 0.0 must be a number between 0 and 1"),
+        ({"max_iterations": 0}, "max_iterations = 0 must be a whole number"),
+        ({"units": "mm"}, 'units = "mm" must be two names'),
+        ({"units": ("mm",)}, r'units = \["mm"\] must be two names'),
+    ],
+)
+def test_numbers_that_no_problem_has_are_a_sentence(given, said):
+    """With `System` alone, too, they would give a force without a word."""
+    with pytest.raises(archord.InputError, match=f"^archord.Problem: {said}") as error:
+        slab(**given)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_pair_of_surfaces_carries_once():
+    pairs = [("pin", "hole"), ("hole", "pin")]
+    contacts = [archord.Interaction(name, pair) for name, pair in zip("ab", pairs, strict=True)]
+    with pytest.raises(archord.InputError, match='interactions "a" and "b" are of the same'):
+        slab(interactions=contacts)
+
+
+@pytest.mark.parametrize(
+    ("centre", "radius", "said"),
+    [
+        ((0.0, 1.0), -1.0, "radius = -1.0 must be positive and finite"),
+        ((0.0, 1.0), np.nan, "radius = NaN must be positive and finite"),
+        ((0.0, 1.0), "1", 'radius = "1" must be positive and finite'),
+        ((0.0, np.nan), 1.0, "must be two numbers"),
+        ((0.0, 1.0, 2.0), 1.0, "must be two numbers"),
+    ],
+)
+def test_a_disc_is_round_and_somewhere(centre, radius, said):
+    with pytest.raises(archord.InputError, match=f"^archord.RigidCircle: .*{said}"):
+        archord.RigidCircle(centre, radius)
+
+
+def test_stages_are_a_list_and_directions_are_words():
+    with pytest.raises(archord.InputError, match="must be a number, or a list of numbers"):
+        archord.Load("press", direction="y", displacement=[[0.0, 1.0], [2.0, 3.0]])
+    with pytest.raises(archord.InputError, match="must be directions among"):
+        archord.Support("base", fixed=None)
 
 
 def test_own_fields_without_fields_are_refused(tmp_path):

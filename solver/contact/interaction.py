@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError, RigidCircle
-from archord.report.errors import in_sentences, require_of
+from archord.report.errors import InputError, in_sentences, require_between, require_of
 from archord.solver.contact.laws.law import ContactLaw
 from archord.solver.contact.laws.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
@@ -119,9 +119,14 @@ class Interaction:
         require_of(self, named or is_law, "law", said)
         said = 'must be "current" or "reference"'
         require_of(self, self.kinematics in ("current", "reference"), "kinematics", said)
-        require_of(self, self.gamma_factor > 0, "gamma_factor", "must be positive")
-        require_of(self, self.interference >= 0, "interference", "must not be negative")
-        require_of(self, self.overlap >= 0, "overlap", "must not be negative")
+        require_between(self, "gamma_factor", 0, np.inf, "must be positive and finite")
+        for key in ("friction", "slide", "interference", "overlap"):
+            said = "must not be negative, and be finite"
+            require_between(self, key, 0, np.inf, said, least=True)
+        try:
+            contact_law(self.law, self.friction)
+        except ValueError as error:
+            raise InputError(f'archord.Interaction: interaction "{self.name}": {error}.') from None
 
     def lacking_in_space(self) -> str:
         """What problems in space cannot do yet of this interaction; empty if there is nothing."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.report.errors import in_sentences, require_of
+from archord.report.errors import in_sentences, require_between
 from archord.solver.contact.laws.law import OPEN, SLIDE, SLIDE_BACK, STICK, ContactLaw, Response
 
 
@@ -70,8 +70,8 @@ class Coulomb(ContactLaw):
 
     def __post_init__(self) -> None:
         """Check the coefficient; raise `InputError`."""
-        is_friction = 0 <= self.friction < np.inf
-        require_of(self, is_friction, "friction", "must not be negative, and be finite")
+        said = "must not be negative, and be finite"
+        require_between(self, "friction", 0, np.inf, said, least=True)
 
     def state(self, n: int) -> FrictionState:
         """Points at rest."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.report.errors import in_sentences, require_of
+from archord.report.errors import in_sentences, require_between
 from archord.solver.contact.laws.law import OPEN, SLIDE, ContactLaw, Response, State
 
 
@@ -48,8 +48,8 @@ class Exponential(ContactLaw):
 
     def __post_init__(self) -> None:
         """Check the parameters; raise `InputError`."""
-        for name, value in vars(self).items():
-            require_of(self, 0 < value < np.inf, name, "must be positive and finite")
+        for name in ("pressure", "clearance"):
+            require_between(self, name, 0, np.inf, "must be positive and finite")
 
     def respond(
         self, opening: Array, trial: Array, gamma: Array, state: State, dt: float
