@@ -319,7 +319,7 @@ def test_stages_are_a_list_and_directions_are_words():
     with pytest.raises(archord.InputError, match="must be a number, or a list of numbers"):
         archord.Load("press", direction="y", displacement=[[0.0, 1.0], [2.0, 3.0]])
     with pytest.raises(archord.InputError, match="must be directions among"):
-        archord.Support("base", fixed=None)
+        archord.Support("base", fixed=3)
 
 
 def test_own_fields_without_fields_are_refused(tmp_path):
