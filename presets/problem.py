@@ -51,7 +51,7 @@ def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
         return scene
     data = plain(scene)
     analysis = data.get("analysis", {})
-    data["analysis"] = analysis | {"plane": "space" if in_space else plane}
+    data["analysis"] = analysis | {"plane": "space" if in_space else "strain"}
     make: Any = ProblemScene
     return make(mesh_name(scene), None, **data)
 

@@ -140,6 +140,8 @@ class ProblemScene(Checked):
         drawn = self.analysis.plane != "axisymmetric" or self.mesh.shape is None
         said = 'must be "strain" or "stress" for the shape of a preset, which is plane'
         require(drawn, "analysis.plane", said)
+        if self.in_space:
+            object.__setattr__(self.analysis, "plane", "space")
         if self.in_space or "plane" in self.analysis.model_fields_set:
             self._require_dimension()
         self._directions()
@@ -170,6 +172,8 @@ class ProblemScene(Checked):
     def _require_dimension(self) -> None:
         """Raise `Fault` for a direction, a point or a disc that does not fit analysis.plane."""
         in_space = self.in_space
+        said = "is for planes: bodies in space are drawn whole"
+        require(not in_space or self.analysis.thickness is None, "analysis.thickness", said)
         allowed = IN_SPACE if in_space else IN_PLANE
         where = "in space" if in_space else "in a plane"
         used: list[tuple[str, str, str, str | None]] = []

@@ -70,7 +70,8 @@ class BodyPoints:
             self.elastic = kinematics.small.T @ self.elastic @ kinematics.small
         self._working = slice(None) if large else list(kinematics.working)
         self.strain: Array = np.zeros((self.weight.size, self.measure.k))
-        self.stress: Array = np.zeros((self.weight.size, kinematics.n_stress))
+        components = self.measure.k if large else kinematics.n_stress
+        self.stress: Array = np.zeros((self.weight.size, components))
         self.flows: np.ndarray = np.zeros(len(cells), dtype=bool)
 
     @property

@@ -111,8 +111,6 @@ class ProblemAnalysis(Modelling):
         is_ring = self.plane == "axisymmetric"
         said = "is for planes: axisymmetric forces are of the whole ring"
         require(not is_ring or self.thickness is None, "thickness", said)
-        said = "is for planes: bodies in space are drawn whole"
-        require(self.plane != "space" or self.thickness is None, "thickness", said)
         said = "must be 1, or 2 for a half that is cut across the axis, as bodies are whole rings"
         require(not is_ring or self.symmetry <= 2, "symmetry", said)
         return self

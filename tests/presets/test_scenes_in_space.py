@@ -1,9 +1,11 @@
 """General scenes in space: what each word does, on two blocks of tetrahedra in a file."""
 
 import gmsh
+import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.presets.account import account_of
 from archord.report.errors import InputError
 from archord.scene.file import parse_any
@@ -176,3 +178,33 @@ def test_only_springs_keep_a_smooth_block_from_sliding(mesh):
     rough = [ON_EACH_OTHER | {"friction": 0.3}]
     account = account_of(parse_any(table(mesh, interaction=rough, **base)), MPI.COMM_SELF)
     assert not any("sliding" in said for said in account.warnings)
+
+
+RUNS = {
+    "large strain": {"analysis": {"strain": "large"}},
+    "a metal": {"body": [{"name": "lower", "material": "S355"}, {"name": "upper"} | SOLID]},
+    "back stresses": {
+        "body": [
+            {"name": "lower"} | SOLID,
+            {"name": "upper"} | SOLID | {"yield_stress": 1.0, "back_stresses": [[10.0, 0.0]]},
+        ]
+    },
+    "one side": {"interaction": [ON_EACH_OTHER | {"integrated": "lower top"}]},
+    "reference": {"analysis": {"kinematics": "reference"}},
+    "a coupling": {
+        "coupling": [POINT],
+        "load": [TURN, PRESS | {"on": "crank"}],
+        "support": [CLAMP],
+    },
+}
+
+
+@pytest.mark.parametrize("words", RUNS)
+def test_a_run_in_space_goes_on_from_its_folder(mesh, words, tmp_path):
+    """Its scene, in words, is the scene that was solved."""
+    given = table(mesh, path={"steps": 2}, **RUNS[words])
+    run = archord.solve(given, tmp_path / "run")
+    assert run.status == "done"
+    assert run.scene.analysis.plane == "space"
+    again = archord.solve(run.scene, tmp_path / "again")
+    np.testing.assert_allclose(again.history["press force"], run.history["press force"], rtol=1e-9)
