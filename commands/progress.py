@@ -86,8 +86,11 @@ class Progress:
         said = (
             f"step {self._done + 1}, attempt {self._substep}, load {load:.6g}, iteration "
             f"{len(result.residuals) - 1}, residual {result.residuals[-1]:.1e}, "
-            f"{result.active_set_changes[-1]} points changed, {seconds:.0f} s"
+            f"{result.active_set_changes[-1]} points changed, "
         )
+        if result.krylov_iterations:
+            said += f"{result.krylov_iterations} GMRES iterations, "
+        said += f"{seconds:.0f} s"
         self.move(said)
         long_silent = self.moving is None and perf_counter() - self._spoken > _LONG_SILENCE
         if self.verbose or long_silent:

@@ -29,6 +29,8 @@ _CONTACT = {
 }
 _OF_LENGTH = ("ux", "uy", "gap")
 _OF_STRESS = (*_CONTACT, "hoop", "along", "normal", "shear", "p1", "p2", "p3")
+_PER = {"axisymmetric": "on the whole ring", "space": "on the whole"}
+_PER |= dict.fromkeys(("strain", "stress"), "per unit thickness")
 _GAP = 0.3  # degrees: the least gap in a circle
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
 _ROUND_OFF = 1e-6  # degrees
@@ -211,7 +213,7 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
         by=by,
         length=run.scene.units.length,
         axes=kind.axes,
-        per="per unit thickness" if kind.is_plane else "on the whole ring",
+        per=_PER[kind.name],
         **found._asdict(),
     )
 

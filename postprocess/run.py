@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
+from archord.materials.kinematics import Kinematics, kinematics
 from archord.output.files.seal import ChangedError, read_report, require_intact
 from archord.output.folder import is_sweep
 from archord.output.history import fault_of_history, read_history
@@ -123,6 +124,11 @@ class Run:
         self.message: str = self.summary["message"]
         self.warnings: list[str] = self.summary["warnings"]
         self.steps = len(self.columns["step"])
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """How displacement becomes strain: names of coordinates and of components."""
+        return kinematics(self.scene.analysis.plane)
 
     @cached_property
     def history(self) -> pd.DataFrame:

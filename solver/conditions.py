@@ -112,12 +112,14 @@ class Mean:
     """The mean motion of a facet set: the motion of a reference ``point`` along an ``axis``, or its
     rotation behind the axes: 2 in a plane; 3, 4 and 5 about x, y and z in space.
 
-    With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x -
-    c|^2`` about the centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive``
-    prescribes this motion, or the force (moment) on the point. The facets get the force spread as
-    the motion's derivative says, which is statically equivalent. Without a point the centroid is
-    the point. A symmetric half that shows half of an edge gives no point: the mirrored facets take
-    up the moment. Means of one ``name`` have one reaction. A drive has one mean at most.
+    It is the rigid motion that is closest to the facets' motion by least squares: with the mean
+    displacement ``w`` and the mean rotation ``t = J^-1 integral of (x - c) x u`` about the centroid
+    ``c``, of facets with the moments of inertia ``J`` (in a plane ``integral of |x - c|^2``), the
+    point moves by ``w + t x (point - c)``. The ``drive`` prescribes this motion, or the force
+    (moment) on the point. The facets get the force spread as the motion's derivative says, which is
+    statically equivalent. Without a point the centroid is the point. A symmetric half that shows
+    half of an edge gives no point: the mirrored facets take up the moment. Means of one ``name``
+    have one reaction. A drive has one mean at most.
     """
 
     name: str

@@ -10,7 +10,7 @@ from archord.commands import progress
 from archord.commands.progress import Progress
 from archord.scene.file import parse_any
 
-RESULT = SimpleNamespace(residuals=[1.0, 2.5e-3], active_set_changes=[0, 7])
+RESULT = SimpleNamespace(residuals=[1.0, 2.5e-3], active_set_changes=[0, 7], krylov_iterations=0)
 LINE = "step 1, attempt 1, load 0.5, iteration 1, residual 2.5e-03, 7 points changed"
 
 
@@ -36,6 +36,13 @@ def test_verbose_tells_every_iteration(clock, capsys):
     for _ in range(2):
         report.iterate(0.5, RESULT)
     assert capsys.readouterr().out.count(LINE) == 2
+
+
+def test_krylov_iterations_are_told_where_there_are_any(clock, capsys):
+    """Of a solve by GMRES."""
+    result = SimpleNamespace(**vars(RESULT) | {"krylov_iterations": 12})
+    reporting(verbose=True).iterate(0.5, result)
+    assert f"{LINE}, 12 GMRES iterations, " in capsys.readouterr().out
 
 
 def test_a_long_silence_is_broken_once(clock, capsys):

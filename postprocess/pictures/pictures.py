@@ -53,7 +53,7 @@ def draw_run(
     Parameters
     ----------
     run : Run
-        The run. Its field is drawn if the run wrote fields.
+        The run. Its field is drawn if the run wrote fields; in space the forces are drawn alone.
     target : str or Path
         The picture, .png, .svg or .pdf.
     steps : sequence of int
@@ -106,6 +106,13 @@ def panels_of(
     draw_fields, draw_contact, draw_forces = _PANELS[type(run.view)]
     draws: list[Callable[[Any], None]] = []
     of_body = "" if edges and field in problems.OF_EDGES else field
+    if run.kinematics.dimension == 3:
+        if steps or field or edges:
+            raise InputError(
+                f"{run.folder}: bodies in space are not drawn; archord export --vtk writes them "
+                "for ParaView and pyvista."
+            )
+        return [lambda axes: draw_forces(axes, run)]
     if run.scene.output.fields or of_body:
         first = numbers[0] if numbers else None
         draws.append(lambda axes: draw_fields(axes, run, first, of_body))

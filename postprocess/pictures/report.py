@@ -96,7 +96,7 @@ def _pages_of(run: Run) -> Iterator[Figure]:
     )
     room = _LINES
     text: Any = figure
-    if run.scene.output.fields:
+    if run.scene.output.fields and run.kinematics.dimension == 2:
         mesh, text = figure.subfigures(2, 1, height_ratios=[1, 2.2])
         _draw_mesh(mesh.subplots(), run, run.fields(run.number(None)))
         room = _LINES_BELOW

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 
 import h5py
 import numpy as np
@@ -17,9 +18,13 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.output.files.step_file import all_arrays
 from archord.postprocess.export import export_vtk
+from archord.postprocess.pictures.report import write_report
+from tests import forked
+from tests.output.run_files import accepted_steps
 from tests.postprocess.vtk_reader import VtkFile
 from tests.solver.contact.blocks_in_space import bodies, tagged
 from tests.solver.space import KINDS
+from tests.test_kill import Run
 
 STEEL = J2Material(210e3, 0.3, hardening=LinearHardening(300.0, 2100.0))
 SOFT = Elastic(70e3, 0.3)
@@ -208,3 +213,29 @@ def test_a_restart_is_bit_identical(tmp_path, monkeypatch):
             archord.solve(problem(), tmp_path / "halted", comm=MPI.COMM_SELF, progress=True)
     archord.solve(problem(), tmp_path / "halted", restart=True, comm=MPI.COMM_SELF)
     same(tmp_path / "whole", tmp_path / "halted", 0.0, 1e-14)
+
+
+def test_a_run_is_solved_again_and_extended_by_its_own_scene(folders, tmp_path):
+    """On the mesh that its folder keeps; killed between two steps, it goes on."""
+    whole = folders[CellType.tetrahedron]
+    assert (
+        forked.archord("solve", f"{whole}/scene.toml", "-o", "again", cwd=tmp_path).returncode == 0
+    )
+    same(whole, tmp_path / "again", 0.0)
+    killed = Run(tmp_path, f"{whole}/scene.toml", "-o", "killed")
+    checkpoint = tmp_path / "killed" / "checkpoint.h5"
+    while killed.process.is_alive() and not checkpoint.exists():
+        time.sleep(0.001)
+    killed.end(0.0)
+    assert accepted_steps(tmp_path / "killed") >= 1
+    assert forked.archord("solve", "killed", "--restart", cwd=tmp_path).returncode == 0
+    same(whole, tmp_path / "killed", 0.0, 1e-14)
+
+
+def test_pictures_of_bodies_are_left_out_or_refused(folders, tmp_path):
+    """A report and a picture have the forces."""
+    run = archord.load(folders[CellType.tetrahedron])
+    assert archord.draw_run(run, tmp_path / "forces.png").stat().st_size > 1000
+    assert write_report(run, tmp_path / "run.pdf").stat().st_size > 1000
+    with pytest.raises(archord.InputError, match=r"bodies in space are not drawn; .* --vtk"):
+        archord.draw_run(run, tmp_path / "field.png", field="peeq")
