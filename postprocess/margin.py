@@ -321,20 +321,22 @@ def _lug_of(run: Run) -> _Lug:
     pull = pulls[0]
     unit = run.units[f"{pull} force"]
     body = _body_of(run, "lug")
-    return _Lug(run.scene.mesh.shape, body, pull, run.scene.thickness, 1.0, unit)
+    shape = run.scene.mesh.shape
+    thickness = run.scene.thickness if shape.space is None else shape.space.thickness
+    return _Lug(shape, body, pull, thickness, 1.0, unit)
 
 
 def _plate_of(run: Run, name: str) -> _Lug:
     """The inner or the outer plate of a run of a [clevis]; its columns of forces are per unit of
     its thickness. Raises `InputError`."""
-    pull = f"{name} pull"
     shape = run.scene.mesh.shape
+    in_space = shape.space is not None
+    pull = "pull" if in_space else f"{name} pull"
     drawn = getattr(shape, name)
-    if {load.name for load in run.scene.load} != {"inner pull", "outer pull"}:
-        raise InputError(
-            f"{run.folder}: margins of a clevis are for its loads 'inner pull' and 'outer pull' "
-            "alone."
-        )
+    known = {"pull"} if in_space else {"inner pull", "outer pull"}
+    if {load.name for load in run.scene.load} != known:
+        names = " and ".join(map(repr, sorted(known)))
+        raise InputError(f"{run.folder}: margins of a clevis are for its loads {names} alone.")
     if drawn.thickness is None:
         raise InputError(
             f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it "
@@ -344,7 +346,8 @@ def _plate_of(run: Run, name: str) -> _Lug:
     together = number * drawn.thickness
     lug = LugShape(radius=shape.radius, clearance=shape.clearance, **drawn.outline(shape))
     unit = run.scene.units.force_of(1.0)
-    return _Lug(lug, _body_of(run, name), pull, together, together, unit)
+    per = 1.0 if in_space else together
+    return _Lug(lug, _body_of(run, name), pull, together, per, unit)
 
 
 def _body_of(run: Run, cells: str) -> Any:

@@ -28,7 +28,7 @@ _PRESETS: dict[str, dict[str, Any]] = {
     name: {
         section: info
         for section, info in scene.model_fields.items()
-        if section not in Preset.model_fields
+        if section not in Preset.model_fields or section in scene.__annotations__
     }
     for name, scene in PRESETS.items()
 }

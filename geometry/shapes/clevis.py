@@ -14,8 +14,9 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import mesh_joint
-from archord.geometry.shapes.lug import ACROSS, Plate, draw_plate, plate_size, size_around
+from archord.geometry.shapes.lug import ACROSS, draw_plate, plate_size, plates_of, size_around
 from archord.geometry.shapes.sketch import PinPart, Sketch
+from archord.geometry.shapes.solid_clevis import solid_clevis
 
 _GAP = 1.0  # between the plates, in radii
 _SETS = ("pin", "hole", "flat", "clamp", "end", "sides")
@@ -31,6 +32,7 @@ def clevis(
     growth: float,
     *,
     pin: PinPart = "half",
+    space: Mapping[str, float] | None = None,
     **options,
 ) -> TaggedMesh:
     """Mesh the bodies "inner pin", "inner", "outer pin" and "outer", with ``options`` as for
@@ -38,13 +40,13 @@ def clevis(
 
     The plates ``inner`` and ``outer`` have a ``width``, ``edge_distance``, ``length`` and ``end``.
     Sets are named as in a lug, with "inner " or "outer " in front, and "axis". Lengths share one
-    unit.
+    unit. In ``space`` it is a `solid_clevis`.
     """
+    if space is not None:
+        parts = (comm, radius, clearance, inner, outer, element_size, growth)
+        return solid_clevis(*parts, space=space)
     hole = (radius + clearance) / radius
-    plates = {}
-    for name, keys in (("inner", inner), ("outer", outer)):
-        side, tip, back = (keys[key] / radius for key in ("width", "edge_distance", "length"))
-        plates[name] = Plate(hole, side / 2, tip, back, keys["end"] == "round")
+    plates = plates_of({"inner": inner, "outer": outer}, radius, hole)
     places = {"inner": 0.0, "outer": plates["inner"].tip + _GAP + plates["outer"].back}
     size = min(element_size / radius, *(plate.ligament / ACROSS for plate in plates.values()))
     bodies = [f"{name}{part}" for name in plates for part in (" pin", "")]

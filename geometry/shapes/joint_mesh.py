@@ -14,7 +14,7 @@ from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.sketch import Place, Sketch
-from archord.geometry.shapes.solids import Depths, mesh_solids, slabs_of
+from archord.geometry.shapes.solids import Rims, mesh_solids, slabs_of
 
 _CUT_ABOVE = (
     30_000,
@@ -38,16 +38,16 @@ def mesh_joint(
 
     The mesh is made with larger elements, which are then cut in four as often as ``refinements``
     says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual
-    ways). In ``space``, whose keys are the fields of `Depths`, all faces are extruded along z.
+    ways). In ``space``, the section of a scene, all faces are extruded along z.
     Collective; rank 0 meshes.
     """
     pins = {
         name: circle.centre for name, circle in sketch.circles.items() if name.split()[-1] == "pin"
     }
     if space is not None:
-        depths = Depths(**space).over(radius)
-        slabs = slabs_of(sketch, depths)
-        joint = mesh_solids(comm, sketch, slabs, depths, radius=radius, partitioner=partitioner)
+        rims = Rims.of(space, radius)
+        slabs = slabs_of(sketch, space["thickness"] / radius, space["pin_length"] / radius)
+        joint = mesh_solids(comm, sketch, slabs, rims, radius=radius, partitioner=partitioner)
         return replace(joint, point_sets=_centres(pins, radius, 3))
 
     def build(gmsh) -> None:

@@ -9,8 +9,9 @@ clamp x = -length to the apex x = edge distance of its end, and from y = -width/
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from mpi4py import MPI
 
@@ -43,22 +44,40 @@ class Plate:
         return min(self.side, self.tip) - self.hole
 
 
+def plates_of(
+    outlines: Mapping[str, Mapping[str, Any]], radius: float, hole: float
+) -> dict[str, Plate]:
+    """The plates of these ``outlines`` in radii of the pin, as the ``hole`` is."""
+    plates = {}
+    for name, keys in outlines.items():
+        side, tip, back = (keys[key] / radius for key in ("width", "edge_distance", "length"))
+        plates[name] = Plate(hole, side / 2, tip, back, keys["end"] == "round")
+    return plates
+
+
 def draw_plate(
-    sketch: Sketch, plate: Plate, body: str, up: int, at: float = 0.0, before: str = ""
+    sketch: Sketch,
+    plate: Plate,
+    body: str,
+    up: int,
+    at: float = 0.0,
+    before: str = "",
+    to: int = 1,
 ) -> None:
     """Draw the half of a ``plate`` above (``up`` = 1) or below the axis, with the hole's centre at
-    (``at``, 0); the names of its sets but the axis have ``before`` in front."""
+    (``at``, 0) and its tip on the side ``to`` (1 or -1) of the hole; the names of its sets but the
+    axis have ``before`` in front."""
     hole = plate.hole
     side = plate.side
-    tip = at + plate.tip
-    back = at - plate.back
+    tip = at + to * plate.tip
+    back = at - to * plate.back
     round_hole = Circle(f"{before}hole", (at, 0.0), hole)
-    apex = Circle(f"{before}end", (tip - side, 0.0), side) if plate.round else None
-    corner = (tip - side if apex else tip, up * side)
-    arc = sketch.path(body, (at + hole, 0), (at, up * hole), (at - hole, 0), on=round_hole)
-    axis = sketch.path(body, (at - hole, 0), (back, 0)) + sketch.path(
-        body, (tip, 0), (at + hole, 0)
-    )
+    apex = Circle(f"{before}end", (tip - to * side, 0.0), side) if plate.round else None
+    corner = (tip - to * side if apex else tip, up * side)
+    near = at + to * hole
+    far = at - to * hole
+    arc = sketch.path(body, (near, 0), (at, up * hole), (far, 0), on=round_hole)
+    axis = sketch.path(body, (far, 0), (back, 0)) + sketch.path(body, (tip, 0), (near, 0))
     clamp = sketch.path(body, (back, 0), (back, up * side))
     last = sketch.path(body, corner, (tip, 0), on=apex)
     sides = sketch.path(body, (back, up * side), corner)
@@ -71,10 +90,10 @@ def size_around(x: float, r: float, size: float, growth: float) -> str:
     return f"{size!r} + {growth!r} * Abs({around(x)} - {r!r})"
 
 
-def plate_size(plate: Plate, size: float, growth: float, at: float = 0.0) -> str:
+def plate_size(plate: Plate, size: float, growth: float, at: float = 0.0, to: int = 1) -> str:
     """The element size in a plate with its hole about (``at``, 0): growing from the hole and the
     clamp's corners."""
-    off = f"Sqrt((x - {at!r} + {plate.back!r})^2 + (Abs(y) - {plate.side!r})^2)"
+    off = f"Sqrt((x - {at!r} + ({to * plate.back!r}))^2 + (Abs(y) - {plate.side!r})^2)"
     clamped = f"{_CORNER * size!r} + {growth!r} * {off}"
     return f"Min({size_around(at, plate.hole, size, growth)}, {clamped})"
 

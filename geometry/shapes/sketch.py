@@ -70,15 +70,20 @@ class Sketch:
             self.lines[name] += [line for line in paths[name] if line not in self.lines[name]]
         return len(self.loops)
 
-    def pin(self, x: float, up: int, part: PinPart, before: str = "") -> None:
-        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0); the names of
-        its body and its sets have ``before`` in front."""
+    def pin(self, x: float, up: int, part: PinPart, before: str = "", bore: float = 0.0) -> None:
+        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0), which may have
+        a ``bore`` of a radius; the names of its body and its sets have ``before`` in front."""
         pin = f"{before}pin"
         for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
             arc = self.path(pin, (x + to, 0), (x, up), on=Circle(pin, (x, 0.0), 1.0))
-            flat = self.path(pin, (x, up), (x, 0))
-            axis = self.path(pin, (x, 0), (x + to, 0))
-            self.face(pin, **{pin: arc, f"{before}flat": flat, "axis": axis})
+            flat = self.path(pin, (x, up), (x, up * bore))
+            axis = self.path(pin, (x + to * bore, 0), (x + to, 0))
+            paths = {pin: arc, f"{before}flat": flat, "axis": axis}
+            if bore:
+                inside = Circle(f"{pin} inside", (x, 0.0), bore)
+                ends = (x, up * bore), (x + to * bore, 0)
+                paths[inside.facets] = self.path(pin, *ends, on=inside)
+            self.face(pin, **paths)
 
 
 def around(x: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
@@ -25,27 +25,22 @@ _SAME = 1e-6  # distance of places that are one, in radii of the pin
 _OPTIONS = {"ElementOrder": 2, "HighOrderOptimize": 0}
 
 
-@dataclass(frozen=True)
-class Depths:
-    """How a joint is extruded: from its mid-plane z = 0, half of it.
+class Rims(NamedTuple):
+    """The rims of the holes that the pin lies in; lengths are in radii of the pin.
 
-    - ``thickness``: of all bodies but the pin, the whole
-    - ``pin_length``: the whole
-    - ``chamfer``: leg of a chamfer of 45 degrees at the rims of the holes that the pin lies in
-    - ``fillet``: radius of a rounding there, instead
-    - ``rim_ratio``: element size at these rims over the size on the arcs
+    - ``chamfer``: leg of a chamfer of 45 degrees
+    - ``fillet``: radius of a rounding, instead
+    - ``ratio``: element size there over the size on the arcs
     """
 
-    thickness: float
-    pin_length: float
-    chamfer: float = 0.0
-    fillet: float = 0.0
-    rim_ratio: float = 1.0
+    chamfer: float
+    fillet: float
+    ratio: float
 
-    def over(self, radius: float) -> Depths:
-        """These depths in radii of the pin."""
-        lengths = ("thickness", "pin_length", "chamfer", "fillet")
-        return replace(self, **{name: getattr(self, name) / radius for name in lengths})
+    @classmethod
+    def of(cls, space: Mapping[str, float], radius: float) -> Rims:
+        """The rims that the section ``space`` of a scene tells."""
+        return cls(space["chamfer"] / radius, space["fillet"] / radius, space["rim_ratio"])
 
 
 @dataclass(frozen=True)
@@ -71,12 +66,12 @@ class _Line(NamedTuple):
     sets: Sequence[str]
 
 
-def slabs_of(sketch: Sketch, depths: Depths) -> list[Slab]:
-    """The bodies of a ``sketch``, each extruded once."""
-    half = depths.thickness / 2
+def slabs_of(sketch: Sketch, thickness: float, pin_length: float) -> list[Slab]:
+    """The bodies of a ``sketch``, each extruded once from the mid-plane: half of it."""
+    half = thickness / 2
     slabs = []
     for body in filter(sketch.faces.get, sketch.faces):
-        top = depths.pin_length / 2 if body == "pin" else half
+        top = pin_length / 2 if body == "pin" else half
         rims = (half,) if bore_of(sketch, body) else ()
         slabs.append(Slab(body, body, 0.0, top, rims=rims))
     return slabs
@@ -86,7 +81,7 @@ def mesh_solids(
     comm: MPI.Comm,
     sketch: Sketch,
     slabs: Sequence[Slab],
-    depths: Depths,
+    rims: Rims,
     *,
     radius: float,
     partitioner=None,
@@ -97,8 +92,8 @@ def mesh_solids(
     Further sets are "mid-plane" (z = 0), "faces" (the other flat ends), and "rim", the chamfers or
     fillets, which belong to their bore's set, too. Collective; rank 0 meshes.
     """
-    build = partial(draw_solids, sketch, slabs, depths)
-    key = (*vars(sketch).items(), tuple(slabs), depths)
+    build = partial(draw_solids, sketch, slabs, rims)
+    key = (*vars(sketch).items(), tuple(slabs), rims)
     made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key)
     made.mesh.geometry.x[:] *= radius
     return made
@@ -130,9 +125,9 @@ def _is_among(height: float, heights: Sequence[float]) -> bool:
     return any(abs(height - other) < _SAME for other in heights)
 
 
-def draw_solids(sketch: Sketch, slabs: Sequence[Slab], depths: Depths, gmsh: Any) -> None:
+def draw_solids(sketch: Sketch, slabs: Sequence[Slab], rims: Rims, gmsh: Any) -> None:
     """Draw the ``slabs`` of a ``sketch`` in ``gmsh``: bodies, sets and element sizes."""
-    drawing = _Drawing(gmsh, sketch, depths)
+    drawing = _Drawing(gmsh, sketch, rims)
     bodies: dict[str, dict[int, Slab]] = defaultdict(dict)
     for slab in slabs:
         for volume in drawing.extruded(slab):
@@ -157,12 +152,12 @@ def draw_solids(sketch: Sketch, slabs: Sequence[Slab], depths: Depths, gmsh: Any
 class _Drawing:
     """A model of gmsh in which profiles of a ``sketch`` are extruded."""
 
-    def __init__(self, gmsh: Any, sketch: Sketch, depths: Depths) -> None:
+    def __init__(self, gmsh: Any, sketch: Sketch, rims: Rims) -> None:
         self.model = gmsh.model
         self.occ = gmsh.model.occ
         self.field = gmsh.model.mesh.field
         self.sketch = sketch
-        self.depths = depths
+        self.rims = rims
         self.lines = {name: lines_of(sketch, name) for name, faces in sketch.faces.items() if faces}
 
     def extruded(self, slab: Slab) -> list[int]:
@@ -199,8 +194,8 @@ class _Drawing:
 
     def blunted(self, volume: int, slab: Slab) -> int:
         """The ``volume`` with a chamfer or a fillet where its bore ends."""
-        depths = self.depths
-        length = depths.chamfer or depths.fillet
+        rims = self.rims
+        length = rims.chamfer or rims.fillet
         if not (length and slab.rims):
             return volume
         bore = bore_of(self.sketch, slab.profile)
@@ -213,7 +208,7 @@ class _Drawing:
                 if _is_among(self._middle(1, curve)[2], slab.rims):
                     walls.append(wall)
                     curves.append(curve)
-        if depths.chamfer:
+        if rims.chamfer:
             made = self.occ.chamfer([volume], curves, walls, [length])
         else:
             made = self.occ.fillet([volume], curves, [length])
@@ -273,12 +268,14 @@ class _Drawing:
 
     def rim_sizes(self, slabs: Sequence[Slab]) -> list[int]:
         """Fields of element sizes that grow from where bores end."""
-        if self.depths.rim_ratio == 1:
+        if self.rims.ratio == 1:
             return []
         fields = []
         for bore, slab in product(self.sketch.bores, slabs):
+            if bore.facets != bore_of(self.sketch, slab.profile):
+                continue
             circle = self.sketch.circles[bore.facets]
-            smallest = self.depths.rim_ratio * bore.size
+            smallest = self.rims.ratio * bore.size
             for height in slab.rims:
                 off = (
                     f"Sqrt(({around(circle.centre[0])} - {circle.radius!r})^2 + (z - {height!r})^2)"

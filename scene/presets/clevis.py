@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 
 from archord.scene.presets.lug import Lug, PlateOutline
 from archord.scene.presets.preset import BoredShape, PinPart, Preset, general_scene
-from archord.scene.sections.bodies import Solid
+from archord.scene.presets.space import ClevisSpace
+from archord.scene.sections.bodies import NotNegative, Solid
 from archord.scene.sections.keys import Positive, key, require
 
 
@@ -40,6 +41,12 @@ class DrawnPlate(PlateOfClevis):
     )
 
 
+class PlateBushing(Solid):
+    """A bushing in every plate of a clevis, bonded to it: the pin lies in it with the clearance."""
+
+    thickness: Positive = key("thickness of its wall", "length", example=2.0)
+
+
 class Clevis(BoredShape):
     """A pin through one inner and two outer plates, and how finely they are meshed."""
 
@@ -50,19 +57,32 @@ class ClevisShape(Clevis):
     inner: DrawnPlate
     outer: DrawnPlate
     pin: PinPart = "half"
+    wall: NotNegative = key("in space: thickness of the bushings' walls", "length", default=0.0)
+    space: ClevisSpace | None = Field(None, description="lengths along z of a clevis in space")
     kind: Literal["clevis"] = "clevis"
     drawing: ClassVar[str] = "archord.geometry.shapes.clevis:clevis"
 
     @model_validator(mode="after")
     def _plates(self) -> ClevisShape:
         for name in ("inner", "outer"):
-            getattr(self, name).lug(self).check(place=(name,))
+            plate = getattr(self, name)
+            plate.lug(self).check(self.radius + self.clearance + self.wall, place=(name,))
+            said = "is missing, as a clevis in space has one"
+            require(self.space is None or plate.thickness is not None, (name, "thickness"), said)
         return self
 
     def arguments(self) -> dict[str, Any]:
         """What draws it: lengths, and what is drawn."""
-        plates = {name: getattr(self, name).outline(self) for name in ("inner", "outer")}
-        return super().arguments() | plates
+        found = super().arguments()
+        wall = found.pop("wall")
+        for name in ("inner", "outer"):
+            plate = getattr(self, name)
+            found[name] = plate.outline(self)
+            if self.space is not None:
+                found[name]["thickness"] = plate.thickness
+        if self.space is not None:
+            found["space"] |= {"wall": wall}
+        return found
 
 
 class ClevisScene(Preset):
@@ -73,17 +93,30 @@ class ClevisScene(Preset):
     clevis: Clevis = Field(description="radius of the pin, clearance in all plates, and mesh")
     inner: ClevisPlate = Field(description="geometry and material of the inner plate")
     outer: ClevisPlate = Field(description="geometry and material of each of the two outer plates")
+    bushing: PlateBushing | None = Field(
+        None, description="a bushing in every plate of a clevis in space"
+    )
+    space: ClevisSpace | None = Field(  # type: ignore[assignment]
+        None, description="the clevis in space instead of a plane"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> ClevisScene:
         self.require_whole("clevis.clearance", self.clevis.clearance)
+        hole = self.clevis.radius + self.clevis.clearance + self._wall
         for name, plate in self._plates.items():
-            plate.lug(self.clevis).check(place=(name,))
+            plate.lug(self.clevis).check(hole, place=(name,))
+            if self.space is not None:
+                self.space.check_rims(self.clevis.radius, plate.thickness)
         said = (
             "is not for a clevis: its plates share a force, and the displacement is the sum of "
             "both; give force"
         )
-        require(self.load.displacement is None, "load.displacement", said)
+        in_space = self.space is not None
+        require(in_space or self.load.displacement is None, "load.displacement", said)
+        require(in_space or self.bushing is None, "bushing", "is for a clevis in space: give space")
+        said = "must not be negative in space"
+        require(not in_space or self.clevis.clearance >= 0, "clevis.clearance", said)
         require(not self.pin.rigid, "pin.rigid", "must be false in a clevis")
         said = "is not for a clevis, whose plates have a thickness each"
         require(self.analysis.thickness is None, "analysis.thickness", said)
@@ -93,8 +126,16 @@ class ClevisScene(Preset):
     def _plates(self) -> dict[str, ClevisPlate]:
         return {"inner": self.inner, "outer": self.outer}
 
+    @property
+    def _wall(self) -> float:
+        return self.bushing.thickness if self.bushing else 0.0
+
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
+        return self._in_plane() if self.space is None else self._solid()
+
+    def _in_plane(self) -> dict[str, Any]:
+        """Two plane problems, each of a plate and its own pin."""
         parts: dict[str, list[dict[str, Any]]] = {"interaction": [], "support": [], "load": []}
         shape = self.arguments() | {"kind": "clevis"}
         overlap = max(-self.clevis.clearance, 0.0)
@@ -115,3 +156,37 @@ class ClevisScene(Preset):
             bodies |= {f"{name} pin": self.pin, name: plate}
         parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
         return general_scene(self, shape, 2, bodies, **parts, path={"steps": self.load.steps})
+
+    def _solid(self) -> dict[str, Any]:
+        """One pin through all plates: the outer ones are pulled away from the inner one."""
+        shape = self.arguments() | {"kind": "clevis", "wall": self._wall}
+        bodies: dict[str, Solid] = {"pin": self.pin}
+        contacts = []
+        for name, plate in self._plates.items():
+            shape[name] = plate.outline(self.clevis) | {"thickness": plate.thickness}
+            bodies[name] = plate
+            hole = f"{name} hole"
+            if self.bushing is not None:
+                sleeve = f"{name} bushing"
+                bodies[sleeve] = self.bushing
+                surfaces = [f"{sleeve} outside", hole]
+                contacts.append(
+                    {"name": f"{sleeve} in {name}", "surfaces": surfaces, "law": "tied"}
+                )
+                hole = f"{sleeve} inside"
+            contacts.append({"name": f"pin in {name}", "surfaces": [f"{name} pin", hole]})
+        pull = {"name": "pull", "on": "outer clamp", "direction": "x"}
+        return general_scene(
+            self,
+            shape,
+            2,
+            bodies,
+            interaction=contacts,
+            support=[
+                {"name": "inner clamp", "on": "inner clamp", "fixed": ["x", "y"]},
+                {"name": "outer clamp", "on": "outer clamp", "fixed": ["y", "z"]},
+                {"name": "axis", "on": "axis", "fixed": ["y"]},
+            ],
+            load=[pull | {self.load.kind: getattr(self.load, self.load.kind)}],
+            path={"steps": self.load.steps},
+        )

@@ -10,10 +10,35 @@ from archord.scene.sections.keys import Positive, Section, key, require
 COARSE = 0.15  # element size over R, where none is given: solids cost more than planes
 _BLUNTEST = 0.2  # chamfer or fillet over R
 _SHORTEST = 0.02  # length over R
+_HOLLOWEST = 0.9  # bore over R
 
 
-class Space(Section):
-    """The joint in space instead of a plane: bodies of a length along z, mirrored at z = 0."""
+class Depth(Section):
+    """The third dimension of a joint, mirrored at z = 0: what all joints have of it."""
+
+    chamfer: NotNegative = key(
+        "leg of a chamfer of 45 degrees at the rims of the holes that the pin lies in",
+        "length",
+        default=0.0,
+    )
+    fillet: NotNegative = key(
+        "radius of the rounded rims of these holes, instead of a chamfer", "length", default=0.0
+    )
+    rim_ratio: float = key(
+        "element size at these rims over element_size", default=0.5, ge=0.02, le=1
+    )
+
+    def check_rims(self, radius: float, thickness: float) -> None:
+        """Raise `Fault` for rims that do not fit a hole of this ``radius`` in a plate."""
+        require(not (self.chamfer and self.fillet), "space.fillet", "is instead of a chamfer")
+        for name in ("chamfer", "fillet"):
+            most = min(_BLUNTEST * radius, 0.45 * thickness)
+            said = f"must be at most {most:g}: {_BLUNTEST:g} R, and 0.45 of the thickness"
+            require(getattr(self, name) <= most, ("space", name), said)
+
+
+class Space(Depth):
+    """The joint in space instead of a plane: bodies of a length along z."""
 
     thickness: Positive = key(
         "length along z of all bodies but the pin, the whole: half of it is modelled",
@@ -23,35 +48,37 @@ class Space(Section):
     pin_length: Positive | None = key(
         "length of the pin, the whole; the thickness if absent", "length", other=15.0
     )
-    chamfer: NotNegative = key(
-        "leg of a chamfer of 45 degrees at the rims of the hole that the pin lies in",
-        "length",
-        default=0.0,
-    )
-    fillet: NotNegative = key(
-        "radius of the rounded rims of this hole, instead of a chamfer", "length", default=0.0
-    )
-    rim_ratio: float = key(
-        "element size at these rims over element_size", default=0.5, ge=0.02, le=1
-    )
 
     def check(self, radius: float) -> None:
         """Raise `Fault` for lengths that do not fit a pin of this ``radius``."""
         for name, length in (("thickness", self.thickness), ("pin_length", self.pin_length)):
             said = f"must be at least {_SHORTEST:g} R"
             require(length is None or length >= _SHORTEST * radius, ("space", name), said)
-        require(not (self.chamfer and self.fillet), "space.fillet", "is instead of a chamfer")
-        for name in ("chamfer", "fillet"):
-            most = min(_BLUNTEST * radius, 0.45 * self.thickness)
-            said = f"must be at most {most:g}: {_BLUNTEST:g} R, and 0.45 of the thickness"
-            require(getattr(self, name) <= most, ("space", name), said)
+        self.check_rims(radius, self.thickness)
 
     def arguments(self) -> dict[str, Any]:
         """What draws it."""
         return self.model_dump() | {"pin_length": self.pin_length or self.thickness}
 
 
-def solid(general: dict[str, Any], space: Space) -> dict[str, Any]:
+class ClevisSpace(Depth):
+    """The clevis in space instead of a plane: its plates beside each other on one pin."""
+
+    gap: NotNegative = key("between the inner plate and each outer one", "length", default=0.0)
+    overhang: NotNegative = key("of the pin beyond each outer plate", "length", default=0.0)
+    bore: NotNegative = key("radius of the bore of a hollow pin", "length", default=0.0)
+
+    def check(self, radius: float) -> None:
+        """Raise `Fault` for lengths that do not fit a pin of this ``radius``."""
+        said = f"must be at most {_HOLLOWEST:g} R"
+        require(self.bore <= _HOLLOWEST * radius, "space.bore", said)
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it."""
+        return self.model_dump()
+
+
+def solid(general: dict[str, Any], space: Depth) -> dict[str, Any]:
     """The ``general`` scene of a plane joint in ``space``, with the mid-plane as a mirror."""
     shape = general["mesh"]["shape"] | {"space": space.model_dump(exclude_none=True)}
     middle = {"name": "mid-plane", "on": "mid-plane", "fixed": ["z"]}

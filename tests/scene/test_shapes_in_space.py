@@ -9,7 +9,7 @@ from archord.presets.problem import general_problem
 from archord.report.errors import InputError
 from archord.scene.file import parse_any, resolved
 from archord.solver.path.system import System
-from tests.scene.test_shapes import BUSHED, BUSHING, LUG, STEEL, changed
+from tests.scene.test_shapes import BUSHED, BUSHING, CLEVIS, LUG, STEEL, changed
 
 SPACE = {"space": {"thickness": 8.0, "pin_length": 12.0, "chamfer": 0.4}}
 JOINT = {
@@ -53,6 +53,62 @@ def test_faults_are_said_in_one_sentence(place, value, said):
         parse_any(changed(LUG | SPACE, place, value))
     assert said in str(error.value)
     assert len(str(error.value).splitlines()) == 1
+
+
+CLEVIS_IN_SPACE = changed(CLEVIS, "clevis.element_size", 3.5) | {
+    "space": {"gap": 0.5, "overhang": 1.0, "rim_ratio": 1.0},
+    "load": {"force": 20000.0, "steps": 1},
+}
+
+
+def test_a_clevis_in_space_is_one_pin_through_all_plates():
+    """Its outer plates are pulled away from the inner one; bushings are bonded to their plates."""
+    bushing = STEEL | {"thickness": 2.0}
+    scene = parse_any(CLEVIS_IN_SPACE | {"bushing": bushing})
+    assert parse_any(tomllib.loads(resolved(scene))) == scene
+    assert [body.name for body in scene.body] == [
+        "pin",
+        *("inner", "inner bushing"),
+        *("outer", "outer bushing"),
+    ]
+    assert [part.surfaces for part in scene.interaction] == [
+        ["inner bushing outside", "inner hole"],
+        ["inner pin", "inner bushing inside"],
+        ["outer bushing outside", "outer hole"],
+        ["outer pin", "outer bushing inside"],
+    ]
+    assert [part.law for part in scene.interaction] == ["tied", "frictionless"] * 2
+    held = {support.on: "".join(support.fixed) for support in scene.support}
+    assert held == {"inner clamp": "xy", "outer clamp": "yz", "axis": "y", "mid-plane": "z"}
+    assert scene.analysis.symmetry == 4
+
+
+@pytest.mark.parametrize(
+    ("data", "place", "value", "said"),
+    [
+        (CLEVIS_IN_SPACE, "space.bore", 9.5, "space.bore = 9.5 must be at most 0.9 R."),
+        (CLEVIS_IN_SPACE, "space.gap", -1.0, "space.gap = -1.0 must be at least 0."),
+        (CLEVIS_IN_SPACE, "space.chamfer", 2.5, "space.chamfer = 2.5 must be at most 1.98"),
+        (CLEVIS_IN_SPACE, "clevis.clearance", -0.1, "clevis.clearance = -0.1 "),
+        (CLEVIS, "bushing", STEEL | {"thickness": 2.0}, "is for a clevis in space: give space."),
+    ],
+)
+def test_faults_of_a_clevis_are_said_in_one_sentence(data, place, value, said):
+    with pytest.raises(InputError) as error:
+        parse_any(changed(data, place, value))
+    assert said in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("bore", [0.0, 5.0], ids=["solid", "hollow"])
+def test_plates_of_a_clevis_carry_one_force(bore):
+    """It goes from the outer plates through the pin to the inner one."""
+    scene = parse_any(changed(CLEVIS_IN_SPACE, "space.bore", bore))
+    system = System(general_problem(scene, MPI.COMM_SELF))
+    system.solve(scene.targets)
+    assert system.reaction("inner clamp")[0] == pytest.approx(-20000.0, rel=1e-5)
+    assert system.contact_force("pin in inner")[0] == pytest.approx(20000.0, rel=1e-5)
+    assert system.contact_force("pin in outer")[0] == pytest.approx(-20000.0, rel=1e-5)
 
 
 def pulled(data, **depths) -> System:

@@ -12,6 +12,7 @@ from archord.geometry.meshes.quality import measures
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
+from archord.geometry.shapes.solid_clevis import solid_clevis
 
 R = 10.0
 T = 12.0  # of the plates, half of it modelled
@@ -25,8 +26,8 @@ def made(shape, *sizes, comm=MPI.COMM_SELF, **options):
     """A shape with its depths, on all ranks."""
     names = ("thickness", "pin_length", "chamfer", "fillet", "rim_ratio")
     space = {name: options.pop(name) for name in names if name in options}
-    lengths = {"thickness": T, "pin_length": LONG, "chamfer": CHAMFER, "rim_ratio": 1.0}
-    return shape(comm, *sizes, space=lengths | space, **options)
+    lengths = {"thickness": T, "pin_length": LONG, "chamfer": CHAMFER, "fillet": 0.0}
+    return shape(comm, *sizes, space={"rim_ratio": 1.0} | lengths | space, **options)
 
 
 def volume(mesh, body):
@@ -107,3 +108,22 @@ def test_elements_shrink_toward_the_rim():
         return (np.abs(z - T / 2) < 1e-9).sum()
 
     assert nodes_at_rim(0.4) == pytest.approx(2.5 * nodes_at_rim(1.0), rel=0.15)
+
+
+def test_a_clevis_has_its_volumes():
+    """Of plates, bushings and a hollow pin that reaches beyond the outer plates."""
+    plate = {"width": 40.0, "edge_distance": 20.0, "length": 50.0, "end": "square"}
+    inner, outer = ({**plate, "thickness": thickness} for thickness in (12.0, 7.0))
+    space = {"gap": 0.5, "overhang": 2.0, "bore": 4.0, "wall": 3.0}
+    space |= {"chamfer": 0.0, "fillet": 0.0, "rim_ratio": 1.0}
+    mesh = gathered(solid_clevis(MPI.COMM_SELF, R, 0.1, inner, outer, 2.5, 0.4, space=space))
+    area = (70 * 40 - np.pi * 13.1**2) / 2
+    assert volume(mesh, "inner") == pytest.approx(6 * area, rel=1e-4)
+    assert volume(mesh, "outer") == pytest.approx(7 * area, rel=1e-4)
+    ring = np.pi * (13.1**2 - 10.1**2) / 2
+    assert volume(mesh, "outer bushing") == pytest.approx(7 * ring, rel=1e-4)
+    pin = np.pi * (R**2 - 4.0**2) / 2
+    assert volume(mesh, "pin") == pytest.approx((6 + 0.5 + 7 + 2) * pin, rel=1e-4)
+    pinned = {name: nodes_of(mesh, name)[:, 2] for name in ("inner pin", "outer pin")}
+    assert pinned["inner pin"].max() == pytest.approx(6.25)
+    assert pinned["outer pin"].min() == pytest.approx(6.25)
