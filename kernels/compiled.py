@@ -26,7 +26,7 @@ _FLAGS = ["-std=c11", "-O3", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contra
 _ffi = cffi.FFI()
 _TYPES = {
     np.dtype(a): _ffi.typeof(c)
-    for a, c in (("d", "double[]"), ("i", "int32_t[]"), ("?", "uint8_t[]"))
+    for a, c in (("d", "double[]"), ("f", "float[]"), ("i", "int32_t[]"), ("?", "uint8_t[]"))
 }
 
 
@@ -66,7 +66,7 @@ def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
 
 
 def pointer(array: npt.NDArray[Any]) -> Any:
-    """The C-contiguous ``array`` of float64, int32 or bool for a C function."""
+    """The C-contiguous ``array`` of float64, float32, int32 or bool for a C function."""
     return _ffi.from_buffer(_TYPES[array.dtype], array)
 
 

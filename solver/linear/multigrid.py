@@ -3,8 +3,8 @@
 The first level below the displacements are the linear displacements on the same mesh (p-multigrid).
 Its matrix is the Galerkin product ``P^T A P`` with the interpolation ``P``. Aggregates of its nodes
 make the levels below, with the rigid motions as near null space (smoothed aggregation; Vanek,
-Mandel and Brezina 1996). Chebyshev polynomials of the diagonal blocks smooth, so that the number of
-iterations grows neither with the mesh nor with the ranks.
+Mandel and Brezina 1996). Sweeps of Gauss-Seidel smooth the displacements, Chebyshev polynomials the
+levels below, so that the number of iterations grows neither with the mesh nor with the ranks.
 
 Prescribed displacements are rows and columns of the unit matrix. The interpolation leaves them out,
 but for the linear displacement at the same node. So the product has unit rows there, too.
@@ -22,6 +22,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array, lagrange_element
 from archord.materials.kinematics import kinematics
+from archord.solver.linear.block_smoother import BlockSmoother
 from archord.solver.linear.strategy import Facts, Strategy
 
 FEWEST_DOFS = 5_000  # below, a factorisation is quicker
@@ -36,7 +37,6 @@ _SMOOTHING = 3  # degree of the polynomials
 _FEWEST_COARSE = 100  # equations that are factorised on the last level
 _WEAK = 0.05  # of the diagonal: couplings that aggregates do not follow
 _ROUND_OFF = 1e-12
-_FINE = "archord_fine_"
 _COARSE = "archord_coarse_"
 _Reason = PETSc.KSP.ConvergedReason
 
@@ -92,15 +92,15 @@ class Multigrid(Strategy):
             fixed = fixed_linear
         self._motions = _free_rigid_motions(V, fixed)
         self._without_blocks = PETSc.Mat()  # A, as products of matrices need it
-        self._levels = PETSc.PC().create(A.comm)
+        self._below = PETSc.PC().create(A.comm)
+        self._smoother = BlockSmoother(A)
         self._right_side = 0.0
         self._is_ready = False
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` iterate."""
         super().attach(ksp)
-        ksp.setType("gmres")
-        ksp.setPCSide(PETSc.PC.Side.RIGHT)  # it stops by the residual itself
+        ksp.setType("fgmres")  # as the smoother rounds to single precision
         ksp.setGMRESRestart(_RESTART)
         ksp.setTolerances(rtol=self._tolerance)
         ksp.setConvergenceTest(self._test)
@@ -124,9 +124,12 @@ class Multigrid(Strategy):
                 self._without_blocks.ptap(self.interpolation, self.coarse)
         else:
             self._make_matrices()
-            self._make_levels()
+            self._below.setOperators(self.coarse)
+            _use_aggregates(self._below)
             self._is_ready = True
-        self._levels.setUp()
+        self._below.setUp()
+        if self.interpolation is not None:
+            self._smoother.update()
 
     def _make_matrices(self) -> None:
         d = self.matrix.getBlockSize()
@@ -134,51 +137,42 @@ class Multigrid(Strategy):
         self.coarse = self._without_blocks
         if self.interpolation is not None:
             self.coarse = self._without_blocks.ptap(self.interpolation)
+            self._residual = self.interpolation.createVecLeft()
+            self._correction = self._residual.duplicate()
         self.coarse.setBlockSize(d)
         self.coarse.setNearNullSpace(_near_null_space(self.coarse, self._motions))
-
-    def _make_levels(self) -> None:
-        if self.interpolation is None:
-            self._levels.setOperators(self.coarse)
-            _use_aggregates(self._levels)
-            return
-        self._levels.setOperators(self.matrix)
-        self._levels.setType("mg")
-        self._levels.setMGLevels(2)
-        self._levels.setMGInterpolation(1, self.interpolation)
-        smoother = self._levels.getMGSmoother(1)
-        smoother.setOperators(self.matrix)
-        _use_options(smoother, _FINE, _polynomials("pbjacobi"))
-        below = self._levels.getMGCoarseSolve()
-        below.setType("preonly")
-        below.setOperators(self.coarse)
-        _use_aggregates(below.getPC())
+        self._right, self._found = self.coarse.createVecs()
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """One cycle, called by PETSc."""
         if not self._is_ready:  # put in the place of another one
             self.setUp(pc)
-        self._levels.apply(r, x)
+        if self.interpolation is None:
+            self._below.apply(r, x)
+            return
+        self._residual.array[:] = self._smoother.from_zero(r.array_r)
+        self.interpolation.multTranspose(self._residual, self._right)
+        self._below.apply(self._right, self._found)
+        self.interpolation.mult(self._found, self._correction)
+        x.array[:] = self._smoother.again(r.array_r, self._correction.array_r)
 
 
 def _use_aggregates(pc: PETSc.PC) -> None:
     """Let ``pc`` be multigrid by smoothed aggregation."""
     # an aggregate with fewer dofs than rigid motions leaves zeros on the diagonal: no blocks
-    smoother = {f"mg_levels_{name}": value for name, value in _polynomials("jacobi").items()}
     aggregation = {
+        "mg_levels_ksp_type": "chebyshev",
+        "mg_levels_ksp_max_it": _SMOOTHING,
+        "mg_levels_pc_type": "jacobi",
         "pc_type": "gamg",
         "pc_gamg_threshold": _WEAK,
         "pc_gamg_coarse_eq_limit": _FEWEST_COARSE,
         "pc_gamg_reuse_interpolation": True,
     }
-    _use_options(pc, _COARSE, aggregation | smoother)
+    _use_options(pc, _COARSE, aggregation)
 
 
-def _polynomials(diagonal: str) -> dict[str, Any]:
-    return {"ksp_type": "chebyshev", "ksp_max_it": _SMOOTHING, "pc_type": diagonal}
-
-
-def _use_options(solver: PETSc.KSP | PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> None:
+def _use_options(solver: PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> None:
     options = PETSc.Options(prefix)
     for name, value in wanted.items():
         options[name] = value

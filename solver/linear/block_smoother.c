@@ -1,0 +1,166 @@
+#include "block_smoother.h"
+#include <string.h>
+
+typedef float Four __attribute__((vector_size(16)));
+
+/* y += B x. Columns of three are read as four, of which the last is not used. */
+static inline void add_product(int d, const float *B, const float *x, float *y)
+{
+    if (d == 3) {
+        Four a, b, c, sum;
+        memcpy(&a, B, 16);
+        memcpy(&b, B + 3, 16);
+        memcpy(&c, B + 6, 16);
+        memcpy(&sum, y, 16);
+        sum += a * x[0] + b * x[1] + c * x[2];
+        memcpy(y, &sum, 16);
+        return;
+    }
+    for (int j = 0; j < d; j++)
+        for (int i = 0; i < d; i++) y[i] += B[d * j + i] * x[j];
+}
+
+static inline void row_times(const BlockRows *A, int d, int32_t from, int32_t to, const float *x, float *y)
+{
+    for (int32_t k = from; k < to; k++) add_product(d, A->block + k * (int64_t)(d * d), x + d * A->column[k], y);
+}
+
+static int32_t place_of(int32_t value, int32_t m, const int32_t *sorted)
+{
+    int32_t low = 0;
+    while (m > 0) {
+        int32_t half = m / 2;
+        if (sorted[low + half] < value) {
+            low += half + 1;
+            m -= half + 1;
+        } else {
+            m = half;
+        }
+    }
+    return low;
+}
+
+static void invert(int d, const float *B, float *inverse)
+{
+    double a[9], work[9] = {0};
+    for (int k = 0; k < d * d; k++) a[k] = B[k];
+    for (int i = 0; i < d; i++) work[i * d + i] = 1.0;
+    for (int p = 0; p < d; p++) { /* Gauss and Jordan, without a choice of pivots */
+        double pivot = a[p * d + p] != 0.0 ? 1.0 / a[p * d + p] : 0.0;
+        for (int j = 0; j < d; j++) {
+            a[p * d + j] *= pivot;
+            work[p * d + j] *= pivot;
+        }
+        for (int i = 0; i < d; i++) {
+            double factor = a[i * d + p];
+            if (i == p) continue;
+            for (int j = 0; j < d; j++) {
+                a[i * d + j] -= factor * a[p * d + j];
+                work[i * d + j] -= factor * work[p * d + j];
+            }
+        }
+    }
+    for (int k = 0; k < d * d; k++) inverse[k] = (float)work[k];
+}
+
+void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values, int32_t first,
+                 int32_t m, const int32_t *ghosts)
+{
+    const int d = A->d;
+    int32_t at = 0;
+    for (int32_t i = 0; i < A->n; i++) {
+        const int32_t *row = offsets + (int64_t)d * i;
+        const int32_t count = (row[1] - row[0]) / d;
+        A->start[i] = at;
+        for (int elsewhere = 0; elsewhere < 2; elsewhere++) {
+            for (int32_t k = 0; k < count; k++) {
+                const int32_t global = columns[row[0] + d * k] / d;
+                const int32_t local = global - first;
+                if ((local < 0 || local >= A->n) != elsewhere) continue;
+                A->column[at] = elsewhere ? A->n + place_of(global, m, ghosts) : local;
+                if (local == i) A->middle[i] = at;
+                float *block = A->block + (int64_t)at * d * d;
+                for (int r = 0; r < d; r++)
+                    for (int c = 0; c < d; c++) block[d * c + r] = (float)values[row[r] + d * k + c];
+                at++;
+            }
+            if (!elsewhere) A->border[i] = at;
+        }
+        invert(d, A->block + (int64_t)A->middle[i] * d * d, A->inverse + (int64_t)i * d * d);
+    }
+    A->start[A->n] = at;
+}
+
+static inline void from_zero(const BlockRows *A, const int d, const double *b, float *x, float *change, double *residual)
+{
+    const int32_t n = A->n;
+    for (int32_t i = 0; i < n; i++) {
+        float sum[4] = {0}, found[4] = {0};
+        row_times(A, d, A->start[i], A->middle[i], x, sum);
+        for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] - sum[r];
+        add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
+        memcpy(x + d * i, found, d * sizeof(float));
+    }
+    for (int32_t i = n - 1; i >= 0; i--) { /* the diagonal block times x is b without the lower part */
+        float sum[4] = {0}, found[4] = {0};
+        row_times(A, d, A->middle[i] + 1, A->border[i], x, sum);
+        add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
+        for (int r = 0; r < d; r++) x[d * i + r] -= found[r];
+        memcpy(change + d * i, found, d * sizeof(float));
+    }
+    for (int32_t i = 0; i < n; i++) {
+        float sum[4] = {0};
+        row_times(A, d, A->start[i], A->middle[i], change, sum);
+        for (int r = 0; r < d; r++) residual[d * i + r] = sum[r];
+    }
+}
+
+void smooth_from_zero(const BlockRows *A, const double *b, float *x, float *work, double *residual)
+{
+    if (A->d == 3)
+        from_zero(A, 3, b, x, work, residual);
+    else
+        from_zero(A, A->d, b, x, work, residual);
+}
+
+void subtract_ghosts(const BlockRows *A, const float *x, double *residual)
+{
+    const int d = A->d;
+    for (int32_t i = 0; i < A->n; i++) {
+        float sum[4] = {0};
+        row_times(A, d, A->border[i], A->start[i + 1], x, sum);
+        for (int r = 0; r < d; r++) residual[d * i + r] -= sum[r];
+    }
+}
+
+static inline void both_ways(const BlockRows *A, const int d, const double *b, float *x, float *change)
+{
+    const int32_t n = A->n;
+    memcpy(change, x, (size_t)n * d * sizeof(float));
+    for (int32_t i = 0; i < n; i++) {
+        float sum[4] = {0}, found[4] = {0};
+        row_times(A, d, A->start[i], A->middle[i], x, sum);
+        row_times(A, d, A->middle[i] + 1, A->start[i + 1], x, sum);
+        for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] - sum[r];
+        add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
+        memcpy(x + d * i, found, d * sizeof(float));
+    }
+    for (int32_t i = n - 1; i >= 0; i--) { /* only the upper part has changed */
+        float sum[4] = {0}, found[4] = {0};
+        row_times(A, d, A->middle[i] + 1, A->border[i], change, sum);
+        add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
+        for (int r = 0; r < d; r++) {
+            x[d * i + r] += found[r];
+            change[d * i + r] -= x[d * i + r];
+        }
+    }
+}
+
+void smooth(const BlockRows *A, const double *b, const double *correction, float *x, float *work)
+{
+    for (int64_t i = 0; i < (int64_t)A->n * A->d; i++) x[i] += (float)correction[i];
+    if (A->d == 3)
+        both_ways(A, 3, b, x, work);
+    else
+        both_ways(A, A->d, b, x, work);
+}
