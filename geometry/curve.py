@@ -281,21 +281,26 @@ class Curve:
 
 def circle_through(x: Array) -> tuple[Array, float] | None:
     """Centre and radius of the circle that the points ``x`` ``(n, 2)`` lie on; None if there is
-    none (Kasa 1976)."""
+    none."""
     if len(x) < 4:
         return None
+    centre, radius = nearest_circle(x)
+    size = np.ptp(x, axis=0).max()
+    off = np.abs(np.linalg.norm(x - centre, axis=1) - radius).max()
+    is_line = _ROUND * radius > size
+    if off > _ROUND * size or is_line:
+        return None
+    return centre, radius
+
+
+def nearest_circle(x: Array) -> tuple[Array, float]:
+    """Centre and radius of the circle that fits the points ``x`` ``(n, 2)`` best (Kasa 1976)."""
     shift = x.mean(axis=0)
     y = x - shift
     rows = np.column_stack([2 * y, np.ones(len(y))])
     (a, b, c), *_ = np.linalg.lstsq(rows, (y**2).sum(axis=1), rcond=None)
-    centre = np.array([a, b])
     radius = float(np.sqrt(max(c + a * a + b * b, 0.0)))
-    size = np.ptp(y, axis=0).max()
-    off = np.abs(np.linalg.norm(y - centre, axis=1) - radius).max()
-    is_line = _ROUND * radius > size
-    if off > _ROUND * size or is_line:
-        return None
-    return shift + centre, radius
+    return shift + np.array([a, b]), radius
 
 
 class RigidCircle:

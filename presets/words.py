@@ -66,8 +66,8 @@ def _mesh(mesh: Any, file: str) -> dict[str, Any]:
     if not isinstance(mesh, Mesh):
         return {"file": file}
     circles = [
-        {"facets": facets, "centre": list(centre), "radius": radius}
-        for facets, (centre, radius) in (mesh.circles or {}).items()
+        {"facets": facets, "centre": list(centre), "radius": radius, "axis": next(iter(axis), None)}
+        for facets, (centre, radius, *axis) in (mesh.circles or {}).items()
     ]
     changes = {name: getattr(mesh, name) for name in CHANGES}
     return {"file": mesh.file or file, "circle": circles} | changes

@@ -11,6 +11,7 @@ from archord.scene.presets.known import AnyShape
 from archord.scene.sections.bodies import NotNegative, Solid
 from archord.scene.sections.contact import CONTACT_LAWS, PARAMETERS_IN_WORDS, require_parameters
 from archord.scene.sections.keys import (
+    Axis,
     Name,
     Pair,
     PartName,
@@ -52,9 +53,12 @@ class CoreSection(Section):
     radius: Positive = key("radius", "length", example=10.0)
 
 
-class CircleSection(DiscSection):
-    """A circle on which a set of facets lies."""
+class CircleSection(Section):
+    """A circle on which a set of facets lies; in space a cylinder, or without an axis a sphere."""
 
+    centre: Place = key("centre, in space also a point of the axis", "length", example=[0.0, 0.0])
+    radius: Positive = key("radius", "length", example=10.0)
+    axis: Axis | None = key("in space: direction of a cylinder's axis", other=[0.0, 0.0, 1.0])
     facets: Name = key("facet set whose nodes are put on the circle", example="hole")
 
 

@@ -18,14 +18,17 @@ from archord.geometry.meshes.cells import (
     along,
     corners_of,
     distinct,
+    entities_of,
     n_sides,
     outer_sides,
+    side_kind,
     sides_among,
     sides_of,
 )
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import distorted, faults, place, thin
+from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
@@ -72,8 +75,7 @@ def check_mesh(
             body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()
         }
         is_plane = mesh.dimension == 2
-        arcs = [pair for pair in pairs if len(pair) == 2 and is_plane]
-        straight = [found for pair in arcs for found in _sagitta(mesh, pair)]
+        straight = [found for pair in pairs if len(pair) == 2 for found in _sagitta(mesh, pair)]
         found = chain(
             faults(mesh),
             _of_bodies(mesh, inside, millimetres),
@@ -146,7 +148,7 @@ def _of_surface(mesh: MeshArrays, inside: Inside, name: str) -> Iterator[str]:
 
 
 def _polygons(mesh: MeshArrays, edges: np.ndarray) -> Array:
-    """Points ``(k, pieces + 1, 2)`` on ``edges`` ``(k, b)``."""
+    """Points ``(k, pieces + 1, d)`` on ``edges`` ``(k, b)``."""
     order = edges.shape[1] - 1
     shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(np.linspace(0, 1, _PIECES + 1))
     return np.einsum("qa,kai->kqi", shape, mesh.x[along(edges)])
@@ -320,13 +322,11 @@ def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
     deepest = 0.0
     names = [name for name in pair if isinstance(name, str)]
     for name in names:
-        edges = mesh.facets_of(name)
-        circle = circle_through(mesh.x[np.unique(edges[:, :2])])
-        if circle is None:
+        radius, polygons = _arcs(mesh, mesh.facets_of(name))
+        if not radius:
             return
-        _, radius = circle
         radii.append(radius)
-        start, middle, end = np.swapaxes(_polygons(mesh, edges)[:, :: _PIECES // 2], 0, 1)
+        start, middle, end = np.swapaxes(polygons[:, :: _PIECES // 2], 0, 1)
         sagitta = ((end - start) ** 2).sum(axis=1) / (8 * radius)
         bulge = np.linalg.norm(middle - (start + end) / 2, axis=1)
         deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
@@ -342,3 +342,17 @@ def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
     elif deepest > _POLYGONAL * clearance:
         corners = "their corners make the largest pressure too high, by a fifth and more"
         yield f"{arcs}: {corners}; {remedy}", False
+
+
+def _arcs(mesh: MeshArrays, facets: np.ndarray) -> tuple[float, Array]:
+    """The radius of the circle or cylinder that ``facets`` lie on, 0 for none, and points ``(k,
+    pieces + 1, d)`` on their edges, in space less what runs along the axis."""
+    if mesh.dimension == 2:
+        circle = circle_through(mesh.x[np.unique(facets[:, :2])])
+        return circle[1] if circle else 0.0, _polygons(mesh, facets)
+    cylinder = cylinder_through(mesh.x, facets)
+    if cylinder is None:
+        return 0.0, np.zeros((0, _PIECES + 1, 3))
+    points = _polygons(mesh, entities_of(side_kind(mesh.kind), facets, 1))
+    at = points.reshape(-1, 3)
+    return cylinder.radius, (at - cylinder.foot(at)).reshape(points.shape)

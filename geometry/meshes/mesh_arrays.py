@@ -35,6 +35,7 @@ _ONE_KIND = {
 }
 _THICK = 1e-6  # difference of z over the mesh's size
 
+_NONE = np.zeros(0, dtype=np.int64)
 Numbers = tuple[Mapping[str, int], Mapping[str, int]]
 
 
@@ -189,15 +190,18 @@ class MeshArrays:
         facets = sides_of(self.kind, cells)[sides_between(self.kind, self.cells, corners)]
         return replace(self, x=x, cells=cells, facets=facets)
 
-    def centred(self) -> MeshArrays:
-        """This mesh with the nodes inside cells where the nodes on the sides want them."""
-        weights = inner_weights(self.kind, self.order)
-        n_inner = len(weights)
-        if not n_inner:
-            return self
+    def centred(self, kept: np.ndarray = _NONE) -> MeshArrays:
+        """This mesh with the nodes inside faces and cells where the nodes around them want them,
+        but for nodes that are ``kept``."""
         x = self.x.copy()
-        on_sides = self.x[self.cells[:, :-n_inner]]
-        x[self.cells[:, -n_inner:]] = np.einsum("ib,cbk->cik", weights, on_sides)
+        for dim in range(2, self.dimension + 1):
+            weights = inner_weights(basix.cell.subentity_types(self.kind)[dim][0], self.order)
+            n_inner = len(weights)
+            if n_inner:
+                entities = entities_of(self.kind, self.cells, dim)
+                around = x[entities[:, :-n_inner]]
+                x[entities[:, -n_inner:]] = np.einsum("ib,cbk->cik", weights, around)
+                x[kept] = self.x[kept]
         return replace(self, x=x)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import basix
 import basix.ufl
 import numpy as np
 from dolfinx import fem
@@ -13,33 +14,86 @@ from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, lagrange_element
-from archord.geometry.curve import circle_through
-from archord.geometry.meshes.cells import along, parts_of
+from archord.geometry.curve import circle_through, nearest_circle
+from archord.geometry.meshes.cells import corners_of, parts_of, side_kind
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.tagged_mesh import tags_of
 
 _OFF_CIRCLE = 0.05  # of the radius
 _ELSEWHERE = 1e-4  # of the radius: more than the rounding of a file moves nodes onto their circle
 _SAME = 1e-9  # distance in a reference cell
+_ROUND = 1e-4  # of the radius: how far corners of facets may be off their cylinder
+_FLAT = 0.02  # of the radius: facets of a smaller extent have no cylinder
 _IN_METRES = 0.01  # of the radius: a facet set smaller than this is drawn in another unit
 
 
 class Circle(NamedTuple):
-    """The circle that the nodes of a facet set lie on."""
+    """The circle that the nodes of a facet set lie on; in space a sphere, or a cylinder with an
+    ``axis`` through its ``centre``."""
 
     facets: str
-    centre: tuple[float, float]
+    centre: tuple[Any, ...]
     radius: float
+    axis: tuple[float, ...] | None = None
+
+    @property
+    def shape(self) -> str:
+        """What it is."""
+        if len(self.centre) == 2:
+            return "circle"
+        return "cylinder" if self.axis else "sphere"
+
+    def foot(self, x: Array) -> Array:
+        """The point of the axis, or the centre, that is nearest to points ``(k, d)``."""
+        centre = np.array(self.centre)
+        if self.axis is None:
+            return np.broadcast_to(centre, x.shape)
+        along = np.array(self.axis) / np.linalg.norm(self.axis)
+        return centre + ((x - centre) @ along)[:, None] * along
 
     def distance(self, x: Array) -> Array:
-        """How far points ``(k, 2)`` are off the circle."""
-        return np.abs(np.linalg.norm(x - self.centre, axis=1) - self.radius)
+        """How far points ``(k, d)`` are off the circle."""
+        return np.abs(np.linalg.norm(x - self.foot(x), axis=1) - self.radius)
+
+
+def cylinder_through(x: Array, facets: np.ndarray) -> Circle | None:
+    """The cylinder that the corners of ``facets`` ``(k, 3 or more)`` lie on; None if there is
+    none.
+
+    The normals of facets are nearly across its axis, from which a least-squares fit starts.
+    """
+    from scipy.optimize import least_squares  # a solve without first-order arcs does not pay for it
+
+    a, b, c = np.swapaxes(x[facets[:, :3]], 0, 1)
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    turned = np.linalg.svd(normal.T @ normal)[2]  # across the axis twice, then along it
+    corners = np.unique(x[facets[:, :3]].reshape(-1, 3), axis=0)
+    middle, radius = nearest_circle(corners @ turned[:2].T)
+    height = (corners @ turned[2]).mean()
+    start = np.array([*middle / radius, 0.0, 0.0])
+
+    def on_axis(place: Array) -> Circle:
+        centre = np.append(radius * place[:2], height) @ turned
+        axis = np.append(place[2:], 1.0) @ turned
+        return Circle("", tuple(centre), 0.0, tuple(axis))
+
+    def unevenness(place: Array) -> Array:
+        distance = on_axis(place).distance(corners)
+        return distance / distance.mean() - 1
+
+    made = on_axis(least_squares(unevenness, start, xtol=_SAME, ftol=None, gtol=None).x)
+    distance = made.distance(corners)
+    is_round = np.ptp(distance) < _ROUND * distance.mean()
+    is_flat = np.ptp(corners, axis=0).max() < _FLAT * distance.mean()
+    return made._replace(radius=distance.mean()) if is_round and not is_flat else None
 
 
 def refined(
     mesh: MeshArrays, times: int = 0, order: int | None = None, circles: Sequence[Circle] = ()
 ) -> MeshArrays:
-    """``mesh`` with each cell cut in four so many ``times``, then of a higher ``order``.
+    """``mesh`` with the edges of each cell cut in two so many ``times``, then of a higher
+    ``order``.
 
     The nodes of ``circles`` are moved onto them along their rays. Without a circle, new nodes lie
     on the curved edges that are there. A note of the mesh tells of nodes that lie on another circle
@@ -47,12 +101,18 @@ def refined(
     """
     notes = list(mesh.notes)
     for circle in circles:
+        if len(circle.centre) != mesh.dimension:
+            said = f"must have a centre of {mesh.dimension} numbers, as the mesh has dimensions"
+            raise ValueError(f"the circle of {circle.facets!r} {said}")
         tags_of("facet", mesh.facet_sets, circle.facets)
         _require_near(mesh, circle)
         notes += _elsewhere(mesh, circle)
 
     def settled(mesh: MeshArrays) -> MeshArrays:
-        return on_circles(mesh, circles).centred() if circles else mesh
+        if not circles:
+            return mesh
+        on = [np.unique(mesh.facets_of(circle.facets)) for circle in circles]
+        return on_circles(mesh, circles).centred(np.concatenate(on))
 
     mesh = settled(replace(mesh, notes=tuple(notes)))
     own = mesh.order
@@ -73,9 +133,9 @@ def _require_near(mesh: MeshArrays, circle: Circle) -> None:
         return
     at = x[off.argmax()]
     said = (
-        f"the node ({at[0]:g}, {at[1]:g}) of the facet set {circle.facets!r} is {off.max():.3g} "
-        "off "
-        f"its circle, whose centre or radius {circle.radius:g} must be wrong"
+        f"the node ({', '.join(f'{value:g}' for value in at)}) of the facet set "
+        f"{circle.facets!r} is {off.max():.3g} off its {circle.shape}, whose "
+        f"{'axis' if circle.axis else 'centre'} or radius {circle.radius:g} must be wrong"
     )
     if np.ptp(x, axis=0).max() < _IN_METRES * circle.radius:
         said += "; or is the mesh in metres? Then give mesh.scale = 1000"
@@ -85,10 +145,18 @@ def _require_near(mesh: MeshArrays, circle: Circle) -> None:
 def _elsewhere(mesh: MeshArrays, circle: Circle) -> list[str]:
     """A warning if the ends of the facets of ``circle`` lie on another one: its clearance is not
     the drawn one."""
-    corners = mesh.x[np.unique(mesh.facets_of(circle.facets)[:, :2])]
-    drawn = circle_through(corners)
+    facets = mesh.facets_of(circle.facets)
+    corners = mesh.x[np.unique(corners_of(mesh.kind, facets))]
     moved = circle.distance(corners).max()
-    if drawn is None or moved <= _ELSEWHERE * circle.radius:
+    if moved <= _ELSEWHERE * circle.radius:
+        return []
+    if mesh.dimension == 3:
+        return [
+            f"the facet set {circle.facets!r} is drawn up to {moved:.3g} off its [[mesh.circle]], "
+            "which changes the clearance by as much"
+        ]
+    drawn = circle_through(corners)
+    if drawn is None:
         return []
     centre, radius = drawn
     x, y = centre.round(9) + 0.0
@@ -111,8 +179,9 @@ def on_circles(mesh: MeshArrays, circles: Sequence[Circle]) -> MeshArrays:
     x = mesh.x.copy()
     for circle in circles:
         nodes = np.unique(mesh.facets_of(circle.facets))
-        ray = x[nodes] - circle.centre
-        x[nodes] = circle.centre + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
+        foot = circle.foot(x[nodes])
+        ray = x[nodes] - foot
+        x[nodes] = foot + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
     return replace(mesh, x=x)
 
 
@@ -139,20 +208,26 @@ def _raised(mesh: MeshArrays, order: int) -> MeshArrays:
 
 
 def _cut(mesh: MeshArrays) -> MeshArrays:
-    """Each cell of order p cut in four, whose nodes are the nodes of a cell of order 2 p."""
+    """Each cell of order p cut in the middles of its edges, into parts whose nodes are the nodes of
+    a cell of order 2 p."""
     p = mesh.order
     made = _raised(mesh, 2 * p)
-    parts = parts_of(mesh.kind, lagrange_element(mesh.kind, p).points)
-    points = lagrange_element(mesh.kind, 2 * p).points
-    nodes = _distances(parts.reshape(-1, 2), points).argmin(axis=1)
-    cells = made.cells[:, nodes].reshape(4 * len(mesh.cells), -1)
-    line = along(made.facets)
-    halves = np.stack([line[:, : p + 1], line[:, p:]], axis=1).reshape(-1, p + 1)
-    facets = halves[:, [0, p, *range(1, p)]]
-    bodies = mesh.bodies.repeat(4)
-    return replace(made, cells=cells, bodies=bodies, facets=facets, tags=mesh.tags.repeat(2))
+    cells = _parts(mesh.kind, p, made.cells)
+    facets = _parts(side_kind(mesh.kind), p, made.facets)
+    bodies = mesh.bodies.repeat(len(cells) // len(mesh.cells))
+    tags = mesh.tags.repeat(2 ** (mesh.dimension - 1))
+    return replace(made, cells=cells, bodies=bodies, facets=facets, tags=tags)
+
+
+def _parts(kind: basix.CellType, p: int, nodes: np.ndarray) -> np.ndarray:
+    """Nodes ``(m s, b)`` of the parts, of order ``p``, of cells with ``nodes`` ``(m, a)`` of order
+    2 p."""
+    points = parts_of(kind, lagrange_element(kind, p).points)
+    there = lagrange_element(kind, 2 * p).points
+    of_parts = _distances(points.reshape(-1, points.shape[2]), there).argmin(axis=1)
+    return nodes[:, of_parts].reshape(-1, points.shape[1])
 
 
 def _distances(points: Array, others: Array) -> Array:
-    """The larger of the distances ``(k, j)`` along x and y between two sets of points."""
+    """The largest of the distances ``(k, j)`` along the axes between two sets of points."""
     return np.abs(points[:, None] - others).max(axis=2)

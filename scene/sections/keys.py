@@ -16,6 +16,7 @@ from archord.scene.sections.faults import of_section
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f]*$")]  # text on one line
 Positive = Annotated[float, Field(gt=0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Axis = Annotated[list[float], Field(min_length=3, max_length=3)]
 Place = Annotated[list[float], Field(min_length=2, max_length=3)]  # in a plane or in space
 
 

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 _KINDS = "a mesh or CAD file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
 _LONGEST = 40  # characters of a value in a message
 CHANGES = ("scale", "order", "refine", "size", "sizes", "sets")  # but for the circles
-Disc = tuple[tuple[float, float], float]  # centre and radius
+# centre and radius, and the axis of a cylinder
+Disc = tuple[tuple[float, ...], float] | tuple[tuple[float, ...], float, tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class Mesh:
     refine : int
         How often every cell is cut in four.
     circles : dict
-        The circles ((x, y), radius) on which the nodes of facet sets are put, by the sets.
+        The circles ((x, y), radius) on which the nodes of facet sets are put, by the sets. In space
+        cylinders ((x, y, z), radius, direction of the axis), or spheres ((x, y, z), radius).
     size : float
         Of CAD: the largest size of elements, a tenth of the largest extent by default.
     sizes : dict
@@ -117,8 +119,8 @@ class Mesh:
         from archord.geometry.meshes.refine import Circle
 
         circles = [
-            Circle(facets, (centre[0], centre[1]), radius)
-            for facets, (centre, radius) in (self.circles or {}).items()
+            Circle(facets, tuple(centre), radius, *map(tuple, axis))
+            for facets, (centre, radius, *axis) in (self.circles or {}).items()
         ]
         return read_mesh(
             self._tagged(),
@@ -151,7 +153,10 @@ class Mesh:
 
 def circles_in(sections: Sequence[Any]) -> dict[str, Disc]:
     """The circles of the sections of a scene, by the facet sets that lie on them."""
-    return {
-        section.facets: ((section.centre[0], section.centre[1]), section.radius)
-        for section in sections
-    }
+    circles: dict[str, Disc] = {}
+    for section in sections:
+        centre = tuple(section.centre)
+        circles[section.facets] = (centre, section.radius)
+        if section.axis is not None:
+            circles[section.facets] = (centre, section.radius, tuple(section.axis))
+    return circles
