@@ -75,7 +75,7 @@ class PatchRecovery:
         wanted, source = np.concatenate([inward, np.column_stack([own, own])]).T
 
         self._powers = _powers(degree, nodes.shape[1])
-        self._is_point: np.ndarray = ~np.isnan(points).any(axis=-1)
+        self._is_point = np.logical_and.reduce(np.isfinite(points), axis=-1)
         points = np.where(self._is_point[..., None], points, 0.0)
         vertex, self._cell = _patches(cells, outside, alone)
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
