@@ -89,7 +89,7 @@ class Problem:
     units : tuple of str
         Names of the units of length and stress.
     degree : int
-        The polynomial degree of displacements.
+        The polynomial degree of displacements, 2 or 3, whatever the order of the mesh.
     tolerance : float
         Residual over reaction at which Newton's method stops.
     max_iterations : int
@@ -213,11 +213,11 @@ class Problem:
         said = "must be a number, and 1 at least"
         require_between(self, "symmetry", 1, np.inf, said, least=True)
         require_between(self, "tolerance", 0, 1, "must be a number between 0 and 1")
-        for key, most in (("degree", 3), ("max_iterations", np.inf)):
-            value = getattr(self, key)
-            is_whole = is_number(value) and value == int(value) and 1 <= value <= most
-            said = f"must be a whole number between 1 and {most:g}"
-            require_of(self, is_whole, key, said)
+        locks = "displacements of first order lock where cells bend or yield"
+        require_of(self, self.degree in (2, 3), "degree", f"must be 2 or 3: {locks}")
+        iterations = self.max_iterations
+        is_whole = is_number(iterations) and iterations == int(iterations) and iterations >= 1
+        require_of(self, is_whole, "max_iterations", "must be a whole number, and 1 at least")
         names = self.units if isinstance(self.units, (tuple, list)) else ()
         are_names = len(names) == 2 and all(isinstance(name, str) for name in names)
         require_of(self, are_names, "units", "must be two names, of a length and of a stress")

@@ -182,7 +182,11 @@ FAULTS = [
     (archord.Load, {"force": 1.0}, f"{LOAD}displacement = 0.1 must not be given together with "),
     (archord.Load, {"displacement": "far"}, f'{LOAD}displacement = "far" must be a number, or '),
     (archord.Load, {"direction": None}, f'{LOAD}direction = null must be "x", "y", "z", "rot'),
-    (archord.Mesh, {"source": None}, "archord.Mesh: the source must be a mesh or CAD file, gmsh with a "),
+    (
+        archord.Mesh,
+        {"source": None},
+        "archord.Mesh: the source must be a mesh or CAD file, gmsh with a ",
+    ),
     (archord.Problem, {"bodies": 3}, "archord.Problem: bodies must be a list of Body, not 3."),
     (archord.Problem, {"loads": [1]}, "archord.Problem: loads must be of the class Load or Dead"),
     (archord.Problem, {"bodis": []}, "archord.Problem: got an unexpected keyword argument 'bodis'"),

@@ -70,12 +70,12 @@ def test_a_curved_cell_takes_a_linear_displacement():
     np.testing.assert_allclose(gradient, np.broadcast_to(A, gradient.shape), atol=1e-12)
 
 
-def pressed(material, depth, comm, size=3.0) -> System:
+def pressed(material, depth, comm, size=3.0, order=2) -> System:
     """A quarter of a pin in a block of this ``material``, pressed to a ``depth`` in two steps."""
     held = {"block side": "x", "pin side": "x", "block below": "z", "pin below": "z"}
     supports = [Support(on, fixed=fixed) for on, fixed in held.items()]
     problem = Problem(
-        joint(size, 2, comm=comm),
+        joint(size, 2, comm=comm, order=order),
         bodies=[Body("block", material), Body("pin", Elastic(E, NU))],
         interactions=[Interaction("contact", ("pin", "hole"))],
         supports=[*supports, Support("block top", fixed="xy")],

@@ -19,7 +19,12 @@ _GROWTH = 0.3  # of elements, per unit of distance from the contact
 
 
 def joint(
-    size: float, layers: int, last: float = 0.4, length: float = THICKNESS, comm=MPI.COMM_WORLD
+    size: float,
+    layers: int,
+    last: float = 0.4,
+    length: float = THICKNESS,
+    comm=MPI.COMM_WORLD,
+    order: int = 2,
 ) -> TaggedMesh:
     """Pin and block, with elements about ``size`` large at the contact, in so many ``layers``
     through the block, of which the last one is ``last`` times as thick as the first.
@@ -31,7 +36,7 @@ def joint(
         Circle("pin", (0.0, MIDDLE), PIN_RADIUS),
         Circle("hole", (0.0, 0.0), HOLE_RADIUS),
     ]
-    plane = gmsh_to_mesh(comm, lambda gmsh: _draw(gmsh, size), circles, quads=True)
+    plane = gmsh_to_mesh(comm, lambda gmsh: _draw(gmsh, size), circles, order=order, quads=True)
     through = graded(0.0, THICKNESS, layers, last)
     beyond = [*through, length] if length > THICKNESS else through
     return layered(plane, {"block": through, "pin": beyond})
