@@ -260,3 +260,11 @@ int32_t closest_on_patches(const Patches *p, int32_t m, const double *x, const d
     }
     return n_lost;
 }
+
+void coordinates_on_patches(const Patches *p, int32_t m, const double *x, const int32_t *facet, double *xi)
+{
+    for (int64_t i = 0; i < m; i++) {
+        const Place at = closest_on_facet(p, facet[i], x + 3 * i);
+        for (int c = S; c <= T; c++) xi[2 * i + c] = at.xi[c];
+    }
+}

@@ -19,3 +19,6 @@ typedef struct {
 int32_t closest_on_patches(const Patches *patches, int32_t m, const double *x, const double *outward, const int32_t *home,
     int32_t others, int32_t *facet, double *xi, double *point, double *normal, double *tangent, double *bend,
     double *shape, double *slope, double *along, uint8_t *found, int32_t *lost);
+
+/* Coordinates xi (m, 2) of the closest points of m points x on the given facets. */
+void coordinates_on_patches(const Patches *patches, int32_t m, const double *x, const int32_t *facet, double *xi);

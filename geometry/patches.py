@@ -21,6 +21,7 @@ from archord.kernels.compiled import library, pointer, structure
 _SOURCE = Path(__file__).with_name("patches.c")
 _BORDER_MARGIN = 0.05  # in xi, by which facets are continued beyond a free border
 _CONTINUED = 0.5  # the same of all edges where points are to stay on their facets
+_FAR = 100.0  # the same where facets are planes of coordinates
 _MOST_FACETS = 64  # on the way from the facet at which a point begins to its partner
 # edges as lines a . xi = b, with a outward: the first leads from the first corner to the second
 _TRIANGLE_EDGES = ((0, -1, 0), (1, 1, 1), (-1, 0, 0))
@@ -192,20 +193,23 @@ class Patches:
         margin = np.full(self.beyond.shape, _CONTINUED)
         return self._project(x, outward, displacement, facet, margin, others=0)
 
-    def _project(
-        self,
-        x: Array,
-        outward: Array,
-        displacement: Array,
-        home: Index,
-        margin: Array,
-        others: int,
-    ) -> PatchProjection:
-        """Closest points on the facets ``home`` and at most so many ``others`` from there on, each
+    def coordinates(self, x: Array, facet: Index) -> Array:
+        """Where the undeformed facets ``facet`` ``(m,)``, continued far beyond their edges, come
+        closest to ``x`` ``(m, 3)``: their coordinates ``(m, 2)``."""
+        margin = np.full(self.beyond.shape, _FAR)
+        members = self._members(np.zeros_like(self.X), margin)
+        xi = np.empty((len(x), 2))
+        arrays = np.ascontiguousarray(x), facet.astype(np.int32, copy=False), xi
+        library(_SOURCE).coordinates_on_patches(
+            structure(_SOURCE, "Patches", members), len(x), *map(pointer, arrays)
+        )
+        return xi
+
+    def _members(self, displacement: Array, margin: Array) -> dict[str, int | np.ndarray]:
+        """The members of the structure ``Patches`` for the kernels: the displaced facets, each
         continued by its ``margin``."""
-        partners = PatchProjection.empty(len(x), self.connectivity.shape[1])
         nodes = (self.X + displacement)[self.connectivity]
-        members: dict[str, int | np.ndarray] = {
+        return {
             "k": self.connectivity.shape[1],
             "n_edges": self.corners.shape[1],
             "exponents": self._exponents,
@@ -218,6 +222,39 @@ class Patches:
             "first": self._first,
             "around": self._around,
         }
+
+    def corner_points(self) -> Array:
+        """The vertices ``(n_facets, e, 3)`` of the facets, in the order in which edges follow."""
+        return self.X[self.connectivity[:, list(_CORNERS[self.cell])]]
+
+    def reference_corners(self) -> Array:
+        """Corners ``(e, 2)`` of the reference facet, anticlockwise."""
+        return basix.geometry(self.cell)[list(_CORNERS[self.cell])]
+
+    def spheres(self) -> tuple[Array, Array, Array]:
+        """Middle ``(n_facets, 3)`` of each facet, the unit normal there, and the radius
+        ``(n_facets,)`` of a sphere about the middle that holds its nodes."""
+        shape, slope = self.shapes(self.reference_corners().mean(axis=0)[None])
+        nodes = self.X[self.connectivity]
+        middle = shape[0] @ nodes
+        normal = np.cross(*(slope[0][:, None, None] @ nodes[None])[:, :, 0])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        radius = np.linalg.norm(nodes - middle[:, None], axis=2).max(axis=1)
+        return middle, normal, radius
+
+    def _project(
+        self,
+        x: Array,
+        outward: Array,
+        displacement: Array,
+        home: Index,
+        margin: Array,
+        others: int,
+    ) -> PatchProjection:
+        """Closest points on the facets ``home`` and at most so many ``others`` from there on, each
+        continued by its ``margin``."""
+        members = self._members(displacement, margin)
+        partners = PatchProjection.empty(len(x), self.connectivity.shape[1])
         points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
         start = home.astype(np.int32, copy=False)
         results: list[np.ndarray] = list(vars(partners).values())

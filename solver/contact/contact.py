@@ -185,12 +185,12 @@ class Contact:
         return total
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
-        """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of
-        laws, by place."""
+        """Numbers ``(n,)`` of this rank's pieces of facets and their ``n q`` points, of materials
+        and of laws, by place."""
         found = {}
         for pair in self.pairs:
-            found[f"contact {pair.surface.name}"] = pair.surface.facet, pair.surface.points
-            found[f"law {pair.surface.name}"] = pair.surface.facet, pair.points
+            found[f"contact {pair.surface.name}"] = pair.surface.piece, pair.surface.points
+            found[f"law {pair.surface.name}"] = pair.surface.piece, pair.points
         return found
 
     def dissipated(self) -> float:

@@ -1,4 +1,4 @@
-"""Quadrature with breaks where facets of the opposite curve end.
+"""Quadrature with breaks where facets of the opposite curve or surface end.
 
 A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its
 ends. Points that ignore them integrate a uniform pressure with an error of the order of the mesh;
@@ -8,11 +8,17 @@ slide by a part of a facet get that part of the error back.
 
 from __future__ import annotations
 
+import basix
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import Curve
+from archord.geometry.curve import Curve, Index
+from archord.geometry.overlay import broken_facets, coincide, piece_rule, quartered
+from archord.geometry.patches import Patches
 
+_EXACT = 4  # degree of the rule in a piece
+_NEARLY_EXACT = 2
+_FEWEST = 4  # pieces of a facet with points of the second degree
 _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
 
 
@@ -47,3 +53,27 @@ def _refined(ends: Array, points: int) -> Array:
         k = int(np.argmax(np.diff(ends)))
         ends = np.insert(ends, k + 1, (ends[k] + ends[k + 1]) / 2)
     return ends
+
+
+def pieces_rule(own: Patches, opposite: Patches) -> tuple[Array, Array, Index]:
+    """Positions ``(pieces, q, 2)`` and weights ``(pieces, q)`` in the pieces into which the facets
+    of ``opposite`` break those of ``own``, and the facets ``(pieces,)`` of the pieces.
+
+    Six points in a triangle, nine in a quadrilateral are exact for a uniform pressure on curved
+    facets of second order. Triangles have three where the surfaces do not coincide: their distance
+    spoils more than that, as it does on a cylinder whose meshes differ.
+    """
+    facet, pieces = broken_facets(own, opposite)
+    degree = _EXACT
+    if own.cell == basix.CellType.triangle and not coincide(own, opposite):
+        degree = _NEARLY_EXACT
+        is_large = np.bincount(facet)[facet] < _FEWEST
+        facet = np.concatenate([facet[~is_large], np.repeat(facet[is_large], 4)])
+        pieces = np.concatenate([pieces[~is_large], quartered(pieces[is_large])])
+        order = np.argsort(facet, kind="stable")
+        facet = facet[order]
+        pieces = pieces[order]
+    xi, w = piece_rule(pieces, degree)
+    whole = basix.make_quadrature(own.cell, 1)[1].sum()
+    covered = np.bincount(facet, w.sum(axis=1))
+    return xi, w * (whole / covered)[facet, None], facet

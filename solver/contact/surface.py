@@ -28,7 +28,7 @@ from archord.solver.contact.facets import (
     refuse_all_but_a_boundary,
     refuse_branches,
 )
-from archord.solver.contact.quadrature import segment_rule
+from archord.solver.contact.quadrature import pieces_rule, segment_rule
 from archord.solver.contact.trace_inequality import trace_constants
 
 # a direction in which no two nodes of a closed piece should be equally far
@@ -53,11 +53,13 @@ class Surface:
 
     curve_dofs : (nodes,) global block dofs of its nodes
     curve : the curve, or the patches, of ``n_facets`` facets
-    curve_xi : (n_facets, q) places of the points on the facets, in space (n_facets, q, 2)
+    curve_xi : (n_facets, q) places of the points on the facets; in space (pieces, q, 2), of all
+        pieces into which facets are broken
 
-    Of this rank's ``n`` facets, in the order of the whole surface:
+    Of this rank's ``n`` facets, in space pieces of facets, in the order of the whole surface:
 
-    facet : (n,) their numbers in the whole surface
+    piece : (n,) their numbers among the pieces of the whole surface
+    facet : (n,) the numbers of their facets in the whole surface, in rising order
     cells : (n,) the cells behind them
     cell_dofs, cell_global : (n, a) block dofs of the cells' nodes on this rank, and of all ranks
     trace : (n, k) nodes on the facet within the cell
@@ -68,7 +70,6 @@ class Surface:
     derivative : (n, q, a, m) the basis by the axes, and around an axis over the radius
     terms : (g, 2) see `Kinematics.terms`
     small_strain : the small strain at the points
-    gamma, gamma_shear : (n,) constants of the trace inequality, in stress per length
     """
 
     def __init__(
@@ -93,7 +94,7 @@ class Surface:
         xi, w = _facet_rule(facet_kind(V.mesh.basix_cell()))
         xi = xi[:, 0] if xi.shape[1] == 1 else xi
         self.place_points(np.stack([xi] * self.n_facets), np.tile(w, (self.n_facets, 1)))
-        self.gamma, self.gamma_shear = self._trace_constants()
+        self._constants = self._trace_constants()
 
     @property
     def in_space(self) -> bool:
@@ -122,15 +123,26 @@ class Surface:
         start = sum(len(part[0]) for part in of_ranks[: self.comm.rank])
         facet = np.argsort(order)[start : start + len(found.cells)]
         sort = np.argsort(facet)
-        found = found.reordered(sort)
-        self.facet = facet[sort]
-        self.cells = found.cells
-        self.cell_dofs = cell_dofs[sort]
-        self.cell_global = cell_global[sort]
-        self.trace = found.trace.astype(np.int32)
-        self._nodes = nodes[self.cell_dofs]
-        self._origin = found.origin
-        self._axes = found.axes
+        self._facets = found.reordered(sort)
+        self._numbers = facet[sort]
+        self._dofs_of_facets = cell_dofs[sort]
+        self._global_of_facets = cell_global[sort]
+        self._nodes = nodes
+
+    def _take_pieces(self, facet: np.ndarray) -> None:
+        """Let this rank's arrays be of pieces of the facets ``facet`` ``(pieces,)`` of the whole
+        surface."""
+        self.piece = np.flatnonzero(np.isin(facet, self._numbers))
+        self.facet = facet[self.piece]
+        home = np.searchsorted(self._numbers, self.facet)
+        behind = self._facets.reordered(home)
+        self.cells = behind.cells
+        self.trace = behind.trace.astype(np.int32)
+        self.cell_dofs = self._dofs_of_facets[home]
+        self.cell_global = self._global_of_facets[home]
+        self._home = home
+        self._origin = behind.origin
+        self._axes = behind.axes
 
     def _ordered(
         self, dofs: np.ndarray, x: Array, within: np.ndarray, number: np.ndarray
@@ -165,16 +177,20 @@ class Surface:
         return np.diff(self.arc_length(np.array([0.0, 1.0])))[:, 0]
 
     def face(self, opposite: Surface) -> None:
-        """Place the points so that forces go to the ``opposite`` surface exactly: in a plane; no
-        history. In space they stay where they are."""
+        """Place the points so that forces go to the ``opposite`` surface exactly; no history."""
+        if isinstance(self.curve, Patches) and isinstance(opposite.curve, Patches):
+            self.place_points(*pieces_rule(self.curve, opposite.curve))
         if isinstance(self.curve, Curve) and isinstance(opposite.curve, Curve):
             self.place_points(*segment_rule(self.curve, opposite.curve))
 
-    def place_points(self, xi: Array, w: Array) -> None:
-        """Put the contact points at ``xi`` ``(n_facets, q)`` in (0, 1), in space ``(n_facets, q,
-        2)``, with weights ``w``; no history."""
+    def place_points(self, xi: Array, w: Array, facet: np.ndarray | None = None) -> None:
+        """Put the contact points at ``xi`` ``(n_facets, q)`` in (0, 1), in space ``(pieces, q,
+        2)``, with weights ``w``; no history. Pieces are of the facets ``facet`` ``(pieces,)``, in
+        rising order; without, every facet is one."""
         self.curve_xi = xi
-        on_facet = xi[self.facet].reshape(*w[self.facet].shape, self._axes.shape[1])
+        self._take_pieces(np.arange(self.n_facets) if facet is None else facet)
+        w = w[self.piece]
+        on_facet = xi[self.piece].reshape(*w.shape, self._axes.shape[1])
         X = self._origin[:, None] + on_facet @ self._axes
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         axes = self._axes.swapaxes(0, 1)
@@ -184,8 +200,8 @@ class Surface:
         self.shape = np.ascontiguousarray(basis.shape)
         self.point = basis.point
         if cell_nodes(self.V.mesh).shape[1] > self.shape.shape[-1]:
-            self.point = self.shape @ self._nodes  # on the curve
-        self.weight = length * w[self.facet] * self.kinematics.measure(self.point)
+            self.point = self.shape @ self._nodes[self.cell_dofs]  # on the curve
+        self.weight = length * w * self.kinematics.measure(self.point)
         n, q = self.weight.shape
         nodes = np.broadcast_to(self.trace[:, None, :], (n, q, self.trace.shape[1]))
         self.trace_shape = np.take_along_axis(self.shape, nodes, axis=2)
@@ -199,6 +215,16 @@ class Surface:
         outward = self.outward.reshape(n * q, self.outward.shape[-1])
         # takes a stress to the force on the facet
         self._cut = np.ascontiguousarray(self.kinematics.traction(outward, large=large))
+
+    @property
+    def gamma(self) -> Array:
+        """Constant ``(n,)`` of the trace inequality of normal stress, in stress per length."""
+        return self._constants[0][self._home]
+
+    @property
+    def gamma_shear(self) -> Array:
+        """The same of the shear."""
+        return self._constants[1][self._home]
 
     def _trace_constants(self) -> tuple[Array, Array]:
         """Constants ``(n,)`` of the trace inequality, of normal stress and shear."""

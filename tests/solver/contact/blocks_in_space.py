@@ -86,7 +86,8 @@ class Blocks:
 
 
 def tagged(blocks: Blocks) -> TaggedMesh:
-    """The mesh of the blocks, with the sets "base", "lid", "left" (x = 0), "front" (y = 0)."""
+    """The mesh of the blocks, with the sets "base", "lid", "left" (x = 0), "front" (y = 0), if
+    they are flat, and "around", the facets without contact."""
     mesh = blocks.V.mesh
     exterior = exterior_facet_indices(mesh.topology)
     middle = compute_midpoints(mesh, 2, exterior)
@@ -95,6 +96,8 @@ def tagged(blocks: Blocks) -> TaggedMesh:
     for name, (axis, at) in of_planes.items():
         sets[name] = exterior[np.abs(middle[:, axis] - at) < 1e-9]
     facets = np.concatenate(list(sets.values()))
+    sets["others"] = np.setdiff1d(exterior, facets)
+    facets = np.concatenate([facets, sets["others"]])
     tags = np.repeat(np.arange(1, 1 + len(sets), dtype=np.int32), [len(f) for f in sets.values()])
     order = np.argsort(facets)
     of_facets = meshtags(mesh, 2, facets[order].astype(np.int32), tags[order])
@@ -102,6 +105,7 @@ def tagged(blocks: Blocks) -> TaggedMesh:
     is_upper[blocks.cells["upper"]] = 1
     of_cells = meshtags(mesh, 3, np.arange(len(is_upper), dtype=np.int32), 1 + is_upper)
     names = {name: (k,) for k, name in enumerate(sets, 1)}
+    names["around"] = sum((tags for name, tags in names.items() if name not in blocks.facets), ())
     return TaggedMesh(mesh, of_cells, of_facets, {"lower": (1,), "upper": (2,)}, names)
 
 
@@ -110,10 +114,11 @@ def bodies(comm, lower=LOWER, upper=UPPER, kind=CellType.tetrahedron, bend=flat)
     of_boxes = [box.nodes(kind) for box in (lower, upper)]
     points, cells = [], []
     for nodes in of_boxes:
-        flat_nodes = np.round(nodes.reshape(-1, 3), 9)
-        unique, node = np.unique(flat_nodes, axis=0, return_inverse=True)
+        places = nodes.reshape(-1, 3)
+        rounded = np.round(places, 9)
+        _, first, node = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
         cells.append(node.reshape(nodes.shape[:2]) + sum(map(len, points)))
-        points.append(unique)
+        points.append(places[first])
     straight = np.concatenate(points)
     element = basix.ufl.element("P", kind.name, 2, shape=(3,))
     chosen = slice(None) if comm.rank == 0 else slice(0, 0)

@@ -1,0 +1,112 @@
+"""Facets in space broken into pieces where the facets of an opposite surface end: triangles into
+triangles, quadrilaterals into quadrilaterals.
+
+The corners of the opposite facets are projected on the undeformed surface, and straight lines join
+them in the coordinates of the facet on which they lie. That is exact where both surfaces are
+planes, or graphs of one polynomial over straight triangles. Other curved edges are off by the
+sagitta of their chords.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import basix
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.geometry.curve import Index
+from archord.geometry.patches import Patches
+from archord.kernels.compiled import library, pointer, structure
+
+_SOURCE = Path(__file__).with_name("overlay.c")
+_TOUCH = 1e-7  # distance of surfaces that coincide, in radii of their facets
+_REACH = 1.2  # of facets, in radii: how far apart those may be that overlie each other
+
+
+def broken_facets(own: Patches, opposite: Patches) -> tuple[Index, Array]:
+    """The facets ``(n,)`` of ``own``, in rising order, and corners ``(n, e, 2)`` on them of the
+    pieces into which the facets of ``opposite`` break them. Together the pieces of a facet cover
+    it. A quadrilateral with its last corner twice is a triangle."""
+    facet, other = _overlying(own, opposite)
+    corners = opposite.corner_points()[other]
+    n_corners = corners.shape[1]
+    xi = own.coordinates(corners.reshape(-1, 3), np.repeat(facet, n_corners))
+    window = own.reference_corners()
+    counts = np.bincount(facet, minlength=own.n_facets)
+    overlay: dict[str, int | np.ndarray] = {
+        "n": own.n_facets,
+        "sides": len(window),
+        "n_corners": n_corners,
+        "window": window,
+        "first": np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        "polygons": xi,
+    }
+    most = 0
+    needed = 8 * own.n_facets + 2 * len(facet)
+    while needed > most:
+        most = needed
+        broken = np.empty(most, dtype=np.int32)
+        pieces = np.empty((most, len(window), 2))
+        needed = library(_SOURCE).broken_facets(
+            structure(_SOURCE, "Overlay", overlay), most, pointer(broken), pointer(pieces)
+        )
+    return broken[:needed], pieces[:needed]
+
+
+def _overlying(own: Patches, opposite: Patches) -> tuple[Index, Index]:
+    """Pairs ``(p,)`` of a facet of ``own``, in rising order, and a facet of ``opposite`` that may
+    lie over it."""
+    from scipy.spatial import cKDTree  # a plane problem does not pay for it
+
+    middle, normal, radius = own.spheres()
+    centre, other_normal, other_radius = opposite.spheres()
+    closest = opposite.closest_point(middle, normal, np.zeros_like(opposite.X)).point
+    gap = ((closest - middle) * normal).sum(axis=1)
+    over = middle + gap[:, None] * normal
+    farthest = _REACH * (radius + other_radius.max())
+    near = cKDTree(centre).query_ball_point(over, farthest, return_sorted=True)
+    facet = np.repeat(np.arange(own.n_facets), [len(found) for found in near])
+    other = np.concatenate([np.asarray(found, dtype=np.int64) for found in near])
+    apart = np.linalg.norm(centre[other] - over[facet], axis=1)
+    is_near = apart < _REACH * (radius[facet] + other_radius[other])
+    is_facing = (normal[facet] * other_normal[other]).sum(axis=1) < 0
+    chosen = is_near & is_facing
+    return facet[chosen], other[chosen]
+
+
+def piece_rule(pieces: Array, degree: int) -> tuple[Array, Array]:
+    """Points ``(n, q, 2)`` and weights ``(n, q)`` in ``pieces`` ``(n, e, 2)``, exact for
+    polynomials of this ``degree``."""
+    start = pieces[:, 0, None]
+    if pieces.shape[1] == 3:
+        X, w = basix.make_quadrature(basix.CellType.triangle, degree)
+        sides = pieces[:, 1:] - start
+        return start + X @ sides, np.abs(np.linalg.det(sides))[:, None] * w
+    X, w = basix.make_quadrature(basix.CellType.quadrilateral, degree + 1)
+    s, t = X.T[..., None]
+    one, opposite, two = (pieces[:, k, None] - start for k in (1, 2, 3))
+    twist = opposite - one - two
+    by_s = one + t * twist
+    by_t = two + s * twist
+    area = by_s[..., 0] * by_t[..., 1] - by_s[..., 1] * by_t[..., 0]
+    return start + s * one + t * two + s * t * twist, area * w
+
+
+def quartered(triangles: Array) -> Array:
+    """Each of the ``triangles`` ``(n, 3, 2)`` cut in four: ``(4 n, 3, 2)``."""
+    across = (triangles[:, [1, 2, 0]] + triangles[:, [2, 0, 1]]) / 2
+    parts = [across]
+    for corner in range(3):
+        part = across.copy()
+        part[:, corner] = triangles[:, corner]
+        parts.append(part)
+    return np.stack(parts, axis=1).reshape(-1, 3, 2)
+
+
+def coincide(own: Patches, opposite: Patches) -> bool:
+    """Whether the undeformed surfaces are the same where they face each other."""
+    middle, normal, radius = own.spheres()
+    over = opposite.closest_point(middle, normal, np.zeros_like(opposite.X))
+    apart = np.linalg.norm(over.point - middle, axis=1)[over.found]
+    return bool((apart < _TOUCH * radius[over.found]).all())
