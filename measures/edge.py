@@ -26,7 +26,8 @@ OF_FRICTION = ("shear", "sticks")  # of one with friction also
 
 @dataclass(frozen=True, kw_only=True)
 class ContactProfile:
-    """One surface's contact state at ``q`` points of its ``n`` facets, on every rank.
+    """One surface's contact state at ``q`` points of its ``n`` facets, in space of the pieces into
+    which the opposite's edges break facets, on every rank.
 
     weight : (n, q) measure
     coordinates : (n, q, d) deformed
@@ -119,11 +120,13 @@ class PatchProfile(_Displaced):
     """The contact state of a surface in space.
 
     normal : (n, q, 3) outward, undeformed
-    corners : (n, c, 3) the undeformed corners of the facets, one after the other around them
-    facet_pressure : (n,) mean pressure
+    facet : (n,) the facet of each piece
+    corners : (n, c, 3) the undeformed corners of these facets, one after the other around them
+    facet_pressure : (n,) mean pressure of these facets
     """
 
     normal: Array
+    facet: Array
     corners: Array
     facet_pressure: Array
 
@@ -155,7 +158,7 @@ AnyProfile = SurfaceProfile | PatchProfile
 def fixed(system: System) -> tuple[str, ...]:
     """Names of the arrays of contact.h5 that do not change."""
     in_space = system.problem.kinematics.dimension == 3
-    return ("weight", "X", "normal", "corners") if in_space else ("s", "weight", "X")
+    return ("weight", "X", "normal", "facet", "corners") if in_space else ("s", "weight", "X")
 
 
 def per_step(system: System) -> tuple[str, ...]:
@@ -202,8 +205,8 @@ def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> dict[str, Array]:
         here |= {"slip": pair.slips, "shear": pair.shears, "normal": side.outward}
     columns = [np.atleast_3d(values) for values in here.values()]
     together = np.concatenate(columns, axis=-1)
-    local = np.zeros((side.n_facets, *together.shape[1:]))
-    local[side.facet] = together
+    local = np.zeros((len(side.curve_xi), *together.shape[1:]))
+    local[side.piece] = together
     whole = side.sum_over_ranks(local)
     ends = np.cumsum([column.shape[-1] for column in columns])[:-1]
     parts = zip(here.items(), np.split(whole, ends, axis=-1), strict=True)
@@ -220,24 +223,32 @@ def _edge_profile(side: Surface, weight: Array, raw_pressure: Array, **others: A
 
 def _patch_profile(side: Surface, weight: Array, raw_pressure: Array, **others: Any) -> Any:
     patches: Any = side.curve
+    facet = side.facet_of_pieces
+    force = np.bincount(facet, (weight * raw_pressure).sum(axis=1))
+    area = np.bincount(facet, weight.sum(axis=1))
     return PatchProfile(
         weight=weight,
-        pressure=project_on_patches(raw_pressure, side.curve_xi, weight),
+        pressure=project_on_patches(raw_pressure, side.curve_xi, weight, facet),
         raw_pressure=raw_pressure,
-        corners=patches.X[patches.vertices],
-        facet_pressure=(weight * raw_pressure).sum(axis=1) / weight.sum(axis=1),
+        facet=facet,
+        corners=patches.X[patches.vertices][facet],
+        facet_pressure=(force / area)[facet],
         **others,
     )
 
 
-def project_on_patches(pressure: Array, xi: Array, weight: Array) -> Array:
-    """L2 projection ``(n, q)`` of ``pressure`` onto one function a facet that is linear in the
-    places ``xi`` ``(n, q, 2)`` on it; facet integrals are kept exactly."""
+def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: Array) -> Array:
+    """L2 projection ``(n, q)`` of ``pressure`` at points of pieces onto one function a facet that
+    is linear in the places ``xi`` ``(n, q, 2)`` on it; facet integrals are kept exactly. The facets
+    ``(n,)`` of the pieces are counted from 0 on."""
     functions = np.concatenate([np.ones((*weight.shape, 1)), xi], axis=-1)
     weighted = functions * weight[..., None]
-    moments = weighted.swapaxes(1, 2) @ functions
-    right = weighted.swapaxes(1, 2) @ pressure[..., None]
-    return (functions @ np.linalg.solve(moments, right))[..., 0]
+    n = facet.max(initial=-1) + 1
+    moments = np.zeros((n, 3, 3))
+    right = np.zeros((n, 3, 1))
+    np.add.at(moments, facet, weighted.swapaxes(1, 2) @ functions)
+    np.add.at(right, facet, weighted.swapaxes(1, 2) @ pressure[..., None])
+    return (functions @ np.linalg.solve(moments, right)[facet])[..., 0]
 
 
 def project(pressure: Array, s: Array, weight: Array) -> Array:

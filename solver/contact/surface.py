@@ -55,6 +55,7 @@ class Surface:
     curve : the curve, or the patches, of ``n_facets`` facets
     curve_xi : (n_facets, q) places of the points on the facets; in space (pieces, q, 2), of all
         pieces into which facets are broken
+    facet_of_pieces : (pieces,) facets of the pieces, in rising order
 
     Of this rank's ``n`` facets, in space pieces of facets, in the order of the whole surface:
 
@@ -188,7 +189,8 @@ class Surface:
         2)``, with weights ``w``; no history. Pieces are of the facets ``facet`` ``(pieces,)``, in
         rising order; without, every facet is one."""
         self.curve_xi = xi
-        self._take_pieces(np.arange(self.n_facets) if facet is None else facet)
+        self.facet_of_pieces = np.arange(self.n_facets) if facet is None else facet
+        self._take_pieces(self.facet_of_pieces)
         w = w[self.piece]
         on_facet = xi[self.piece].reshape(*w.shape, self._axes.shape[1])
         X = self._origin[:, None] + on_facet @ self._axes
