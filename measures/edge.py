@@ -126,7 +126,7 @@ class PatchProfile(_Displaced):
     """
 
     normal: Array
-    facet: Array
+    facet: np.ndarray
     corners: Array
     facet_pressure: Array
 
@@ -237,7 +237,7 @@ def _patch_profile(side: Surface, weight: Array, raw_pressure: Array, **others: 
     )
 
 
-def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: Array) -> Array:
+def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: np.ndarray) -> Array:
     """L2 projection ``(n, q)`` of ``pressure`` at points of pieces onto one function a facet that
     is linear in the places ``xi`` ``(n, q, 2)`` on it; facet integrals are kept exactly. The facets
     ``(n,)`` of the pieces are counted from 0 on."""
