@@ -50,7 +50,7 @@ class Record:
     def plain(self) -> dict[str, Any]:
         """The record as run.json and checkpoints hold it."""
         told = asdict(self)
-        if "delta" not in self.values:
+        if not self.values.keys() >= {*_OF_JOINT}:
             return told
         del told["at"]
         values = told.pop("values")

@@ -26,6 +26,7 @@ from archord.presets.problem import (
     placed,
     require_mirrored,
 )
+from archord.presets.solid_measures import solid_measures
 from archord.report.timer import Timer
 from archord.scene.columns import supporting
 from archord.scene.problem import ProblemScene
@@ -74,7 +75,7 @@ def general_account(
 
 def _account(scene: ProblemScene, system: System, warnings: list[str], file: str | None) -> Account:
     """The account of a general problem, whose mesh is in a ``file``, if any."""
-    measures = part_measures(scene)
+    measures = [*part_measures(scene), *solid_measures(scene)]
     by_factor = [column("step"), column("load_factor", of="at")]
     return Account(
         scene,

@@ -1,0 +1,82 @@
+"""What presets in space tell in their own words."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from mpi4py import MPI
+
+from archord.output.run import solve_scene
+from archord.scene.file import parse_any
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+JOINT = {
+    "joint": {
+        "radius": 10.0,
+        "clearance": 0.05,
+        "block_size": 30.0,
+        "relative_element_size": 0.15,
+        "growth": 0.4,
+    },
+    "pin": STEEL,
+    "block": STEEL,
+    "load": {"displacement": 2.0, "steps": 1},
+    "output": {"fields": False},
+}
+
+
+def last_of(data, folder):
+    """The values of the last step of a scene."""
+    folder.mkdir()
+    return solve_scene(parse_any(data), folder, MPI.COMM_SELF).steps[-1]
+
+
+def test_a_joint_in_space_lies_between_the_planes(tmp_path):
+    """Of a thickness like its radius, in P and in p0 at its middle; at its rim p is smaller."""
+    thickness = 8.0
+    space = {"space": {"thickness": thickness, "rim_ratio": 1.0}}
+    solid = last_of(JOINT | space, tmp_path / "space")
+    strain, stress = (
+        last_of(JOINT | {"analysis": {"plane": plane}}, tmp_path / plane)
+        for plane in ("strain", "stress")
+    )
+    assert solid["delta"] == pytest.approx(0.1, rel=1e-12)
+    assert 0.99 * stress["P"] < solid["P"] / thickness < strain["P"]
+    assert 0.97 * stress["p0"] < solid["p0"] < 1.03 * strain["p0"]
+    assert 0.8 * solid["p0"] < solid["rim pressure"] < 0.98 * solid["p0"]
+    assert solid["eps"] == pytest.approx(stress["eps"], rel=0.04)
+
+
+def test_the_pin_of_a_clevis_bends_as_a_beam(tmp_path):
+    """Its moment is below the one by hand, as plates press less evenly than that."""
+    plate = STEEL | {"width": 40.0, "length": 40.0}
+    made = last_of(
+        {
+            "clevis": {"radius": 10.0, "clearance": 0.02, "element_size": 3.0, "growth": 0.5},
+            "space": {"gap": 2.0, "rim_ratio": 1.0},
+            "inner": plate | {"thickness": 16.0},
+            "outer": plate | {"thickness": 10.0},
+            "pin": STEEL,
+            "load": {"force": 20000.0, "steps": 1},
+            "output": {"fields": False},
+        },
+        tmp_path / "clevis",
+    )
+    by_hand = 20000.0 / 2 * (16.0 / 4 + 2.0 + 10.0 / 2)
+    assert made["pin bending moment by hand"] == pytest.approx(by_hand, rel=1e-5)
+    assert 0.85 * by_hand < made["pin bending moment"] < by_hand
+    deflection = made["pin deflection by hand"]
+    assert deflection == pytest.approx(beam(20000.0), rel=1e-5)
+    assert 0.6 * deflection < made["pin deflection"] < deflection
+    assert made["pin in inner rim pressure"] > made["pin in inner mid pressure"]
+
+
+def beam(force):
+    """Deflection of a round steel beam on two supports, 30 apart, under an even load on 16."""
+    inertia = math.pi * 10.0**4 / 4
+    area = math.pi * 10.0**2
+    shear_modulus = 210e3 / 2.6
+    bent = (8 * 30.0**3 - 4 * 30.0 * 16.0**2 + 16.0**3) / (384 * 210e3 * inertia)
+    sheared = (16.0 / 4 + 2.0 + 10.0 / 2) / 2 / (0.9 * shear_modulus * area)
+    return force * (bent + sheared)
