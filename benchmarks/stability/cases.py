@@ -1,5 +1,5 @@
 """The cases of the stability benchmark: joints read from ``cases.toml``, general scenes from
-``problems.toml``, whose blocks are drawn here; and what each must give.
+``problems.toml`` and ``space.toml``, whose blocks are drawn here; and what each must give.
 
 A case names what its numbers must agree with: a closed form; another case of the same run that gets
 there another way (other units, other steps, the other control); or the same joint on a fine mesh,
@@ -41,16 +41,17 @@ _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
     joints = tomllib.loads(FILE.with_name("cases.toml").read_text(encoding="utf-8"))
-    problems = tomllib.loads(FILE.with_name("problems.toml").read_text(encoding="utf-8"))
-    bases = problems.pop("base")
     found = {}
     for group, table in joints.items():
         for name, keys in table.items():
             found[name] = _case(name, group, keys, _joint, "P/(E* R)")  # compared by default
-    for group, table in problems.items():
-        for name, keys in table.items():
-            merged = _merged(bases[keys.pop("base", group)], keys)
-            found[name] = _case(name, group, merged, _problem, "")
+    for file in ("problems.toml", "space.toml"):
+        problems = tomllib.loads(FILE.with_name(file).read_text(encoding="utf-8"))
+        bases = problems.pop("base")
+        for group, table in problems.items():
+            for name, keys in table.items():
+                merged = _merged(bases[keys.pop("base", group)], keys)
+                found[name] = _case(name, group, merged, _problem, "")
     return found
 
 

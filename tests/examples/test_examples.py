@@ -12,6 +12,7 @@ from archord.materials.named import named_material
 
 FOLDER = Path(__file__).parents[2] / "examples"
 SHORT = ["three_stack", "three_bodies", "lug", "own_material", "own_law", "axisymmetric_punch"]
+SHORT.append("eccentric_press")
 
 
 @pytest.fixture
@@ -46,6 +47,23 @@ def test_a_stack_of_squares_is_exact(run_of):
     exact = (depth + 2 * yield_stress / (3 * K)) / (2 / M + 1 / K)
     run = run_of("three_stack")
     assert -run.columns["lid force"][-1] == pytest.approx(exact, rel=2e-8)
+
+
+@pytest.mark.mpi
+def test_blocks_in_space_are_pressed_and_bent(run_of):
+    """As columns are, without contraction across: the force is within the kern, so that the whole
+    face touches; the largest pressure is at a corner."""
+    area = 20.0**2
+    inertia = 20.0**4 / 12
+    aside = np.array([2.0, -1.0])
+    softness = 10.0 / 210e3 + 10.0 / 70e3
+    run = run_of("eccentric_press")
+    moved = -20e3 * softness * (1 / area + aside @ aside / inertia)
+    assert run.columns["press displacement"][-1] == pytest.approx(moved, rel=2e-3)
+    assert run.columns["base back z"][-1] == pytest.approx(20e3, rel=1e-8)
+    assert run.columns["base back moment x"][-1] == pytest.approx(9.0 * 20e3, rel=1e-6)
+    largest = 20e3 / area * (1 + 6 * np.abs(aside).sum() / 20.0)
+    assert run.columns["contact largest pressure"][-1] == pytest.approx(largest, rel=0.04)
 
 
 @pytest.mark.mpi
