@@ -22,6 +22,7 @@ from archord.geometry.basis import Array
 from archord.solver.linear.strategy import Facts
 
 MOST_REVISIONS = 2  # of the points in one solve: more cost as much as the iterations they save
+_DIMENSION_WHERE_BODIES_YIELD = 3  # from which on it pays there without friction
 _TOLERANCE = 1e-3  # residual of a system over its right-hand side
 # with the factorisation, for one revision: nearly incompressible bodies need most
 _MOST_SOLVES = 40
@@ -34,7 +35,7 @@ Revise = Callable[[Array], tuple[PETSc.Mat, Array] | None]
 
 def why_not(facts: Facts) -> str | None:
     """Why the active set waits for the next iteration."""
-    if facts.yields and not facts.friction:
+    if facts.yields and not facts.friction and facts.dimension < _DIMENSION_WHERE_BODIES_YIELD:
         return (
             "bodies yield without friction: it would take as long as the iterations that it saves"
         )
@@ -87,11 +88,14 @@ class LookAhead:
         self._ksp.setInitialGuessNonzero(True)
         self._ksp.setTolerances(rtol=_TOLERANCE, max_it=self._most_solves)
 
-    def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat) -> int:
-        """Replace ``x``, the solution of ``A x = r``, by the solution of the revised system;
-        Newton's step is ``-x``. Returns the number of Krylov iterations."""
+    def improve(
+        self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat, tolerance: float = _TOLERANCE
+    ) -> int:
+        """Replace ``x``, the solution of ``A x = r``, by the solution of the revised system, to a
+        ``tolerance``; Newton's step is ``-x``. Returns the number of Krylov iterations."""
         if self.given_up or not np.isfinite(x.norm()):
             return 0
+        self._ksp.setTolerances(rtol=max(tolerance, _TOLERANCE))
         iterations = 0
         r = r.copy()
         better = x.copy()

@@ -1,5 +1,7 @@
 """Joints in space against other codes, on coarse meshes."""
 
+from dataclasses import replace
+
 import pytest
 
 from archord.benchmarks.space.case import solved
@@ -17,3 +19,10 @@ def test_forces_of_coarse_meshes_come_near_the_references(name):
     for reference, value in result.compared:
         if reference.quantity == "P":
             assert value == pytest.approx(reference.value, rel=WITHIN[name])
+
+
+def test_the_whole_load_of_a_block_that_yields_is_one_step():
+    case = replace(CASES["A"], steps=1)
+    result = solved(case, COARSE)
+    assert result.cutbacks == 0
+    assert result.newton <= 15
