@@ -88,11 +88,9 @@ class LookAhead:
         self._ksp.setInitialGuessNonzero(True)
         self._ksp.setTolerances(rtol=_TOLERANCE, max_it=self._most_solves)
 
-    def improve(
-        self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat, tolerance: float = _TOLERANCE
-    ) -> int:
-        """Replace ``x``, the solution of ``A x = r``, by the solution of the revised system, to a
-        ``tolerance``; Newton's step is ``-x``. Returns the number of Krylov iterations."""
+    def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat, tolerance: float = 0.0) -> int:
+        """Replace ``x``, the solution of ``A x = r`` to a ``tolerance``, by the solution of the
+        revised system; Newton's step is ``-x``. Returns the number of Krylov iterations."""
         if self.given_up or not np.isfinite(x.norm()):
             return 0
         self._ksp.setTolerances(rtol=max(tolerance, _TOLERANCE))

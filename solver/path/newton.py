@@ -157,8 +157,8 @@ class NewtonSolver:
         self._result.krylov_iterations += krylov_iterations(ksp)
         if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
             return
-        loosely = {"tolerance": ksp.getTolerances()[0]} if self._iterates else {}
-        iterations = self._ahead.improve(b, x, self._strategy.matrix, **loosely)
+        tolerance = ksp.getTolerances()[0] if self._iterates else 0.0
+        iterations = self._ahead.improve(b, x, self._strategy.matrix, tolerance)
         self._result.krylov_iterations += iterations
         if self._system.border:
             self._system.border.singular = None  # vectors that FGMRES tries say nothing of it
