@@ -63,6 +63,7 @@ class Accepted:
         self.contact_moments: Callable[[str], Array] = cache(
             lambda name: system.contact_moments(name, origin)
         )
+        self.mean_motion: Callable[[str, tuple[float, ...]], Array] = cache(system.mean_motion)
         self.quantities = cache(lambda name: system.contact.interface(name).quantities())
         self.largest_peeq: Callable[[str], Place] = cache(self._largest_peeq)
         self._found: dict[str, Any] = {}

@@ -11,6 +11,7 @@ import numpy as np
 from archord.measures.edge import AnyProfile
 from archord.measures.measure import Accepted, Measure
 from archord.scene.columns import part_columns
+from archord.scene.parts import CouplingSection
 from archord.scene.problem import ProblemScene
 
 Value = Callable[[Accepted, str], float]  # of a part by its name
@@ -77,10 +78,21 @@ _VALUES = {
 def part_measures(scene: ProblemScene) -> list[Measure]:
     """The measures of the parts of ``scene``, in the order of the columns."""
     measures = []
+    spread = {part.name: part for part in scene.coupling if part.kind == "distributing"}
     for section, part, what, unit in part_columns(scene):
         value = partial(_value, _VALUES[section].get(what) or _of_law(what), part)
+        if section == "coupling" and part in spread:
+            value = partial(_mean_motion, spread[part], what)
         measures.append(Measure(f"{part} {what}", unit, value))
     return measures
+
+
+def _mean_motion(coupling: CouplingSection, what: str, state: Accepted) -> float:
+    """The displacement or rotation of a ``coupling`` in space along or about an axis."""
+    kind, axis = what.split()
+    motion = state.mean_motion(coupling.facets, tuple(coupling.point))
+    behind = len(state.axes) if kind == "rotation" else 0
+    return motion[behind + state.axes.index(axis)]
 
 
 def _value(value: Value, part: str, state: Accepted) -> float:

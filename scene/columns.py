@@ -39,7 +39,8 @@ class Parts(Protocol):
 
 
 def part_columns(scene: Parts) -> Iterator[Column]:
-    """The columns of loads, supports, interactions and bodies of ``scene``, in order."""
+    """The columns of loads, supports, couplings, interactions and bodies of ``scene``, in
+    order."""
     units = scene.units
     length = units.length
     plane = scene.analysis.plane
@@ -50,11 +51,11 @@ def part_columns(scene: Parts) -> Iterator[Column]:
     axes = {"axisymmetric": "rz", "space": "xyz"}.get(plane, "xy")
     for load in scene.load:
         turns = (load.direction or "").startswith("rotation")
-        moved, by = ("rad", moment) if turns else (length, force)
+        along, by = ("rad", moment) if turns else (length, force)
         if load.kind == "pressure":
-            moved = volume
+            along = volume
             by = units.stress
-        yield "load", load.name, "displacement", moved
+        yield "load", load.name, "displacement", along
         yield "load", load.name, "force", by
     couplings = {coupling.name for coupling in scene.coupling}
     turned = {"moment": moment}
@@ -66,6 +67,12 @@ def part_columns(scene: Parts) -> Iterator[Column]:
         section = "coupling" if name in couplings else "support"
         for what, unit in (dict.fromkeys(axes, force) | turned).items():
             yield section, name, what, unit
+    moved = {f"displacement {axis}": length for axis in axes}
+    moved |= {f"rotation {axis}": "rad" for axis in axes}
+    for coupling in scene.coupling:
+        if plane == "space" and coupling.kind == "distributing":
+            for what, unit in moved.items():
+                yield "coupling", coupling.name, what, unit
     places = [f"at {axis}" for axis in axes]
     touching = {"contact length": length, "largest slip": length, "arcs": ""}
     if plane == "axisymmetric":

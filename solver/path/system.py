@@ -4,6 +4,7 @@ path of its loads."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import basix.ufl
 import numpy as np
@@ -14,6 +15,7 @@ from archord.geometry.basis import Array, displacement_element, lagrange_element
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.report.timer import Timer
 from archord.solver.bulk import Bulk
+from archord.solver.conditions import Mean
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -113,7 +115,15 @@ class System(Totals):
         shape = "curved" if cell_degree(mesh) > 1 else "straight"
         self.cell_kind = f"{shape} {mesh.basix_cell().name}s"
         self.drive_names = self.equilibrium.drives.names
+        self.mean_rates = cache(self._mean_rates)
         self._path: LoadPath | None = None
+
+    def _mean_rates(self, facets: str, point: tuple[float, ...]) -> Array:
+        """Derivatives ``(d + t, n_owned, d)`` of `mean_motion` by the displacements."""
+        kinematics = self.problem.kinematics
+        n = kinematics.dimension + len(kinematics.turns)
+        means = [Mean("", facets, axis, point) for axis in range(n)]
+        return np.stack([self.equilibrium.drives.loads.mean_motion(mean) for mean in means])
 
     def _bulk(self) -> Bulk:
         problem = self.problem

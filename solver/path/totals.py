@@ -29,6 +29,7 @@ class Totals:
     contact: Contact
     equilibrium: Equilibrium
     drive_names: list[str]
+    mean_rates: Callable[[str, tuple[float, ...]], Array]
 
     def reaction(self, name: str) -> Array:
         """Force ``(d,)`` of the supports and means ``name`` on the whole."""
@@ -66,6 +67,14 @@ class Totals:
         """Moments ``(t,)`` of that force at ``point``, on the deformed whole: about z in a plane,
         about x, y and z in space, none around an axis."""
         return self.problem.whole * self.contact.moments(name, point)
+
+    def mean_motion(self, facets: str, point: tuple[float, ...]) -> Array:
+        """The rigid motion closest to the motion of a set of ``facets``, see `Mean`: the
+        displacement of the ``point``, then the rotations."""
+        owned = self.equilibrium.unknowns.n_owned
+        u = self.equilibrium.displacement()[:owned]
+        rates = self.mean_rates(facets, point)
+        return self.comm.allreduce(np.einsum("knd,nd->k", rates, u))
 
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces ``(l,)`` of the ``drive_names`` on the whole, which do the work:

@@ -12,7 +12,7 @@ from dolfinx.mesh import CellType
 from vtkmodules.vtkCommonCore import reference
 
 import archord
-from archord import Body, Elastic, Interaction, Load, Problem, Support
+from archord import Body, Coupling, Elastic, Interaction, Load, Problem, Support, boxes
 from archord.commands.progress import Progress
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
@@ -240,3 +240,35 @@ def test_pictures_of_bodies_are_left_out_or_refused(folders, tmp_path):
     assert write_report(run, tmp_path / "run.pdf").stat().st_size > 1000
     with pytest.raises(archord.InputError, match=r"bodies in space are not drawn; .* --vtk"):
         archord.draw_run(run, tmp_path / "field.png", field="peeq")
+
+
+@pytest.mark.mpi
+def test_a_distributing_coupling_tells_how_its_facets_move_on_average(comm, tmp_path_factory):
+    """The end of a cantilever: its deflection and slope by Bernoulli and Timoshenko, and the motion
+    of another point of the same faces."""
+    L, E, force = 10.0, 210e3, 100.0
+    mesh = boxes({"beam": (0.0, 0.0, 0.0, L, 1.0, 1.0)}, size=0.5, kind="hexahedra", comm=comm)
+    middle, beyond = (L, 0.5, 0.5), (L + 2.0, 0.5, 0.5)
+    problem = Problem(
+        mesh,
+        [Body("beam", Elastic(E, 0.0))],
+        supports=[Support("wall", on="beam left", fixed=["x", "y", "z"])],
+        couplings=[
+            Coupling("end", "beam right", middle, "distributing"),
+            Coupling("far", "beam right", beyond, "distributing"),
+        ],
+        loads=[Load("bend", on="end", direction="z", force=force)],
+        steps=1,
+    )
+    folder = comm.bcast(tmp_path_factory.mktemp("beam") if comm.rank == 0 else None)
+    last = {name: v[-1] for name, v in archord.solve(problem, folder, comm=comm).columns.items()}
+    inertia = 1 / 12
+    slope = force * L**2 / (2 * E * inertia)
+    deflection = force * L**3 / (3 * E * inertia) + 1.2 * force * L / (E / 2)
+    assert last["end displacement z"] == pytest.approx(last["bend displacement"], rel=1e-9)
+    assert last["end displacement z"] == pytest.approx(deflection, rel=2e-3)
+    assert last["end rotation y"] == pytest.approx(-slope, rel=2e-3)
+    assert last["far rotation y"] == pytest.approx(last["end rotation y"], rel=1e-9)
+    farther = last["end displacement z"] - 2.0 * last["end rotation y"]
+    assert last["far displacement z"] == pytest.approx(farther, rel=1e-9)
+    assert abs(last["end rotation x"]) + abs(last["end rotation z"]) < 1e-6 * slope
