@@ -138,25 +138,31 @@ def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
 
     mesh = run.fields(step)
     x = run.points(step)["coordinates"]
-    m, q, d = x.shape
+    is_point = ~np.isnan(x).any(axis=-1)  # cells of fewer points than others have none behind
     kinds = {6: TRIANGLE, 9: QUADRILATERAL, 10: TETRAHEDRON, 27: HEXAHEDRON}
     kind = kinds[mesh.cells.shape[1]]
-    reference, _ = bulk_quadrature(kind, run.scene.analysis.degree)
+    rules = [
+        bulk_quadrature(kind, run.scene.analysis.degree, full=full)[0] for full in (False, True)
+    ]
+    shapes = {len(points): tabulate(kind, 2, points)[0] for points in rules}
     _, in_vtk_order = CELLS[mesh.cells.shape[1]]
     cells = mesh.cells[:, np.argsort(in_vtk_order)]
-    shape = tabulate(kind, 2, reference)[0]
-    vertices = np.arange(m * q)[:, None]
-    body = np.repeat(mesh.body, q)
-    grid = Grid(in_space(x.reshape(m * q, d)), vertices, VERTEX, {"CellData/body": body})
+    cell, _ = np.nonzero(is_point)
+    vertices = np.arange(len(cell))[:, None]
+    grid = Grid(in_space(x[is_point]), vertices, VERTEX, {"CellData/body": mesh.body[cell]})
 
     def values(step: int) -> Arrays:
         nodal = run.fields(step).displacement[cells]
-        displacement = np.einsum("qa,mak->mqk", shape, nodal).reshape(m * q, d)
-        found = {"PointData/displacement": in_space(displacement)}
+        displacement = np.zeros_like(x)
+        for n_points, shape in shapes.items():
+            of_rule = is_point.sum(axis=1) == n_points
+            moved = np.einsum("qa,mak->mqk", shape, nodal[of_rule])
+            displacement[of_rule, :n_points] = moved
+        found = {"PointData/displacement": in_space(displacement[is_point])}
         at_points = run.points(step)
         del at_points["coordinates"]
         for name, array in at_points.items():
-            found[f"PointData/{name}"] = _for_vtk(array.reshape(m * q, *array.shape[2:]))
+            found[f"PointData/{name}"] = _for_vtk(array[is_point])
         return found
 
     return grid, values

@@ -192,8 +192,9 @@ def same(one, other, tolerance, at_points=0.0):
 
 def close(name, a, b, tolerance):
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    off = np.abs(a - b).max(initial=0.0)
-    assert off <= tolerance * np.abs(a).max(initial=0.0), (name, off)
+    np.testing.assert_array_equal(np.isnan(a), np.isnan(b))
+    off = np.nanmax(np.abs(a - b), initial=0.0)
+    assert off <= tolerance * np.nanmax(np.abs(a), initial=0.0), (name, off)
 
 
 def test_a_restart_is_bit_identical(tmp_path, monkeypatch):
