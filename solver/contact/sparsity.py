@@ -21,10 +21,6 @@ class Meetings(NamedTuple):
     rows: np.ndarray  # (p, k + o) block dofs that get forces
     columns: np.ndarray  # (p, a + o) block dofs on which the forces depend
 
-    def largest_dof(self) -> int:
-        """The largest block dof; 0 without any."""
-        return max(int(dofs.max(initial=0)) for dofs in (self.rows, self.columns))
-
 
 class Reach:
     """Which opposite facets each facet of a ``pair`` may meet, where points slide by about

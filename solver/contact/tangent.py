@@ -18,6 +18,7 @@ from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import Surface
 
+_PLACES = Path(__file__).with_name("places.c")
 _SOURCES = {  # by the dimension
     2: Path(__file__).with_name("contact_tangent.c"),
     3: Path(__file__).with_name("space_tangent.c"),
@@ -37,13 +38,10 @@ class ContactTangent:
         self._block_size = block_size
         self._kernels = library(_SOURCES[block_size])
         meetings = [reach.meetings() for reach in reaches]
-        size = 1 + max((m.largest_dof() for m in meetings), default=0)
-        places = [m.rows[:, :, None] * size + m.columns[:, None, :] for m in meetings]
-        nothing = np.zeros(0, dtype=np.int64)
-        unique = np.unique(np.concatenate([nothing, *(place.ravel() for place in places)]))
-        self.rows, self.columns = np.divmod(unique, size)
+        places = [np.broadcast_arrays(m.rows[:, :, None], m.columns[:, None, :]) for m in meetings]
+        self.rows, self.columns, slots = _numbered(places)
         self._keys = [m.keys for m in meetings]
-        self._slots = [np.searchsorted(unique, place).astype(np.int32) for place in places]
+        self._slots = slots
 
     def blocks(self) -> Array:
         """Derivative ``(n, d, d)`` of the residual at the last evaluation."""
@@ -54,6 +52,29 @@ class ContactTangent:
             side = _side(reach.pair)
             self._kernels.contact_tangent(side, *map(pointer, (place, slots, values)))
         return values
+
+
+def _numbered(places: list[list[np.ndarray]]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Rows and columns ``(n,)`` of the different ones of several arrays of ``places``, sorted, and
+    for each array the numbers of its places among them."""
+    nothing = np.zeros(0, dtype=np.int32)
+    rows, columns = (
+        np.concatenate([nothing, *(place[axis].astype(np.int32).ravel() for place in places)])
+        for axis in (0, 1)
+    )
+    slot, unique_rows, unique_columns = np.empty((3, len(rows)), dtype=np.int32)
+    n = library(_PLACES).number_places(
+        len(rows),
+        *map(pointer, (rows, columns)),
+        rows.max(initial=-1) + 1,
+        columns.max(initial=-1) + 1,
+        *map(pointer, (slot, unique_rows, unique_columns)),
+    )
+    if n < 0:
+        raise MemoryError
+    ends = np.cumsum([place[0].size for place in places], dtype=int)
+    slots = np.split(slot, ends[:-1]) if places else []
+    return unique_rows[:n].astype(np.int64), unique_columns[:n].astype(np.int64), slots
 
 
 def point_rates(pair: Pair, u: Array, levels: Array) -> tuple[Array, Array]:
