@@ -148,7 +148,9 @@ def scene(
 
 
 @click.command()
-@argument("file", "FILE", "mesh (.msh, .inp, .xdmf, .npz), or scene (.toml)")
+@argument(
+    "file", "FILE", "mesh (.msh, .inp, .xdmf, .npz), CAD (.step, .stp, .brep), or scene (.toml)"
+)
 @output("picture to draw [<name>.png]")
 @overrides()
 @pictures("the mesh with its named sets")

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from archord.geometry.basis import TRIANGLE
 from archord.geometry.curve import Curve, circle_through
-from archord.geometry.meshes.cells import along, n_sides, sides_between, sides_of
+from archord.geometry.meshes.cells import (
+    along,
+    corners_of,
+    entities_of,
+    n_sides,
+    outer_sides,
+    side_kind,
+    sides_between,
+    sides_of,
+)
 from archord.geometry.meshes.check import cracks, parts
 from archord.geometry.meshes.mesh_arrays import MeshArrays
-from archord.geometry.meshes.quality import distorted, measures
+from archord.geometry.meshes.quality import distorted, measures, place
+from archord.geometry.meshes.refine import cylinder_through
+from archord.geometry.patches import Patches
 from archord.postprocess.pictures.pictures import save_figure
 from archord.report.figure import new_figure
 from archord.report.table import Table
@@ -21,19 +33,25 @@ from archord.report.table import Table
 def mesh_text(name: str, mesh: MeshArrays) -> str:
     """What is in ``mesh``, in tables with a row a set; warnings come last."""
     area = measures(mesh)
-    width, height = np.ptp(mesh.x, axis=0)
-    left, low = mesh.x.min(axis=0)
-    kind = f"{mesh.kind.name}s of order {mesh.order}"
-    extent = f"{width:g} by {height:g} from ({left:g}, {low:g})"
+    is_plane = mesh.dimension == 2
+    extents = " by ".join(f"{extent:g}" for extent in np.ptp(mesh.x, axis=0))
+    plural = f"{mesh.kind.name}s".replace("hedrons", "hedra")
+    kind = f"{plural} of order {mesh.order}"
+    extent = f"{extents} from {place(mesh.x.min(axis=0))}"
     head = f"{name}: {len(mesh.cells)} {kind}, {len(mesh.x)} nodes, {extent}"
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
-    bodies = Table("cell set", "cells", "area", "parts", left=1)
+    bodies = Table("cell set", "cells", "area" if is_plane else "volume", "parts", left=1)
     for name, inside in cells.items():
         n_parts = parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1
         bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", n_parts)
-    facets = Table("facet set", "of", "circle", "facets", "length", "shortest", "longest", left=3)
-    for name, tags in mesh.facet_sets.items():
-        facets.add(name, *_facet_row(mesh, mesh.facets[np.isin(mesh.tags, tags)], cells))
+    columns = ["facet set", "of", "circle", "facets", "length", "shortest", "longest"]
+    if not is_plane:
+        columns = ["facet set", "of", "middle", "cylinder", *columns[3:]]
+        columns[5] = "area"
+    facets = Table(*columns, left=columns.index("facets"))
+    for name in mesh.facet_sets:
+        row = _facet_row if is_plane else _face_row
+        facets.add(name, *row(mesh, mesh.facets_of(name), cells))
     points = Table("point set", "nodes", left=1)
     for name, nodes in mesh.point_sets.items():
         points.add(name, len(nodes))
@@ -47,13 +65,36 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     return "\n\n".join(parts_of_text)
 
 
+def _owners(mesh: MeshArrays, facets: np.ndarray, cells: Mapping[str, np.ndarray]) -> str:
+    """The sets of the ``cells`` behind facets."""
+    corners = corners_of(mesh.kind, facets)
+    behind = sides_between(mesh.kind, mesh.cells, corners) // n_sides(mesh.kind)
+    return ", ".join(name for name, inside in cells.items() if inside[behind].any())
+
+
+def _face_row(
+    mesh: MeshArrays, facets: np.ndarray, cells: Mapping[str, np.ndarray]
+) -> list[object]:
+    """Owners, middle, cylinder, number, area, shortest and longest edge of the ``facets`` of a set
+    in space."""
+    kind = side_kind(mesh.kind)
+    corners = corners_of(mesh.kind, facets)
+    cylinder = cylinder_through(mesh.x, facets) if len(facets) else None
+    middle = place(mesh.x[corners].mean(axis=(0, 1)).round(9) + 0.0) if len(facets) else ""
+    said = f"R {cylinder.radius:.8g}" if cylinder else ""
+    ends = mesh.x[entities_of(kind, facets, 1)[:, :2]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    area = Patches(mesh.x, facets, kind, mesh.order).areas().sum()
+    sizes = [area, length.min(initial=np.inf), length.max(initial=0.0)]
+    numbers = [f"{value:.5g}" for value in sizes]
+    return [_owners(mesh, facets, cells), middle, said, len(facets), *numbers]
+
+
 def _facet_row(
     mesh: MeshArrays, edges: np.ndarray, cells: Mapping[str, np.ndarray]
 ) -> list[object]:
     """Owners, circle, number, length, shortest and longest of the ``edges`` of a set."""
     nodes, count = np.unique(edges[:, :2], return_counts=True)
-    behind = sides_between(mesh.kind, mesh.cells, edges[:, :2]) // n_sides(mesh.kind)
-    owners = ", ".join(name for name, inside in cells.items() if inside[behind].any())
     ends = Curve(mesh.x, edges.shape[1] - 1, along(edges)).arc_length(np.array([0.0, 1.0]))
     length = np.diff(ends)[:, 0]
     said = []
@@ -67,12 +108,19 @@ def _facet_row(
     if len(nodes) and (count == 2).all():
         said.append("closed")
     sizes = [length.sum(), length.min(initial=np.inf), length.max(initial=0.0)]
-    return [owners, ", ".join(said), len(edges), *(f"{value:.5g}" for value in sizes)]
+    return [
+        _owners(mesh, edges, cells),
+        ", ".join(said),
+        len(edges),
+        *(f"{value:.5g}" for value in sizes),
+    ]
 
 
 def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
     """The cells, facets and points of named sets, each set in a colour, small ones over large;
     returns ``target``. Raises `InputError`."""
+    if mesh.dimension == 3:
+        return _draw_solids(mesh, target)
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -101,3 +149,32 @@ def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
     axes.set_aspect("equal")
     figure.legend(loc="outside right upper")
     return save_figure(figure, target)
+
+
+def _draw_solids(mesh: MeshArrays, target: Path) -> Path:
+    """The boundary of bodies in space, with the facets of named sets, each set in a colour with its
+    name in its middle."""
+    from matplotlib import colormaps
+
+    figure = new_figure(9.0, 8.0)
+    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    faint = {"alpha": 0.25, "shade": False}
+    outer, _ = outer_sides(mesh.kind, mesh.cells)
+    axes.plot_trisurf(*mesh.x.T, triangles=_triangles(mesh, outer), color="0.9", **faint)
+    for k, name in enumerate(mesh.facet_sets):
+        facets = mesh.facets_of(name)
+        if len(facets):
+            colour = colormaps["tab10"](k % 10)
+            triangles = _triangles(mesh, facets)
+            axes.plot_trisurf(*mesh.x.T, triangles=triangles, color=colour, **faint)
+            axes.text(*mesh.x[triangles].mean(axis=(0, 1)), name, zorder=3)
+    axes.set_aspect("equal")
+    return save_figure(figure, target)
+
+
+def _triangles(mesh: MeshArrays, facets: np.ndarray) -> np.ndarray:
+    """Nodes ``(k, 3)`` of the triangles that facets in space are, or are cut into."""
+    corners = corners_of(mesh.kind, facets)
+    if corners.shape[1] == 3:
+        return corners
+    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [3, 2, 1]]])

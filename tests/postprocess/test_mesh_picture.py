@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from archord.geometry.basis import QUADRILATERAL
+from archord import boxes
+from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL
+from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.refine import Circle, refined
 from archord.postprocess.pictures.mesh import draw_mesh, mesh_text
@@ -56,3 +59,25 @@ def test_a_mesh_is_drawn(tmp_path):
     assert draw_mesh(ring(), tmp_path / "ring.png").stat().st_size > 10_000
     with pytest.raises(InputError, match="must end in one of"):
         draw_mesh(ring(), tmp_path / "ring.xyz")
+
+
+def test_a_mesh_in_space_is_told_of_and_drawn(tmp_path):
+    """The faces of solids, with middles and radii, by which a user finds those of a STEP file."""
+    mesh = gathered(boxes({"bar": (0, 0, 0, 3, 1, 2)}, 1.0, "hexahedra", MPI.COMM_SELF))
+    head, *tables = mesh_text("bar.msh", mesh).split("\n\n")
+    assert head == "bar.msh: 6 hexahedra of order 2, 105 nodes, 3 by 1 by 2 from (0, 0, 0)"
+    said = rows("\n".join(tables))
+    assert said["bar"].split() == ["bar", "6", "6", "1"]
+    columns = ["bar", "right", "bar", "(3,", "0.5,", "1)", "2", "2", "1", "1"]
+    assert said["bar right"].split() == columns
+    assert draw_mesh(mesh, tmp_path / "bar.png").stat().st_size > 10_000
+
+
+def test_cylinders_of_a_mesh_in_space_are_told():
+    turned = np.linspace(0, np.pi / 2, 7)
+    x = [[r * np.cos(a), r * np.sin(a), z] for z in (0, 1) for a in turned for r in (1, 2)]
+    first = np.arange(0, 12, 2)[:, None]
+    cells = first + np.array([0, 1, 2, 3, 14, 15, 16, 17])
+    facets = {"bore": cells[:, [0, 2, 4, 6]]}
+    made = MeshArrays.of_sets(HEXAHEDRON, np.array(x), cells, {"tube": np.arange(6)}, facets, {})
+    assert "  R 1  " in rows(mesh_text("tube", made))["bore"]

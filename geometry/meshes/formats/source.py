@@ -143,7 +143,8 @@ class Mesh:
     def _sizes(self) -> Any:
         from archord.geometry.meshes.formats.step import Sizes
 
-        return Sizes(self.size, self.sizes)
+        on_faces = {name: size / self.scale for name, size in self.sizes.items()}
+        return Sizes(self.size and self.size / self.scale, on_faces)
 
     def _tagged(self) -> Any:
         from archord.geometry.meshes.formats.read import tagged

@@ -15,6 +15,7 @@ _ENTITY = re.compile(r"#(\d+)\s*=\s*(\w+)\s*\((.*?)\)\s*;", re.DOTALL)
 _REFERENCE = re.compile(r"#(\d+)")
 _NAME = re.compile(r"\s*'((?:[^']|'')*)'")
 _SURFACES = {"PLANE": "Plane", "CYLINDRICAL_SURFACE": "Cylinder", "CONICAL_SURFACE": "Cone"}
+_NAMELESS = "Open CASCADE STEP translator"  # the label of solids that nobody has named
 _ACROSS = 10  # elements along the largest extent
 _AROUND = 24  # elements around a circle, at least
 _GROWTH = 0.3  # of elements away from a face with a size of its own, per unit of distance
@@ -42,6 +43,7 @@ def mesh_step(gmsh: Any, path: Path, order: int, sizes: Sizes) -> None:
     if not solids:
         raise ValueError("has no solid, only faces or curves")
     labels = {tag: gmsh.model.getEntityName(3, tag).split("/")[-1] for tag in solids}
+    labels = {tag: name for tag, name in labels.items() if not name.startswith(_NAMELESS)}
     bodies = _sets("solid", solids, labels)
     surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
     faces = _sets("face", surfaces, _face_names(gmsh, path, solids))

@@ -4,6 +4,7 @@ areas and sets."""
 import gmsh
 import numpy as np
 import pytest
+from dolfinx import io
 from mpi4py import MPI
 
 from archord.geometry.basis import HEXAHEDRON, TETRAHEDRON, lagrange_element, tabulate
@@ -109,6 +110,33 @@ def test_every_format_gives_the_same_tube(module, tmp_path, kind, order, nodes):
     again = tagged(expected.mesh, expected.cells, expected.facets)
     volume = sum(value for (what, _), (_, value) in content(again)[2].items() if what == "cells")
     assert volume == pytest.approx(VOLUME, rel=OFF[order])
+
+
+@KINDS
+def test_files_of_dolfinx_keep_the_tags(module, tmp_path, kind, order, nodes):  # noqa: F811
+    """Sets are the values of tags; in HDF5 and as text."""
+    if order == 3:
+        pytest.skip("dolfinx writes no tags of cubic facets")
+    draw(kind, order, nodes)
+    comm = MPI.COMM_WORLD
+    made = read_mesh(gmsh, comm)
+    name, degree, expected = content(made)
+    path = tmp_path / "tube.xdmf"
+    for encoding in (io.XDMFFile.Encoding.HDF5, io.XDMFFile.Encoding.ASCII):
+        with io.XDMFFile(comm, path, "w", encoding=encoding) as file:
+            file.write_mesh(made.mesh)
+            made.facets.name = "facet_tags"
+            file.write_meshtags(made.facets, made.mesh.geometry)
+        mesh = read_mesh(path, comm)
+        assert content(mesh)[:2] == (name, degree)
+        found = content(mesh)[2]
+        [volume] = [value for (what, _), (_, value) in found.items() if what == "cells"]
+        assert volume == pytest.approx(expected["cells", "tube"][1], rel=1e-6)
+        for face in ("bore", "rim", "top"):
+            n, area = expected["facets", face]
+            tag = str(made.facet_sets[face][0])
+            assert found["facets", tag] == (n, pytest.approx(area, rel=1e-6))
+        assert dimension_of_source(path) == 3
 
 
 @KINDS
