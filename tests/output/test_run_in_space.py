@@ -197,12 +197,13 @@ def close(name, a, b, tolerance):
     assert off <= tolerance * np.nanmax(np.abs(a), initial=0.0), (name, off)
 
 
-def test_a_restart_is_bit_identical(tmp_path, monkeypatch):
+@KINDS
+def test_a_restart_is_bit_identical(kind, tmp_path, monkeypatch):
     """After an interruption behind the first step."""
     from mpi4py import MPI
 
     def problem():
-        return pressed(MPI.COMM_SELF)
+        return pressed(MPI.COMM_SELF, kind)
 
     archord.solve(problem(), tmp_path / "whole", comm=MPI.COMM_SELF)
 
