@@ -42,9 +42,9 @@ Printed = list[
 @dataclass(frozen=True)
 class SecondOpinion:
     """CalculiX's results on ``mesh``: the ``forces`` ``(steps,)`` on drives by name; at the last
-    step the ``displacement`` ``(n, 2)`` and the ``stress`` ``(n, 4)`` at the nodes (xx, yy, zz,
-    xy), the pressure on the axis of a joint and the integral of PEEQ over the whole; iterations of
-    all steps."""
+    step the ``displacement`` ``(n, d)`` and the ``stress`` ``(n, 4)``, in space ``(n, 6)``, at the
+    nodes (xx, yy, zz, xy, yz, zx), the pressure on the axis of a joint and the integral of PEEQ
+    over the whole, nan in space; iterations of all steps."""
 
     mesh: DeckMesh
     forces: dict[str, Array]
@@ -89,6 +89,7 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
         faults += [line.strip() for line in said if "*ERROR" in line]
         raise Failure("; ".join(faults))
     text = (folder / "deck.frd").read_text()
+    kinematics = system.problem.kinematics
     p0 = None
     centre = view_of(scene).arc_centre
     if centre is not None:
@@ -102,8 +103,8 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
     return SecondOpinion(
         mesh,
         drive_forces(system, mesh, printed),
-        read_nodal(text, "DISP", mesh)[:, :2],
-        read_nodal(text, "STRESS", mesh)[:, :4],
+        read_nodal(text, "DISP", mesh)[:, : kinematics.dimension],
+        read_nodal(text, "STRESS", mesh)[:, : kinematics.n_stress],
         p0,
         peeq_integral(printed, mesh) * system.problem.whole,
         sum(int(row[3]) for row in counted),
@@ -149,10 +150,12 @@ def step_forces(printed: Printed, nodes: str) -> Array:
 def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
     """The integral of PEEQ over the deck's model at the last time printed: means of the elements
     times their areas, as the points of a triangle have equal weights where its edges are
-    straight."""
+    straight; nan in space."""
     latest = {
         name: rows for quantity, name, _, rows in printed if quantity == "equivalent plastic strain"
     }
+    if mesh.x.shape[1] == 3:
+        return math.nan
     rows = np.concatenate([np.zeros((0, 3)), *latest.values()])
     area = np.concatenate([areas(mesh.x[nodes]) for nodes in mesh.elements.values()])
     element = rows[:, 0].astype(int) - 1

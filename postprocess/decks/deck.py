@@ -27,7 +27,8 @@ from archord.geometry.meshes.formats.source import Mesh
 from archord.materials.elasticity import Elastic, contact_modulus
 from archord.materials.j2 import J2Material
 from archord.output.user_file import writing
-from archord.postprocess.decks.mesh import DeckMesh, Ints, deck_mesh, label, surface_name
+from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label, surface_name
+from archord.postprocess.decks.numbering import Ints
 from archord.presets.account import account_of
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
@@ -40,11 +41,15 @@ PENETRATION = 4e-4  # over the size of the surfaces, under a pressure of the con
 SLICE = 0.1  # thickness of a slice in plane stress, in the shortest edge
 WEDGES = 180  # wedges of CalculiX in a ring
 _WEAK = 1e-7  # stiffness of the springs that hold floating bodies, over Young's modulus
-_FAMILIES = {"strain": "CPE", "stress": "CPS", "axisymmetric": "CAX"}
+_FAMILIES = {"strain": "CPE", "stress": "CPS", "axisymmetric": "CAX", "space": "C3D"}
+_MODELS = {"axisymmetric": "axisymmetric, printed forces", "space": "in space, forces"}
+_REDUCED = 20  # nodes of elements with reduced integration, as archord has but for contact
+_LONGEST = 15  # entries of a row
 _LARGE = (
     "NLGEOM is elastic by St. Venant and Kirchhoff in CalculiX; archord has Hencky's elasticity"
 )
-_RESULTS = ["*NODE FILE, OUTPUT=2D", "U", "*EL FILE, OUTPUT=2D", "S", "*CONTACT FILE", "CSTR"]
+_RESULTS = ["*NODE FILE{}", "U", "*EL FILE{}", "S", "*CONTACT FILE", "CSTR"]
+_AS_DRAWN = ", OUTPUT=2D"  # not of the bricks that CalculiX makes of plane elements
 
 
 def system_of(scene: AnyScene, given: Problem | None = None) -> System:
@@ -95,7 +100,7 @@ def thickness(problem: Problem, mesh: DeckMesh) -> float:
     In plane stress CalculiX's bricks must be thin against the elements: thick ones resist, by
     shear, a thickness strain that varies in the plane.
     """
-    if not problem.kinematics.is_plane:
+    if problem.kinematics.has_hoop:
         return 1 / WEDGES
     if not problem.kinematics.is_thin:
         return 1.0
@@ -197,10 +202,15 @@ class _Writer:
         self.problem = problem = system.problem
         self.mesh = mesh
         self.thick = thickness(problem, mesh)
-        is_plane = problem.kinematics.is_plane
-        self.slice = self.thick if is_plane else 1.0
-        if not is_plane and any(isinstance(i.surfaces[0], Rigid) for i in problem.interactions):
+        has_hoop = problem.kinematics.has_hoop
+        self.slice = 1.0 if has_hoop else self.thick
+        if has_hoop and any(isinstance(i.surfaces[0], Rigid) for i in problem.interactions):
             raise ValueError("a rigid disc cannot be exported around an axis; a body can")
+        if problem.turns:
+            raise ValueError(
+                f"the finite rotation of {problem.turns[0].name!r} cannot be exported; a rotation "
+                "at small strain can"
+            )
         drives = system.equilibrium.drives
         by_force = {drive.name for drive in problem.all_drives if drive.control == "force"}
         means = [mean.name for mean in problem.means if mean.drive not in by_force]
@@ -224,23 +234,20 @@ class _Writer:
         """Nodes, elements, sets and surfaces."""
         mesh = self.mesh
         whole = number(self.problem.whole / self.thick)
-        model = f"thickness {number(self.thick)}, forces"
-        if not self.problem.kinematics.is_plane:
-            model = "axisymmetric, printed forces"
+        model = _MODELS.get(self.problem.kinematics.name, f"thickness {number(self.thick)}, forces")
         lines = ["*HEADING", f"archord: {heading}; {model} times {whole} are of the whole"]
         lines.append("*NODE, NSET=ALL_NODES")
-        x = self._drawn()
-        for i in range(len(x)):
-            lines.append(f"{i + 1}, {number(x[i, 0])}, {number(x[i, 1])}")
+        for node, place in enumerate(self._drawn(), 1):
+            lines.append(", ".join([str(node), *(number(value) for value in place)]))
         if self.own:
             lines.append("*NODE, NSET=DRIVES")
             lines += [f"{node}, 0., 0." for node in self.own.values()]
-        family = _FAMILIES[self.problem.kinematics.name]
         first = 1
         for name, nodes in mesh.elements.items():
-            lines.append(f"*ELEMENT, TYPE={family}{nodes.shape[1]}, ELSET={label(name)}")
+            lines.append(f"*ELEMENT, TYPE={self._type(nodes)}, ELSET={label(name)}")
             numbers = first + np.arange(len(nodes))
-            lines += _rows(np.column_stack([numbers, nodes + 1]))
+            for element in np.column_stack([numbers, nodes + 1]):
+                lines += _continued(element)
             first += len(nodes)
         sets = {name: surface.nodes for name, surface in mesh.surfaces.items()} | mesh.node_sets
         for name, nodes in sets.items():
@@ -249,18 +256,23 @@ class _Writer:
             lines += _rows(np.split(listed, range(10, len(listed), 10)))
         for name, surface in mesh.surfaces.items():
             lines.append(f"*SURFACE, NAME={label(name)}_SURFACE, TYPE=ELEMENT")
-            for element, edge in zip(surface.elements, surface.edges, strict=True):
-                lines.append(f"{element + 1}, S{edge + 1}")
+            for element, side in zip(surface.elements, surface.sides, strict=True):
+                lines.append(f"{element + 1}, S{side + 1}")
         return lines
 
+    def _type(self, nodes: Ints) -> str:
+        """The type of elements with these ``nodes`` ``(m, k)``."""
+        n = nodes.shape[1]
+        kind = f"{_FAMILIES[self.problem.kinematics.name]}{n}"
+        return f"{kind}R" if n == _REDUCED else kind
+
     def _drawn(self) -> Array:
-        """Nodes ``(n, 2)`` that overlap by the interferences."""
+        """Nodes ``(n, d)`` that overlap by the interferences."""
         x = self.mesh.x.copy()
         for i in self.problem.interactions:
             nodes = self.mesh.surfaces[surface_name(i, 0)].nodes
-            along = np.diff(self.mesh.x[nodes[:, :2]], axis=1)
             normal = np.zeros_like(x)
-            np.add.at(normal, nodes, along[..., ::-1] * [1.0, -1.0])
+            np.add.at(normal, nodes, _outward(self.mesh.x[nodes])[:, None])
             at = np.unique(nodes)
             x[at] += i.interference * normal[at] / np.linalg.norm(normal[at], axis=1)[:, None]
         return x
@@ -326,13 +338,13 @@ class _Writer:
         element = 1 + sum(map(len, self.mesh.elements.values()))
         for body in springs.rigid.loose:
             nodes = np.unique(self.mesh.elements[body.name])
-            along = self.mesh.x[nodes].sum(axis=1)
+            ends = nodes[_apart(self.mesh.x[nodes])]
             stiffness = number(_WEAK * body.material.E * self.thick)
-            for axis in (1, 2):
+            for axis in range(1, 1 + self.mesh.x.shape[1]):
                 name = f"{label(body.name)}_SPRINGS_{axis}"
                 lines.append(f"*ELEMENT, TYPE=SPRING1, ELSET={name}")
-                for end in (along.argmin(), along.argmax()):
-                    lines.append(f"{element}, {nodes[end] + 1}")
+                for end in ends:
+                    lines.append(f"{element}, {end + 1}")
                     element += 1
                 lines += [f"*SPRING, ELSET={name}", str(axis), stiffness]
         return lines
@@ -363,7 +375,8 @@ class _Writer:
         if self.own:
             lines += ["*NODE PRINT, NSET=DRIVES", "U"]
         if last:
-            lines += _RESULTS
+            as_drawn = "" if self.mesh.x.shape[1] == 3 else _AS_DRAWN
+            lines += [line.format(as_drawn) for line in _RESULTS]
             if any(body.material.yields for body in problem.bodies):
                 for body in problem.bodies:
                     lines += [f"*EL PRINT, ELSET={label(body.name)}", "PEEQ"]
@@ -377,6 +390,37 @@ class _Writer:
             total += values[drive] * forces
             ever += np.abs(forces)
         return [f"{n + 1}, {axis + 1}, {number(total[n, axis])}" for n, axis in np.argwhere(ever)]
+
+
+def _continued(entries: Iterable[Any]) -> list[str]:
+    """The ``entries`` as one row, which goes on in the next line where it is too long."""
+    words = list(map(str, entries))
+    parts = [words[k : k + _LONGEST] for k in range(0, len(words), _LONGEST)]
+    lines = [", ".join(part) for part in parts]
+    return [f"{line}," for line in lines[:-1]] + lines[-1:]
+
+
+def _outward(x: Array) -> Array:
+    """Normals ``(n, d)`` of sides by their nodes ``x`` ``(n, k, d)``, as long as the sides are
+    large."""
+    start = x[:, 0]
+    if x.shape[2] == 2:
+        along = x[:, 1] - start
+        return along[:, ::-1] * [1.0, -1.0]
+    last = x.shape[1] // 2 - 1
+    return np.cross(x[:, last] - start, x[:, 1] - start)
+
+
+def _apart(x: Array) -> list[int]:
+    """Nodes of a body, by their places ``x`` ``(n, d)``, whose springs hold all its rigid motions:
+    two in a plane, and in space another one aside of their line."""
+    along = x.sum(axis=1)
+    ends = [int(along.argmin()), int(along.argmax())]
+    if x.shape[1] == 2:
+        return ends
+    first, last = x[ends]
+    aside = np.linalg.norm(np.cross(x - first, last - first), axis=1)
+    return [*ends, int(aside.argmax())]
 
 
 def _rows(table: Iterable[Iterable[Any]]) -> list[str]:

@@ -5,43 +5,33 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-import basix
 import numpy as np
-import numpy.typing as npt
 
-from archord.geometry.basis import Array
+from archord.geometry.basis import Array, dimension_of
 from archord.geometry.curve import RigidCircle
+from archord.postprocess.decks.numbering import Ints, are_mirrored, numbering
 from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Rigid
 
-Ints = npt.NDArray[np.int64]
-
-# Abaqus counts corners counterclockwise, then the midpoint behind each, then the centre; its edges
-# begin at a corner. These are basix' nodes of degree 2 in that order, and its facets as edges.
-_NODES = {
-    basix.CellType.triangle: [0, 1, 2, 5, 3, 4],
-    basix.CellType.quadrilateral: [0, 1, 3, 2, 4, 6, 7, 5, 8],
-}
-_EDGES = {basix.CellType.triangle: [1, 2, 0], basix.CellType.quadrilateral: [0, 3, 1, 2]}
 _OF_MIDDLE = np.array([-0.25] * 4 + [0.5] * 4)  # the middle of a quadrilateral of 8 nodes by these
 _RIM = 0.8  # inner over outer radius of the ring that stands for a rigid disc
 
 
 @dataclass(frozen=True)
 class DeckSurface:
-    """The ``elements`` ``(n,)`` behind a surface, their ``edges`` ``(n,)``, edge i going from
-    corner i to the next, and those edges' nodes ``(n, 3)``: start, end, midpoint."""
+    """The ``elements`` ``(n,)`` behind a surface, their ``sides`` ``(n,)``, and the nodes ``(n, 3,
+    6 or 8)`` of these sides, corners before midpoints: in a plane start, end, midpoint."""
 
     elements: Ints
-    edges: Ints
+    sides: Ints
     nodes: Ints
 
 
 @dataclass(frozen=True)
 class DeckMesh:
-    """Nodes ``x`` ``(n, 2)`` and per body the nodes ``(m, 6 or 8)`` of its ``elements``,
-    counterclockwise, corners before midpoints; both are numbered from 0, elements through all
-    bodies.
+    """Nodes ``x`` ``(n, d)`` and per body the nodes ``(m, k)`` of its ``elements``, which turn
+    counterclockwise in a plane, corners before midpoints; both are numbered from 0, elements
+    through all bodies.
 
     ``node_sets`` ``(k,)`` and ``surfaces`` have the names of the problem's sets; the ring of
     elements that stands for a rigid disc is a body and a surface with the `surface_name`. ``dofs``
@@ -57,8 +47,8 @@ class DeckMesh:
     surfaces: dict[str, DeckSurface]
 
     def forces(self, of_dofs: Array) -> Array:
-        """Nodal forces ``(n, 2)`` that do the work of the forces on the dofs."""
-        out = np.zeros((max(len(of_dofs), self.dofs.max() + 1), 2))
+        """Nodal forces ``(n, d)`` that do the work of the forces on the dofs."""
+        out = np.zeros((max(len(of_dofs), self.dofs.max() + 1), self.x.shape[1]))
         out[: len(of_dofs)] = of_dofs
         np.add.at(out, self.middles[:, :8], _OF_MIDDLE[:, None] * out[self.middles[:, 8:]])
         return out[self.dofs]
@@ -103,8 +93,8 @@ def deck_mesh(system: System) -> DeckMesh:
             name = surface_name(interaction, 0)
             elements[name] = ring
             node_sets[name] = np.unique(ring)
-            edges = np.ones(n, dtype=np.int64)
-            surfaces[name] = DeckSurface(first + np.arange(n), edges, ring[:, [1, 2, 5]])
+            sides = np.ones(n, dtype=np.int64)
+            surfaces[name] = DeckSurface(first + np.arange(n), sides, ring[:, [1, 2, 5]])
     used = np.unique(np.concatenate([own.ravel() for own in elements.values()]))
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))
@@ -119,43 +109,51 @@ class _Cells:
 
     Attributes
     ----------
-    x : array (n, 2)
+    x : array (n, d)
         The nodes, in the order of the system's block dofs.
-    elements : dict of arrays (m, 6 or 8)
-        Nodes of the elements, counterclockwise, by the names of bodies.
+    elements : dict of arrays (m, k)
+        Nodes of the elements by the names of bodies.
     middles : array (m, 9)
-        The nodes of quadrilaterals, with the one in the middle; none of triangles.
+        The nodes of quadrilaterals, with the one in the middle; none of others.
     """
 
     def __init__(self, system: System, bodies: dict[str, Ints]) -> None:
         V = system.V
         mesh = V.mesh
-        kind = mesh.basix_cell()
-        self.x = V.tabulate_dof_coordinates()[:, :2]
-        self._edges = np.array(_EDGES[kind])
-        self._corners = corners = len(self._edges)
-        self._nodes = nodes = V.dofmap.list[:, _NODES[kind]].astype(np.int64)
-        one, two, last = np.moveaxis(self.x[nodes[:, [0, 1, corners - 1]]], 1, 0)
-        self._clockwise = np.linalg.det(np.stack([two - one, last - one], axis=1)) < 0
-        turned = [0, *range(corners - 1, 0, -1), *range(2 * corners - 1, corners - 1, -1), 8]
-        nodes[self._clockwise] = nodes[self._clockwise][:, turned[: nodes.shape[1]]]
+        self._kind = mesh.basix_cell()
+        d = dimension_of(self._kind)
+        self.x = V.tabulate_dof_coordinates()[:, :d]
+        self._cells = V.dofmap.list.astype(np.int64)
+        self._mirrored = are_mirrored(self._kind, self.x[self._cells])
+        nodes = self._numbered("nodes", np.arange(len(self._cells)))
         numbered = np.concatenate(list(bodies.values()))
         self._number = np.full(len(nodes), -1)  # of every cell's element
         self._number[numbered] = np.arange(len(numbered))
-        self.elements = {name: nodes[own, : 2 * corners] for name, own in bodies.items()}
-        is_quadrilateral = kind == basix.CellType.quadrilateral
-        self.middles = nodes[numbered] if is_quadrilateral else np.zeros((0, 9), dtype=np.int64)
-        mesh.topology.create_connectivity(2, 1)
-        self._facets = mesh.topology.connectivity(2, 1).array.reshape(-1, corners)
+        self.elements = {name: nodes[own] for name, own in bodies.items()}
+        self.middles = np.zeros((0, 9), dtype=np.int64)
+        if self._cells.shape[1] == 9:
+            middle = self._cells[numbered, -1:]
+            self.middles = np.hstack([nodes[numbered], middle])
+        mesh.topology.create_connectivity(d, d - 1)
+        facets = mesh.topology.connectivity(d, d - 1).array
+        self._facets = facets.reshape(len(self._cells), -1)
+
+    def _numbered(self, part: str, cells: Ints, sides: Ints | None = None) -> Ints:
+        """The nodes of ``cells`` ``(n,)`` that a ``part`` of their `Numbering` says, of these
+        ``sides`` of them."""
+        of_kind = [getattr(numbering(self._kind, mirrored=m), part) for m in (False, True)]
+        tables = np.stack(of_kind)[self._mirrored[cells].astype(int)]
+        if sides is not None:
+            tables = tables[np.arange(len(cells)), sides]
+        return np.take_along_axis(self._cells[cells], tables, axis=1)
 
     def surface(self, facets: Ints) -> DeckSurface:
-        """The edges of elements that are these ``facets``."""
+        """The sides of elements that are these ``facets``."""
         on_surface = np.isin(self._facets, facets) & (self._number >= 0)[:, None]
         cell, facet = np.nonzero(on_surface)
-        edge = self._edges[facet]
-        edge = np.where(self._clockwise[cell], self._corners - 1 - edge, edge)
-        along = np.stack([edge, (edge + 1) % self._corners, edge + self._corners], axis=1)
-        return DeckSurface(self._number[cell], edge, self._nodes[cell[:, None], along])
+        straight, mirrored = (numbering(self._kind, mirrored=m).side_of for m in (False, True))
+        sides = np.where(self._mirrored[cell], mirrored[facet], straight[facet])
+        return DeckSurface(self._number[cell], sides, self._numbered("on_sides", cell, sides))
 
 
 def _ring(circle: RigidCircle, n: int) -> tuple[Array, Ints]:
