@@ -2,6 +2,10 @@
 
 Names of cases choose among them, numbers are sizes of elements at the contact: ``python3 -m
 archord.benchmarks.space elastic A 1.5 0.9``. Seconds are of the mesh and the solve.
+
+With ``--calculix`` CalculiX solves them on the same meshes, where the image target peers is there:
+``ARCHORD_TARGET=peers docker/run python3 -m archord.benchmarks.space --calculix elastic 3``. Its
+seconds are of its process alone, and what only archord's results tell is missing.
 """
 
 from __future__ import annotations
@@ -11,12 +15,14 @@ from collections.abc import Iterator, Sequence
 
 from mpi4py import MPI
 
+from archord.benchmarks.space.calculix import solved_by_calculix
 from archord.benchmarks.space.case import Solved, solved
 from archord.benchmarks.space.joints import CASES
 from archord.report.table import Table
 
-_HEADINGS = ("case", "quantity", "at", "reference", "+-", "archord", "error [%]")
-_COST = ("dofs", "Newton", "GMRES", "s")
+_HEADINGS = ("case", "quantity", "at", "reference", "+-")
+_OTHER = "--calculix"
+_COST = ("error [%]", "dofs", "Newton", "GMRES", "s")
 
 
 def rows(result: Solved) -> Iterator[tuple[str, ...]]:
@@ -41,11 +47,12 @@ def main(arguments: Sequence[str]) -> None:
     """Print the table of the cases and sizes that the ``arguments`` name, of all cases on their own
     sizes without."""
     chosen = [CASES[name] for name in arguments if name in CASES] or list(CASES.values())
-    sizes = [float(size) for size in arguments if size not in CASES] or [0.0]
-    table = Table(*_HEADINGS, *_COST, left=2)
+    sizes = [float(size) for size in arguments if size not in (*CASES, _OTHER)] or [0.0]
+    solve = solved_by_calculix if _OTHER in arguments else solved
+    table = Table(*_HEADINGS, "CalculiX" if _OTHER in arguments else "archord", *_COST, left=2)
     for case in chosen:
         for size in sizes:
-            for row in rows(solved(case, size)):
+            for row in rows(solve(case, size)):
                 table.add(*row)
     if MPI.COMM_WORLD.rank == 0:
         print(table)

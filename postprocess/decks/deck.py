@@ -237,8 +237,8 @@ class _Writer:
         model = _MODELS.get(self.problem.kinematics.name, f"thickness {number(self.thick)}, forces")
         lines = ["*HEADING", f"archord: {heading}; {model} times {whole} are of the whole"]
         lines.append("*NODE, NSET=ALL_NODES")
-        for node, place in enumerate(self._drawn(), 1):
-            lines.append(", ".join([str(node), *(number(value) for value in place)]))
+        for node, place in enumerate(self._drawn().tolist(), 1):
+            lines.append(", ".join([str(node), *map(number, place)]))
         if self.own:
             lines.append("*NODE, NSET=DRIVES")
             lines += [f"{node}, 0., 0." for node in self.own.values()]
