@@ -237,8 +237,10 @@ class _Writer:
         model = _MODELS.get(self.problem.kinematics.name, f"thickness {number(self.thick)}, forces")
         lines = ["*HEADING", f"archord: {heading}; {model} times {whole} are of the whole"]
         lines.append("*NODE, NSET=ALL_NODES")
-        for node, place in enumerate(self._drawn().tolist(), 1):
-            lines.append(", ".join([str(node), *map(number, place)]))
+        x = self._drawn()
+        for i in range(len(x)):
+            place = [number(x[i, axis]) for axis in range(x.shape[1])]
+            lines.append(", ".join([str(i + 1), *place]))
         if self.own:
             lines.append("*NODE, NSET=DRIVES")
             lines += [f"{node}, 0., 0." for node in self.own.values()]
