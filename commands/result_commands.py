@@ -111,20 +111,25 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
     metavar="NAME",
     help="draw the field along this edge [hoop stress]",
 )
+@click.option(
+    "--cut", default="", metavar="PLANE", help='in space: no cells beyond this plane, as "z=5"'
+)
 @output("file to draw [RUN/picture.png]")
 def picture(
-    folder: Path, steps: tuple[int, ...], field: str, edges: tuple[str, ...], output: Path | None
+    folder: Path,
+    steps: tuple[int, ...],
+    field: str,
+    edges: tuple[str, ...],
+    cut: str,
+    output: Path | None,
 ) -> int:
     """Draw a run: a field on the bodies, contact pressure or a field along edges, and the force of
     the loads."""
     from archord.postprocess.pictures.pictures import draw_run
     from archord.postprocess.run import Run
 
-    print(
-        draw_run(
-            Run(folder), output or folder / "picture.png", steps=steps, field=field, edges=edges
-        )
-    )
+    target = output or folder / "picture.png"
+    print(draw_run(Run(folder), target, steps=steps, field=field, edges=edges, cut=cut))
     return 0
 
 

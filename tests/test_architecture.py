@@ -211,8 +211,9 @@ def test_the_requirements_name_all_that_is_imported():
     """petsc4py comes with dolfinx, which PyPI, conda and Debian call differently."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
-    named = {re.split(r"[^\w-]", word)[0].removeprefix("fenics-").replace("-", "_")
-             for word in [*project["dependencies"], *extras["solve"]]}  # fmt: skip
+    required = [*project["dependencies"], *extras["solve"], *extras["plots"]]
+    names = (re.split(r"[^\w-]", word)[0] for word in required)
+    named = {name.removeprefix("fenics-").replace("-", "_") for name in names}
     rooms = [
         room for room in ROOMS if not room.startswith("benchmarks")
     ]  # peers have environments of their own

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from archord.materials.material import Array
 from archord.output.user_file import writing
 from archord.postprocess.comparison import curves_of
 from archord.postprocess.curve import first_loading
-from archord.postprocess.pictures import joint, problems
+from archord.postprocess.pictures import joint, problems, solids
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.presets.views import JointView, ProblemView
@@ -47,13 +48,14 @@ def draw_run(
     steps: Sequence[int] = (),
     field: str = "",
     edges: Sequence[str] = (),
+    cut: str = "",
 ) -> Path:
     """Draw the field, the contact pressure and the forces of a run.
 
     Parameters
     ----------
     run : Run
-        The run. Its field is drawn if the run wrote fields; in space the forces are drawn alone.
+        The run. Its field is drawn if the run wrote fields.
     target : str or Path
         The picture, .png, .svg or .pdf.
     steps : sequence of int
@@ -63,7 +65,9 @@ def draw_run(
         The field, by default PEEQ or von Mises stress.
     edges : sequence of str
         Edges of the mesh that take the place of the contact pressure: along them the ``field``, or
-        the hoop stress, is drawn at all ``steps``.
+        the hoop stress, is drawn at all ``steps``. Not in space.
+    cut : str
+        Of bodies in space: a plane as "z=5", beyond which no cells are drawn.
 
     Returns
     -------
@@ -88,7 +92,7 @@ def draw_run(
     >>> archord.draw_run(run, "joint.svg").name
     'joint.svg'
     """
-    draws = panels_of(run, steps=steps, field=field, edges=edges)
+    draws = panels_of(run, steps=steps, field=field, edges=edges, cut=cut)
     figure = new_figure(5.0 * len(draws), 4.4)
     panels = np.atleast_1d(figure.subplots(1, len(draws)))
     for axes, draw in zip(panels, draws, strict=True):
@@ -97,22 +101,28 @@ def draw_run(
 
 
 def panels_of(
-    run: Run, *, steps: Sequence[int] = (), field: str = "", edges: Sequence[str] = ()
+    run: Run,
+    *,
+    steps: Sequence[int] = (),
+    field: str = "",
+    edges: Sequence[str] = (),
+    cut: str = "",
 ) -> list[Callable[[Any], None]]:
     """What `draw_run` draws, a function of the axes each. Raises `InputError` for a step that the
     run does not have."""
     run.number(None)
     numbers = [run.number(step) for step in steps]
     draw_fields, draw_contact, draw_forces = _PANELS[type(run.view)]
+    if run.kinematics.dimension == 3:
+        if edges:
+            said = "has no edges to draw a field along; archord probe --line draws it along a line"
+            raise InputError(f"{run.folder}: is in space, and {said}.")
+        draw_fields = partial(solids.field_panel, cut=cut)
+        draw_contact = solids.contact_panel
+    elif cut:
+        raise InputError(f"{run.folder}: is in a plane, where there is nothing to cut.")
     draws: list[Callable[[Any], None]] = []
     of_body = "" if edges and field in problems.OF_EDGES else field
-    if run.kinematics.dimension == 3:
-        if steps or field or edges:
-            raise InputError(
-                f"{run.folder}: bodies in space are not drawn; archord export --vtk writes them "
-                "for ParaView and pyvista."
-            )
-        return [lambda axes: draw_forces(axes, run)]
     if run.scene.output.fields or of_body:
         first = numbers[0] if numbers else None
         draws.append(lambda axes: draw_fields(axes, run, first, of_body))

@@ -21,6 +21,7 @@ _MAGNIFIED = 0.05
 _STYLES = ("-", "--", ":", "-.")  # of surfaces
 _ELASTIC = "0.93"  # grey of what has no plastic strain
 _UNLOADED = 1e-3  # of the largest force of a run: what is left after unloading
+OF_PEEQ = "inferno_r"  # its map of colours
 _CONSTANT = 1e-9  # relative range of a field without a scale of colours
 # fields of edges alone
 OF_EDGES = ("hoop", "normal", "shear", "facet_pressure", "gap", "contact_shear")
@@ -34,6 +35,7 @@ _NAMED = {  # what fields are called that are no rows of `CELL_FIELDS`, and thei
     "displacement": ("displacement", "{length}"),
     "ux": ("displacement in {0}", "{length}"),
     "uy": ("displacement in {1}", "{length}"),
+    "uz": ("displacement in {2}", "{length}"),
     "principal_angle": ("angle of the first principal stress", "rad"),
     "p1": ("p1", "{stress}"),
     "p2": ("p2", "{stress}"),
@@ -118,10 +120,7 @@ def draw_field(
     there is no scale of colours, but a sentence. Raises `InputError` for a field that the run does
     not have.
     """
-    yielded = fields.peeq is not None and fields.peeq.any()
-    name = _FIELDS.get(field, field) or ("peeq" if yielded else "von_mises")
-    label, scale = field_words(run, name)
-    values = scale * _values(run, fields, name)
+    values, label, usual = field_values(run, fields, field)
     of_cells = len(values) == len(fields.cells)
     in_cells = values if of_cells else values[fields.cells].mean(axis=1)
     triangles = fields.triangles[shown]
@@ -133,7 +132,7 @@ def draw_field(
         place = {"transform": axes.transAxes, "ha": "center", "fontsize": "small"}
         axes.text(0.5, 0.02, f"{label}: {said}", **place)
         return
-    colours = _colours_for(known, "inferno_r" if name == "peeq" else "viridis")
+    colours = colours_for(known, usual)
     style = {"cmap": colours.map, "vmin": colours.low, "vmax": colours.high}
     if of_cells:
         grey = np.isnan(in_cells) | (in_cells == 0)
@@ -145,6 +144,16 @@ def draw_field(
     axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=extend)
 
 
+def field_values(run: Run, fields: Fields, field: str) -> tuple[Array, str, str]:
+    """A ``field`` of the cells ``(m,)`` or of the nodes ``(n,)`` in the unit of its label, the
+    label, and the usual map of its colours: by default PEEQ, or von Mises stress where nothing has
+    yielded. Raises `InputError` for a field that the run does not have."""
+    yielded = fields.peeq is not None and fields.peeq.any()
+    name = _FIELDS.get(field, field) or ("peeq" if yielded else "von_mises")
+    label, scale = field_words(run, name)
+    return scale * _values(run, fields, name), label, OF_PEEQ if name == "peeq" else "viridis"
+
+
 def _without_colours(known: Array) -> str:
     """What is said in place of a scale of colours; nothing where the ``known`` values differ."""
     if not len(known):
@@ -154,7 +163,7 @@ def _without_colours(known: Array) -> str:
     return ""
 
 
-class _Colours(NamedTuple):
+class Colours(NamedTuple):
     """A scale of colours ``map`` from ``low`` to ``high``."""
 
     map: Any
@@ -172,15 +181,15 @@ class _Colours(NamedTuple):
         return "min" if below else "neither"
 
 
-def _colours_for(known: Array, usual: str) -> _Colours:
+def colours_for(known: Array, usual: str) -> Colours:
     """The colours of the ``known`` values: the ``usual`` map, or one with 0 in its middle where
     values have both signs."""
     low = float(known.min(initial=0.0))
     high = float(known.max(initial=0.0))
     if high > 0 and low < -_CONSTANT * high:
         largest = max(-low, high)
-        return _Colours(_with_grey("RdBu_r"), -largest, largest)
-    return _Colours(_with_grey(usual), low, high)
+        return Colours(_with_grey("RdBu_r"), -largest, largest)
+    return Colours(_with_grey(usual), low, high)
 
 
 def _with_grey(name: str) -> Any:
@@ -197,8 +206,9 @@ def _plain() -> Any:
 
 def _values(run: Run, fields: Fields, name: str) -> Array:
     """A field of the cells ``(m,)`` or else of the nodes ``(n,)``. Raises `InputError`."""
-    ux, uy = fields.displacement.T
-    moved = {"displacement": np.hypot(ux, uy), "ux": ux, "uy": uy}
+    moved = {"displacement": np.linalg.norm(fields.displacement, axis=1)}
+    for axis, along in zip("xyz", fields.displacement.T, strict=False):
+        moved[f"u{axis}"] = along
     means = {name: values for name, values in fields.cell.items() if values.ndim == 1}
     known = fields.nodal_fields() | moved | means
     if name not in known:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -18,7 +19,9 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.output.files.step_file import all_arrays
 from archord.postprocess.export import export_vtk
+from archord.postprocess.pictures.pictures import panels_of
 from archord.postprocess.pictures.report import write_report
+from archord.postprocess.pictures.solids import skin_of
 from tests import forked
 from tests.output.run_files import accepted_steps
 from tests.postprocess.vtk_reader import VtkFile
@@ -235,13 +238,39 @@ def test_a_run_is_solved_again_and_extended_by_its_own_scene(folders, tmp_path):
     same(whole, tmp_path / "killed", 0.0, 1e-14)
 
 
-def test_pictures_of_bodies_are_left_out_or_refused(folders, tmp_path):
-    """A report and a picture have the forces."""
-    run = archord.load(folders[CellType.tetrahedron])
-    assert archord.draw_run(run, tmp_path / "forces.png").stat().st_size > 1000
+def test_pictures_show_bodies_pressures_and_forces(folders, tmp_path):
+    """Bodies may be cut open by a plane that meets them; a report has a picture, too."""
+    for folder in folders.values():
+        run = archord.load(folder)
+        assert len(panels_of(run)) == 3
+        assert archord.draw_run(run, tmp_path / "all.png").stat().st_size > 1000
+        options = {"field": "uz", "steps": [1], "cut": "x=0.4"}
+        assert archord.draw_run(run, tmp_path / "cut.png", **options).stat().st_size > 1000
     assert write_report(run, tmp_path / "run.pdf").stat().st_size > 1000
-    with pytest.raises(archord.InputError, match=r"bodies in space are not drawn; .* --vtk"):
-        archord.draw_run(run, tmp_path / "field.png", field="peeq")
+    for wrong, said in (
+        ({"cut": "q=1"}, r'cut = "q=1" must name a plane, as "z=0"'),
+        ({"cut": "z=99"}, r"must lie within the bodies: .* < z < "),
+        ({"edges": ["lid"]}, "is in space, and has no edges to draw a field along"),
+        ({"field": "strain"}, "has no field 'strain'"),
+    ):
+        with pytest.raises(archord.InputError, match=said):
+            archord.draw_run(run, tmp_path / "no.png", **wrong)
+    assert not (tmp_path / "no.png").exists()
+
+
+def test_the_skin_of_bodies_encloses_their_volume(folders):
+    """Triangles are seen from outside; a cut ends at its plane, where it has a face."""
+    run = archord.load(folders[CellType.tetrahedron])
+    fields = run.fields()
+    still = replace(fields, displacement=0 * fields.displacement)
+    skin = skin_of(run, still, fields.von_mises)
+    corners = fields.coordinates[fields.cells[:, :4]]
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
+    assert np.linalg.det(skin.corners).sum() / 6 == pytest.approx(volume, rel=1e-5)
+    assert np.isin(skin.values, fields.von_mises).all()
+    x = skin_of(run, still, fields.von_mises, "x=0.4").corners[..., 0]
+    assert x.max() == pytest.approx(0.4)
+    assert np.isclose(x, 0.4).all(axis=1).any()
 
 
 @pytest.mark.mpi

@@ -1,0 +1,246 @@
+"""What a run in space looks like: a field on the deformed bodies, cut open, and the contact
+pressure unrolled.
+
+pyvista finds the faces, and matplotlib paints them from the farthest to the nearest: no display is
+needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from archord.geometry.curve import circle_through
+from archord.materials.material import Array
+from archord.output.files.vtkhdf import SECOND_ORDER
+from archord.postprocess.fields import Fields
+from archord.postprocess.pictures.problems import (
+    OF_PEEQ,
+    Colours,
+    colours_for,
+    field_values,
+    shown_step,
+    step_words,
+)
+from archord.postprocess.run import Run
+from archord.report.errors import InputError
+
+AXES = "xyz"
+_STEEP = 0.45  # height of the view over the plane of the other two axes
+_DARKEST = 0.6  # brightness of a face that is seen from the side
+_ELASTIC = 0.93  # grey of what has not yielded
+_PRESSED = 1e-6  # of the largest pressure: a facet that is pressed
+
+
+class Skin(NamedTuple):
+    """The boundary of deformed bodies as ``k`` triangles.
+
+    - ``corners`` ``(k, 3, 3)``: seen from outside against the clock
+    - ``values`` ``(k,)``: of the field
+    """
+
+    corners: Array
+    values: Array
+
+
+class View(NamedTuple):
+    """How bodies are seen: the unit vectors ``(3,)`` to the ``right``, ``up`` and ``towards`` the
+    eye."""
+
+    right: Array
+    up: Array
+    towards: Array
+
+    @classmethod
+    def from_octant(cls, signs: Sequence[int]) -> View:
+        """Seen from the octant with these ``signs`` of x, y and z; y points up."""
+        x, y, z = signs
+        towards = np.array([x, _STEEP * y, 1.3 * z])
+        towards = towards / np.linalg.norm(towards)
+        right = np.cross([0.0, 1.0, 0.0], towards)
+        right = right / np.linalg.norm(right)
+        return cls(right, np.cross(towards, right), towards)
+
+    def flat(self, x: Array) -> Array:
+        """Points ``(..., 3)`` as they are drawn ``(..., 2)``."""
+        return np.stack([x @ self.right, x @ self.up], axis=-1)
+
+
+def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
+    """The boundary of the bodies with the ``values`` of the cells ``(m,)`` or the nodes ``(n,)``;
+    nothing beyond the plane of a ``cut`` as "z=5". Raises `InputError`."""
+    import pyvista
+
+    kind = SECOND_ORDER[fields.cells.shape[1]]
+    grid = pyvista.UnstructuredGrid({kind: fields.cells}, fields.coordinates)
+    grid.point_data["displacement"] = fields.displacement
+    of_cells = len(values) == len(fields.cells)
+    of_what = "cell_data" if of_cells else "point_data"
+    getattr(grid, of_what)["value"] = values
+    if cut:
+        axis, place = _plane_of(run, fields, cut)
+        grid = grid.clip(normal=np.eye(3)[axis], origin=place * np.eye(3)[axis])
+    grid.cell_data["middle"] = grid.cell_centers().points
+    surface = grid.extract_surface(nonlinear_subdivision=1).triangulate()
+    triangles = surface.faces.reshape(-1, 4)[:, 1:].copy()
+    outward = surface.points[triangles].mean(axis=1) - surface.cell_data["middle"]
+    inside_out = (_normals(surface.points[triangles]) * outward).sum(axis=1) < 0
+    triangles[inside_out] = triangles[inside_out, ::-1]
+    x = surface.points + surface.point_data["displacement"]
+    found = getattr(surface, of_what)["value"]
+    return Skin(x[triangles], found if of_cells else found[triangles].mean(axis=1))
+
+
+def field_panel(
+    axes: Any, run: Run, step: int | None = None, field: str = "", cut: str = ""
+) -> None:
+    """A ``field`` at ``step`` (see `shown_step`) on the deformed bodies, seen from the octant that
+    shows most of it. Raises `InputError` for a field that the run does not have, and for a ``cut``
+    that leaves nothing."""
+    from matplotlib.collections import PolyCollection
+
+    fields = run.fields(step or shown_step(run))
+    values, label, map_name = field_values(run, fields, field)
+    skin = skin_of(run, fields, values, cut)
+    shown = np.where(skin.values == 0, np.nan, skin.values) if map_name == OF_PEEQ else skin.values
+    normal = _normals(skin.corners)
+    view = _best_view(normal, np.abs(np.nan_to_num(shown)), cut)
+    order = np.argsort(skin.corners.mean(axis=1) @ view.towards)
+    known = shown[np.isfinite(shown)]
+    colours = colours_for(known, map_name)
+    painted = _painted(colours, shown[order], normal[order], view)
+    polygons = view.flat(skin.corners[order])
+    axes.add_collection(
+        PolyCollection(polygons, facecolors=painted, edgecolors=painted, linewidths=0.2)
+    )
+    axes.autoscale_view()
+    axes.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
+    _draw_axes(axes, view)
+    axes.figure.colorbar(_scale(colours), ax=axes, label=label, shrink=0.85)
+    axes.set_title(step_words(run, fields.step), fontsize="medium")
+
+
+def _plane_of(run: Run, fields: Fields, cut: str) -> tuple[int, float]:
+    """The axis that is normal to the plane of a ``cut`` as "z=5", and where it stands. Raises
+    `InputError` for what is no plane through the bodies."""
+    name, _, place = cut.partition("=")
+    try:
+        axis = AXES.index(name.strip() or "?")
+        at = float(place)
+    except ValueError:
+        said = f'cut = "{cut}" must name a plane, as "z=0" or "x=12.5"'
+        raise InputError(f"{run.folder}: {said}.") from None
+    along = fields.coordinates[:, axis]
+    low = along.min()
+    high = along.max()
+    if not low < at < high:
+        said = f'cut = "{cut}" must lie within the bodies: {low:.4g} < {AXES[axis]} < {high:.4g}'
+        raise InputError(f"{run.folder}: {said}.")
+    return axis, at
+
+
+def _normals(triangles: Array) -> Array:
+    """Unit normals ``(k, 3)`` of ``triangles`` ``(k, 3, 3)``."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return normal / np.maximum(length, np.finfo(float).tiny)
+
+
+def _best_view(normal: Array, size: Array, cut: str) -> View:
+    """The view that shows most of a field of this ``size`` ``(k,)`` on faces with these ``normal``
+    vectors ``(k, 3)``; of a cut, one of those that look into it."""
+    views = []
+    for signs in product((1, -1), (1, -1), (1, -1)):
+        if cut and signs[AXES.index(cut.strip()[0])] < 0:
+            continue
+        views.append(View.from_octant(signs))
+    return max(views, key=lambda view: float(np.maximum(normal @ view.towards, 0) @ size))
+
+
+def _painted(colours: Colours, values: Array, normal: Array, view: View) -> Array:
+    """Colours ``(k, 4)`` of faces, darker where they are seen from the side."""
+    scaled = (values - colours.low) / max(colours.high - colours.low, np.finfo(float).tiny)
+    painted = colours.map(np.clip(np.nan_to_num(scaled), 0, 1))
+    painted[~np.isfinite(values), :3] = _ELASTIC
+    light = _DARKEST + (1 - _DARKEST) * np.abs(normal @ view.towards)
+    painted[:, :3] *= light[:, None]
+    return painted
+
+
+def _scale(colours: Colours) -> Any:
+    """What a scale of colours is drawn from."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(colours.low, colours.high), colours.map)
+
+
+def _draw_axes(axes: Any, view: View) -> None:
+    """Three arrows in a corner that show where x, y and z point."""
+    inset = axes.inset_axes([-0.08, -0.08, 0.26, 0.26])
+    inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
+    inset.axis("off")
+    for name, end in zip(AXES, view.flat(np.eye(3)), strict=True):
+        inset.annotate("", end, (0, 0), arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0})
+        inset.text(*(1.4 * end), name, ha="center", va="center", fontsize="small")
+
+
+def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
+    """Mean contact pressure of the facets of the last surface that is a cylinder, over the angle
+    and the place along its axis, at the first of ``steps`` (see `shown_step`); of other surfaces
+    the facets as they lie in the plane that shows most of them."""
+    from matplotlib.collections import PolyCollection
+
+    step = steps[0] if steps else shown_step(run)
+    surfaces = run.contact(step)
+    name, places, words = _unrolled(surfaces)
+    profile = surfaces[name]
+    pressure = profile.facet_pressure
+    pressed = pressure > _PRESSED * pressure.max(initial=0.0)
+    colours = colours_for(pressure, "viridis")
+    drawn = PolyCollection(places, array=np.where(pressed, pressure, np.nan), cmap=colours.map)
+    drawn.set(clim=(0.0, colours.high), edgecolor="face", linewidth=0.2)
+    axes.add_collection(drawn)
+    axes.autoscale_view()
+    length = run.scene.units.length
+    across, along = (word.format(length=length) for word in words)
+    axes.set(xlabel=across, ylabel=along)
+    axes.set_title(f"contact pressure on {name}, step {step}", fontsize="medium")
+    unit = run.scene.units.stress
+    axes.figure.colorbar(drawn, ax=axes, label=f"pressure [{unit}]", shrink=0.85)
+
+
+def _unrolled(surfaces: dict[str, Any]) -> tuple[str, Array, tuple[str, str]]:
+    """The surface that is drawn, its facets' corners ``(n, c, 2)`` in the picture, and the words on
+    its axes."""
+    for name in reversed(surfaces):
+        corners = surfaces[name].corners
+        flat = corners.reshape(-1, 3)
+        for axis in (2, 0, 1):
+            a, b = (k for k in range(3) if k != axis)
+            circle = circle_through(flat[:, [a, b]])
+            if circle is not None:
+                places = _angle_and_length(corners, circle[0], (a, b), axis)
+                return name, places, ("angle [°]", f"{AXES[axis]} [{{length}}]")
+    name = next(reversed(surfaces))
+    corners = surfaces[name].corners
+    thin = int(np.ptp(corners.reshape(-1, 3), axis=0).argmin())
+    a, b = (k for k in range(3) if k != thin)
+    return name, corners[..., [a, b]], (f"{AXES[a]} [{{length}}]", f"{AXES[b]} [{{length}}]")
+
+
+def _angle_and_length(corners: Array, centre: Array, across: tuple[int, int], axis: int) -> Array:
+    """``corners`` ``(n, c, 3)`` of facets of a cylinder by the angle in degrees about its axis, and
+    the place along it: ``(n, c, 2)``. No facet is torn apart."""
+    arm = corners[..., list(across)] - centre
+    middle = arm.mean(axis=1)
+    direction = middle.mean(axis=0)
+    zero = np.arctan2(direction[1], direction[0])
+    of_facet = np.arctan2(middle[:, 1], middle[:, 0])
+    turned = np.angle(np.exp(1j * (np.arctan2(arm[..., 1], arm[..., 0]) - of_facet[:, None])))
+    of_facet = np.angle(np.exp(1j * (of_facet - zero))) + zero
+    return np.stack([np.degrees(of_facet[:, None] + turned), corners[..., axis]], axis=-1)
