@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,9 @@ def _mesh(mesh: Any, file: str) -> dict[str, Any]:
         for facets, (centre, radius, *axis) in (mesh.circles or {}).items()
     ]
     changes = {name: getattr(mesh, name) for name in CHANGES}
-    return {"file": mesh.file or file, "circle": circles} | changes
+    if mesh.file:
+        file = str(Path(mesh.file).absolute())
+    return {"file": file, "circle": circles} | changes
 
 
 def _body(body: Body) -> dict[str, Any]:

@@ -186,3 +186,28 @@ def test_a_damaged_mesh_is_refused(tmp_path, name):
         np.savez(path, **(arrays | {name: wrong}))
         with pytest.raises(ValueError, match=str(path)):
             read_mesh(path, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("kind", ["rectangles", "boxes"])
+def test_a_run_of_a_file_named_from_the_current_folder_goes_on(tmp_path, monkeypatch, kind):
+    """Its scene names the file wherever the run folder is; in a plane and in space."""
+    monkeypatch.chdir(tmp_path)
+    place = (0.0, 0.0, 2.0, 1.0) if kind == "rectangles" else (0.0, 0.0, 0.0, 2.0, 1.0, 1.0)
+    mesh = getattr(archord, kind)({"bar": place}, 1.0, comm=MPI.COMM_SELF)
+    with open("bar.npz", "wb") as file:
+        store_mesh(gathered(mesh), file)
+
+    def pulled(*displacement):
+        return archord.Problem(
+            "bar.npz",
+            bodies=[archord.Body("bar", archord.Elastic(210e3, 0.3))],
+            supports=[archord.Support("bar left")],
+            loads=[archord.Load("pull", "bar right", "x", displacement=displacement)],
+            steps=2,
+        )
+
+    archord.solve(pulled(0.01), "run")
+    run = archord.solve(pulled(0.01, 0.02), "run", restart=True)
+    assert len(forces("run")) == 2 * 2
+    assert run.status == "done"
+    assert archord.load_scene("run/scene.toml").mesh.file == str(tmp_path / "bar.npz")
