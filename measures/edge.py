@@ -123,9 +123,11 @@ class PatchProfile(_Displaced):
     facet : (n,) the facet of each piece
     corners : (n, c, 3) the undeformed corners of these facets, one after the other around them
     facet_pressure : (n,) mean pressure of these facets
+    traction : (n, q, 3) contact force on the own body per undeformed area
     """
 
     normal: Array
+    traction: Array
     facet: np.ndarray
     corners: Array
     facet_pressure: Array
@@ -165,7 +167,7 @@ def per_step(system: System) -> tuple[str, ...]:
     """Names of the arrays of contact.h5 that change."""
     names = PER_STEP + OF_FRICTION if system.contact.has_friction else PER_STEP
     in_space = system.problem.kinematics.dimension == 3
-    return (*names, "facet_pressure") if in_space else names
+    return (*names, "traction", "facet_pressure") if in_space else names
 
 
 def surface_profiles(system: System) -> dict[str, Any]:
@@ -202,7 +204,8 @@ def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> dict[str, Array]:
         "X": side.point,
     }
     if side.in_space:
-        here |= {"slip": pair.slips, "shear": pair.shears, "normal": side.outward}
+        here |= {"slip": pair.slips, "shear": pair.shears, "traction": pair.tractions}
+        here["normal"] = side.outward
     columns = [np.atleast_3d(values) for values in here.values()]
     together = np.concatenate(columns, axis=-1)
     local = np.zeros((len(side.curve_xi), *together.shape[1:]))

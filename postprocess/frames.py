@@ -15,9 +15,13 @@ from archord.postprocess.arc import undeformed
 from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
-_VECTORS = ("normal", "slip", "shear")  # at points in space
+_VECTORS = ("normal", "slip", "traction", "shear")  # at points in space
 _LENGTHS = ("s", "weight", "gap", "x", "y", "z", "ux", "uy", "uz", "slip_x", "slip_y", "slip_z")
-_STRESSES = ("pressure", "raw_pressure", "shear_x", "shear_y", "shear_z")
+_STRESSES = (
+    "pressure",
+    "raw_pressure",
+    *(f"{name}_{axis}" for name in ("traction", "shear") for axis in "xyz"),
+)
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
 
 

@@ -20,6 +20,15 @@ from archord.output.files.seal import ChangedError, read_report, require_intact
 from archord.output.folder import is_sweep
 from archord.output.history import fault_of_history, read_history
 from archord.postprocess.arc import read_contact
+from archord.postprocess.around_axis import (
+    ALONG_Z,
+    ORIGIN,
+    Axis,
+    LineLoad,
+    Unrolled,
+    line_load,
+    unrolled,
+)
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
 from archord.postprocess.probe import Probe, probe
@@ -168,6 +177,52 @@ class Run:
             sides = ", ".join(arcs)
             raise InputError(f"{self.folder}: has no side {side!r}; its sides are {sides}.")
         return arcs[side or list(arcs)[-1]]
+
+    def unrolled(
+        self,
+        side: str,
+        step: int | None = None,
+        *,
+        point: Sequence[float] = ORIGIN,
+        direction: Sequence[float] = ALONG_Z,
+    ) -> Unrolled:
+        """One ``side`` of `contact` in space at ``step`` (the last), around the axis through a
+        ``point`` along a ``direction``. Raises `InputError`."""
+        self._require_space("unrolled contact")
+        return unrolled(self.arc(step, side), Axis(point, direction))
+
+    def line_load(
+        self,
+        interaction: str,
+        step: int | None = None,
+        *,
+        point: Sequence[float] = ORIGIN,
+        direction: Sequence[float] = ALONG_Z,
+        along: Sequence[float] | None = None,
+    ) -> LineLoad:
+        """The load of an ``interaction`` in space at ``step`` (the last) on its second surface,
+        along the axis through a ``point`` along a ``direction``; of pieces between the places
+        ``along`` the axis, by default 40 equal ones. Raises `InputError`."""
+        self._require_space("line loads")
+        shares = self.summary["model"]["contact_shares"]
+        if interaction not in shares:
+            known = ", ".join(shares) or "none"
+            raise InputError(
+                f"{self.folder}: has no interaction {interaction!r}; its interactions are {known}."
+            )
+        part = next(part for part in self.scene.interaction if part.name == interaction)
+        met = self.contact(step)
+        profiles = [met[side] for side in part.surfaces if side in met]
+        signs = [
+            1.0 if side == part.surfaces[-1] else -1.0 for side in part.surfaces if side in met
+        ]
+        whole = self.scene.analysis.symmetry * np.multiply(signs, shares[interaction])
+        return line_load(profiles, whole, Axis(point, direction), along)
+
+    def _require_space(self, what: str) -> None:
+        """Raise `InputError` for a run that is not in space."""
+        if self.kinematics.dimension != 3:
+            raise InputError(f"{self.folder}: has no {what}, which are for runs in space.")
 
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
         """`contact` as a table with a row for each point; of one ``side`` if given. Raises

@@ -242,6 +242,12 @@ class Pair:
         """The same ``(n, q, d)`` as vectors."""
         return self._on_surface(self.traction)
 
+    @property
+    def tractions(self) -> Array:
+        """Contact force ``(n, q, d)`` on the own body per undeformed area."""
+        vectors = np.einsum("mki,mk->mi", self.frame, self.traction)
+        return vectors.reshape(self.surface.point.shape)
+
     def _on_surface(self, components: Array) -> Array:
         """The part ``(n, q, d)`` along the tangents of vectors with these ``components``
         ``(m, d)``."""

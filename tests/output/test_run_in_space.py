@@ -303,3 +303,20 @@ def test_a_distributing_coupling_tells_how_its_facets_move_on_average(comm, tmp_
     farther = last["end displacement z"] - 2.0 * last["end rotation y"]
     assert last["far displacement z"] == pytest.approx(farther, rel=1e-9)
     assert abs(last["end rotation x"]) + abs(last["end rotation z"]) < 1e-6 * slope
+
+
+@KINDS
+def test_line_loads_add_up_to_the_force_of_the_history(folders, kind):
+    """Along both axes of the surface, of all components; and so do the pressures of the unrolled facets."""
+    run = archord.load(folders[kind])
+    force = [run.columns[f"joint force {axis}"][-1] for axis in "xyz"]
+    for direction in np.eye(3)[:2]:
+        found = run.line_load("joint", direction=direction, point=(0.0, 0.0, -1.0))
+        whole = np.diff(found.along) @ found.load
+        np.testing.assert_allclose(whole, force, rtol=0, atol=1e-9 * np.abs(force).max())
+    flat = run.unrolled("lower", direction=(1.0, 0.0, 0.0), point=(0.0, 0.5, -1.0))
+    carried = run.contact()["lower"].facet_force.sum()
+    assert flat.pressure @ flat.area == pytest.approx(carried, rel=1e-12)
+    assert (flat.angle > 0).all()  # above the axis, counted from y
+    with pytest.raises(archord.InputError, match="has no interaction 'weld'"):
+        run.line_load("weld")
