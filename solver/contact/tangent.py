@@ -6,6 +6,7 @@ contact_tangent.c for curves in a plane, in space_tangent.c for surfaces in spac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,9 @@ class ContactTangent:
         return values
 
 
-def _numbered(places: list[list[np.ndarray]]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+def _numbered(
+    places: Sequence[Sequence[np.ndarray]],
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Rows and columns ``(n,)`` of the different ones of several arrays of ``places``, sorted, and
     for each array the numbers of its places among them."""
     nothing = np.zeros(0, dtype=np.int32)
