@@ -155,6 +155,8 @@ class Run:
             raise InputError(
                 f"{self.folder}: is the run of a general scene; this is for runs of a [joint]."
             )
+        if self.kinematics.dimension == 3:
+            raise InputError(f"{self.folder}: is in space; this is for joints in a plane.")
         self.number(None)
         columns = {name: np.array(self.columns[name]) for name in CURVES}
         columns["P"] /= self.scene.thickness
