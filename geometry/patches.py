@@ -131,6 +131,11 @@ class Patches:
         value, by_s, by_t = self._element.tabulate(1, np.ascontiguousarray(xi))[..., 0]
         return value, np.stack([by_s, by_t], axis=1)
 
+    def corner_shapes(self, xi: Array) -> Array:
+        """Linear, or bilinear, functions ``(m, e)`` of the corners in turn at ``xi`` ``(m, 2)``."""
+        element = element_of(self.cell, len(self.reference_corners()))
+        return element.tabulate(0, np.ascontiguousarray(xi))[0, :, list(_CORNERS[self.cell]), 0].T
+
     def areas(self) -> Array:
         """Area ``(n_facets,)`` of each facet."""
         xi, w = basix.make_quadrature(self.cell, 2 * self.degree)

@@ -15,6 +15,7 @@ import numpy as np
 from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
+    from archord.geometry.patches import Patches
     from archord.solver.contact.pair import Pair
     from archord.solver.contact.surface import Surface
     from archord.solver.path.system import System
@@ -124,6 +125,7 @@ class PatchProfile(_Displaced):
     corners : (n, c, 3) the undeformed corners of these facets, one after the other around them
     facet_pressure : (n,) mean pressure of these facets
     traction : (n, q, 3) contact force on the own body per undeformed area
+    corner_pressure : (n, c) pressure at the corners, recovered: of facets that meet the same
     """
 
     normal: Array
@@ -131,6 +133,7 @@ class PatchProfile(_Displaced):
     facet: np.ndarray
     corners: Array
     facet_pressure: Array
+    corner_pressure: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,7 +170,7 @@ def per_step(system: System) -> tuple[str, ...]:
     """Names of the arrays of contact.h5 that change."""
     names = PER_STEP + OF_FRICTION if system.contact.has_friction else PER_STEP
     in_space = system.problem.kinematics.dimension == 3
-    return (*names, "traction", "facet_pressure") if in_space else names
+    return (*names, "traction", "facet_pressure", "corner_pressure") if in_space else names
 
 
 def surface_profiles(system: System) -> dict[str, Any]:
@@ -236,6 +239,7 @@ def _patch_profile(side: Surface, weight: Array, raw_pressure: Array, **others: 
         facet=facet,
         corners=patches.X[patches.vertices][facet],
         facet_pressure=(force / area)[facet],
+        corner_pressure=recovered(patches, side.curve_xi, weight, facet, raw_pressure)[facet],
         **others,
     )
 
@@ -252,6 +256,30 @@ def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: np.ndar
     np.add.at(moments, facet, weighted.swapaxes(1, 2) @ functions)
     np.add.at(right, facet, weighted.swapaxes(1, 2) @ pressure[..., None])
     return (functions @ np.linalg.solve(moments, right)[facet])[..., 0]
+
+
+def recovered(
+    patches: Patches, xi: Array, weight: Array, facet: np.ndarray, pressure: Array
+) -> Array:
+    """Pressure ``(facets, c)`` at the corners of the ``patches``: L2 projection of ``pressure``
+    ``(n, q)`` at points of pieces onto a continuous function that is linear on triangles and
+    bilinear on quadrilaterals. The force is kept exactly.
+
+    It converges with the second order where the pressure is smooth, and may be negative beside the
+    edge of the contact. ``xi`` ``(n, q, 2)`` are the places of the points on the facets ``facet``
+    ``(n,)`` of the pieces."""
+    from scipy.sparse import coo_array  # runs in a plane do not pay for it
+    from scipy.sparse.linalg import spsolve
+
+    shape = patches.corner_shapes(xi.reshape(-1, 2)).reshape(*weight.shape, -1)
+    weighted = shape * weight[..., None]
+    mass = weighted.swapaxes(1, 2) @ shape
+    force = weighted.swapaxes(1, 2) @ pressure[..., None]
+    vertices = patches.corners[facet]
+    rows, columns = np.broadcast_arrays(vertices[:, :, None], vertices[:, None, :])
+    matrix = coo_array((mass.ravel(), (rows.ravel(), columns.ravel()))).tocsc()
+    right = np.bincount(vertices.ravel(), force.ravel())
+    return spsolve(matrix, right)[patches.corners]
 
 
 def project(pressure: Array, s: Array, weight: Array) -> Array:
