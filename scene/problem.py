@@ -142,8 +142,7 @@ class ProblemScene(Checked):
         require(drawn, "analysis.plane", said)
         if self.in_space:
             object.__setattr__(self.analysis, "plane", "space")
-        if self.in_space or "plane" in self.analysis.model_fields_set:
-            self._require_dimension()
+        self._require_dimension()
         self._directions()
         require_different(self)
         require_solids({("body", name): body for name, body in self.solids.items()})
@@ -156,56 +155,58 @@ class ProblemScene(Checked):
         """Whether bodies are in space: as the scene says, or as its directions and points are."""
         if "plane" in self.analysis.model_fields_set:
             return self.analysis.plane == "space"
-        points = [coupling.point for coupling in self.coupling]
-        return not self._used <= {*IN_PLANE} or any(len(point) == 3 for point in points)
+        used = {freedom for *_, freedom in self._directed}
+        return not used <= {*IN_PLANE} or any(len(point) == 3 for _, point in self._points)
 
     @property
-    def _axes(self) -> str:
-        return '"x", "y" or "z"' if self.in_space else '"x" or "y"'
+    def _directed(self) -> list[tuple[str, str, str, str]]:
+        """Sections, names, places and directions of what is held or loaded in a direction."""
+        found: list[tuple[str, str, str, str]] = []
+        found += [("support", s.name, s.on, freedom) for s in self.support for freedom in s.fixed]
+        found += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
+        return found
 
     @property
-    def _used(self) -> set[str]:
-        """The directions that parts use."""
-        loaded = {load.direction for load in self.load if load.direction}
-        return loaded.union(*(support.fixed for support in self.support))
+    def _points(self) -> list[tuple[tuple[str, ...], list[float]]]:
+        """Keys and values of points."""
+        points: list[tuple[tuple[str, ...], list[float]]] = []
+        points += [(("coupling", c.name, "point"), c.point) for c in self.coupling]
+        for load in self.load:
+            if load.core:
+                points.append((("load", load.name, "core", "centre"), load.core.centre))
+        return points
 
     def _require_dimension(self) -> None:
-        """Raise `Fault` for a direction, a point or a disc that does not fit analysis.plane."""
-        in_space = self.in_space
-        said = "is for planes: bodies in space are drawn whole"
-        require(not in_space or self.analysis.thickness is None, "analysis.thickness", said)
-        allowed = IN_SPACE if in_space else IN_PLANE
-        where = "in space" if in_space else "in a plane"
-        used: list[tuple[str, str, str, str | None]] = []
-        used += [("support", s.name, "fixed", f) for s in self.support for f in s.fixed]
-        used += [("load", load.name, "direction", load.direction) for load in self.load]
-        for section, name, at, freedom in used:
-            said = f"must be among {', '.join(allowed)} {where}"
-            require(freedom is None or freedom in allowed, (section, name, at), said)
-        count = 3 if in_space else 2
-        said = f"must be {count} numbers {where}"
-        for coupling in self.coupling:
-            require(len(coupling.point) == count, ("coupling", coupling.name, "point"), said)
-        for load in self.load:
-            place = ("load", load.name, "core", "centre")
-            require(load.core is None or len(load.core.centre) == count, place, said)
-        for part in self.interaction:
+        """Raise `Fault` for a point of another dimension, and for what only a plane has."""
+        count = 3 if self.in_space else 2
+        for place, point in self._points:
+            said = f"must have {count} numbers {self._where}"
+            require(len(point) == count, place, said)
+        if self.in_space:
+            said = "is for planes: bodies in space are drawn whole"
+            require(self.analysis.thickness is None, "analysis.thickness", said)
             said = "is not for bodies in space: mesh the stiff body, too"
-            is_drawn = not in_space or part.rigid is None
-            require(is_drawn, ("interaction", part.name, "rigid"), said)
+            for part in self.interaction:
+                require(part.rigid is None, ("interaction", part.name, "rigid"), said)
+
+    @property
+    def _where(self) -> str:
+        return "in space" if self.in_space else "in a plane"
 
     def _directions(self) -> None:
-        """Raise `Fault` where one direction of one place is held or loaded twice, or turns what
-        cannot turn."""
+        """Raise `Fault` where a direction is of another dimension, one direction of one place is
+        held or loaded twice, or what cannot turn turns."""
+        allowed = IN_SPACE if self.in_space else IN_PLANE
         couplings = {c.name for c in self.coupling}
         discs = {i.name for i in self.interaction if i.rigid}
         seen: dict[tuple[str, str], str] = {}
-        parts = [("support", s.name, s.on, f) for s in self.support for f in s.fixed]
-        parts += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
-        for section, name, on, freedom in parts:
+        for section, name, on, freedom in self._directed:
             at = (section, name, "fixed" if section == "support" else "direction")
+            said = f"must be among {', '.join(allowed)} {self._where}"
+            require(freedom in allowed, at, said)
             fits = not turns(freedom) or on in couplings
-            said = f"must be {self._axes}: {on!r} is no coupling, which alone has a rotation"
+            axes = '"x", "y" or "z"' if self.in_space else '"x" or "y"'
+            said = f"must be {axes}: {on!r} is no coupling, which alone has a rotation"
             require(fits, at, said)
             before = seen.get((on, freedom))
             said = f"repeats {freedom!r} of {on!r}, which {before} holds or loads already"

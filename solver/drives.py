@@ -26,7 +26,7 @@ from archord.solver.contact.surface import RigidSurface
 from archord.solver.loads import Loads
 from archord.solver.prescribed import Prescribed
 from archord.solver.problem import Body, Problem, Rigid
-from archord.solver.turns import Turns
+from archord.solver.turns import FiniteTurn
 
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
 _SAME_PLACE = 1e-9  # of the distance between two anchors
@@ -137,20 +137,19 @@ class Drives:
                 for level, name in enumerate(self.names):
                     disc.rate[level] = rates.get(name, 0.0)
 
-    def _turns(self) -> Turns | None:
-        """The finite rotations, None without any."""
-        turns = self.problem.turns
-        if not turns:
-            return None
-        numbers = {turn.name: self._prescribed.names.index(turn.name) for turn in turns}
-        held = {name: self._holder == number for name, number in numbers.items()}
-        return Turns.of(turns, self.names, self._x, held)
+    def _turns(self) -> list[FiniteTurn]:
+        """The finite rotations."""
+        numbers = {name: number for number, name in enumerate(self._prescribed.names)}
+        return [
+            FiniteTurn(turn, self.names, self._x, self._holder == numbers[turn.name])
+            for turn in self.problem.turns
+        ]
 
     def displaced(self, levels: Array) -> Array:
         """The prescribed displacements ``(n_local, d)`` at these ``levels``."""
         u = np.tensordot(levels, self.rate, 1)
-        if self.turns:
-            self.turns.displace(u, levels)
+        for turn in self.turns:
+            turn.displace(u, levels)
         return u
 
     def _require_independent(self) -> None:

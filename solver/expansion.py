@@ -20,6 +20,7 @@ from archord.solver.core_load import core_density, require_core
 from archord.solver.parts import Coupling, Load, Support, freedoms
 from archord.solver.problem import Problem
 
+_TWO_MIRRORS = 4  # parts of a whole in space, from which on nothing turns
 _STRETCHED = 10.0  # sizes of the mesh that large strain may displace by
 _TURNS = {2: PLANE_STRAIN.turns, 3: SPACE.turns}  # of a coupling, which turns a ring like a plane
 Rate = float | Callable[[Array], Array]
@@ -292,10 +293,10 @@ class _Expansion:
     def _mean_point(self, coupling: Coupling) -> None:
         # with its mirror image an edge moves along the symmetry line alone
         mirrored = self.stated.symmetry > 1
-        if mirrored and self.dimension == 3:
+        if mirrored and self.dimension == 3 and self.stated.symmetry < _TWO_MIRRORS:
             raise ValueError(
-                f"the distributing coupling {coupling.name!r} is of a part with mirror images, "
-                "which space does not know yet: take a rigid coupling, a pressure, or the whole"
+                f"the distributing coupling {coupling.name!r} is of a half in space, which may "
+                "turn in its mirror: take a rigid coupling, a pressure, or the whole"
             )
         point = None if mirrored else coupling.point
         for freedom, axis in self.freedoms.items():

@@ -136,8 +136,8 @@ class Evaluation:
         applied = drives.applied.reshape(rates.shape)
         u = unknowns.u.x.array[: unknowns.n_dofs]
         own = rates @ self.reaction.ravel() + applied @ u
-        if drives.turns:
-            own = own + drives.turns.moments(unknowns.levels, self.reaction)
+        for turn in drives.turns:
+            turn.add_moments(own, unknowns.levels, self.reaction)
         of_springs = self.springs.on_levels if self.springs else 0.0
         return unknowns.comm.allreduce(own) + self.contact.force_on_drives() + of_springs
 

@@ -61,8 +61,8 @@ class Unknowns:
         self.levels[drives.unknown] = given[drives.unknown]
         u = u.copy()
         u[self.fixed] = self.levels @ self._rate_of_fixed
-        if drives.turns:
-            drives.turns.displace(u, self.levels)
+        for turn in drives.turns:
+            turn.displace(u, self.levels)
         self.join(x, u[: self.n_owned], self.levels[drives.unknown] / drives.weight)
 
     def take(self, x: PETSc.Vec) -> None:
@@ -90,8 +90,8 @@ class Unknowns:
         u.x.array[: self.n_dofs] = own[: self.n_dofs]
         u.x.scatter_forward()
         u.x.array[self.fixed.ravel()] = levels @ self._rate_of_fixed
-        if self.drives.turns:
-            self.drives.turns.displace(u.x.array.reshape(-1, self.dimension), levels)
+        for turn in self.drives.turns:
+            turn.displace(u.x.array.reshape(-1, 3), levels)
 
     def where_free(self, values: Array) -> Array:
         """The ``values`` ``(n_owned, d)`` with zeros where displacements are prescribed."""

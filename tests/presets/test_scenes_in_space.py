@@ -131,7 +131,7 @@ FAULTS = {
         "coupling": [POINT],
         "load": [TURN | {"direction": "rotation"}],
     },
-    'coupling "crank".point = .* must be 3 numbers in space': {
+    'coupling "crank".point = .* must have 3 numbers in space': {
         "coupling": [POINT | {"point": [0.0, 0.0]}],
         "load": [TURN],
     },
@@ -144,7 +144,7 @@ FAULTS = {
             }
         ]
     },
-    'load "weight".core.centre = .* must be 3 numbers in space': {
+    'load "weight".core.centre = .* must have 3 numbers in space': {
         "load": [
             {"name": "weight", "on": "upper", "direction": "z", "force": 1.0}
             | {"core": {"centre": [0.0, 0.0], "radius": 1.0}}
@@ -208,3 +208,23 @@ def test_a_run_in_space_goes_on_from_its_folder(mesh, words, tmp_path):
     assert run.scene.analysis.plane == "space"
     again = archord.solve(run.scene, tmp_path / "again")
     np.testing.assert_allclose(again.history["press force"], run.history["press force"], rtol=1e-9)
+
+
+def test_a_problem_from_python_is_told_in_words(tmp_path):
+    """Which solve to the same forces; a support holds all axes by default."""
+    problem = archord.Problem(
+        archord.boxes({"block": (0.0, 0.0, 0.0, 2.0, 1.0, 1.0)}, size=0.5),
+        [archord.Body("block", archord.Elastic(E, 0.3))],
+        supports=[archord.Support("block left")],
+        couplings=[archord.Coupling("end", "block right", (2.0, 0.5, 0.5), "distributing")],
+        loads=[
+            archord.Load("bend", on="end", direction="rotation y", displacement=0.01),
+            archord.Load("weight", "block", "z", force=-1.0, core=((1.0, 0.5, 0.5), 0.6)),
+        ],
+        steps=1,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    assert run.scene.support[0].fixed == ["x", "y", "z"]
+    again = archord.solve(run.scene, tmp_path / "again")
+    for column in ("bend force", "block left z", "block left moment y", "weight displacement"):
+        assert again.columns[column] == pytest.approx(run.columns[column], rel=1e-9)

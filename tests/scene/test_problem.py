@@ -198,7 +198,7 @@ def test_an_interference_has_a_stage_of_its_own():
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
         ("interaction.0.law", "coulomb", "interaction .*friction must be positive where law"),
-        ("analysis", {"plane": "space"}, 'coupling "point".point = .* must be 3 numbers in space'),
+        ("analysis", {"plane": "space"}, 'coupling "point".point = .* must have 3 numbers in'),
         (
             "analysis",
             {"plane": "axisymmetric", "thickness": 2.0},

@@ -164,7 +164,7 @@ def test_a_tie_pulls(comm):
 
 
 REFUSED = {
-    "the distributing coupling 'end' is of a part with mirror images": {
+    "the distributing coupling 'end' is of a half in space": {
         "couplings": [Coupling("end", "z1", MIDDLE, "distributing")],
         "symmetry": 2,
     },
