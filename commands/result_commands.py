@@ -149,8 +149,20 @@ def report(folder: Path, output: Path | None, force: bool) -> int:
 
 @click.command()
 @argument("folder", "RUN", "run folder")
-@click.option("--edge", metavar="NAME", default="", help="along this set of facets of the mesh")
+@click.option(
+    "--edge",
+    metavar="NAME",
+    default="",
+    help='along this set of facets of the mesh; in space "A & B", where two of them meet',
+)
 @click.option("--line", type=float, nargs=4, metavar="X0 Y0 X1 Y1", help="along this line")
+@click.option(
+    "--along",
+    type=float,
+    nargs=6,
+    metavar="X0 Y0 Z0 X1 Y1 Z1",
+    help="along this line in space",
+)
 @click.option("--step", type=int, metavar="N", help="at this step [the last]")
 @click.option(
     "--quantity",
@@ -169,13 +181,19 @@ def report(folder: Path, output: Path | None, force: bool) -> int:
 )
 @output("table (.csv) or picture to write")
 def probe(
-    folder: Path, angles: tuple[float, ...], over: float | None, output: Path | None, **asked: Any
+    folder: Path,
+    angles: tuple[float, ...],
+    over: float | None,
+    output: Path | None,
+    along: tuple[float, ...] | None,
+    **asked: Any,
 ) -> int:
     """Print a quantity along an edge or a line of a run, its largest and smallest value and where;
     and draw it."""
     from archord.postprocess.run import Run
     from archord.postprocess.tables import probe_text
 
+    asked["line"] = along or asked["line"]
     found = Run(folder).probe(**asked)
     found = found.over(over) if over is not None else found
     print(probe_text(found, angles))

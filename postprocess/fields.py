@@ -22,12 +22,12 @@ from archord.scene.sections.errors import toml_value
 BODIES = {"pin": 1, "block": 2}
 _NO_FIELDS = ("mesh", "edges", "points", "cells")  # groups of the file
 # Of VTK's second-order cells by their nodes: straight triangles to draw them by, and the edges,
-# each along it
+# each along it; of the faces of cells in space, too
 _SUBTRIANGLES = {
     6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
     9: [[a, b, 8] for a, b in pairwise([0, 4, 1, 5, 2, 6, 3, 7, 0])],
 }
-_EDGES = {6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]], 9: [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]}
+EDGES = {6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]], 9: [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]}
 
 
 def _known(kind: str, name: str, doc: str) -> property:
@@ -150,7 +150,7 @@ class Fields:
     def facets(self) -> np.ndarray:
         """Edges ``(k, 3)`` of all cells, which lie on the left: first node, the one between, last
         node."""
-        edges = self.cells[:, _EDGES[self.cells.shape[1]]]
+        edges = self.cells[:, EDGES[self.cells.shape[1]]]
         a, b, c = np.moveaxis(self.coordinates[self.cells[:, :3]], 1, 0)
         clockwise = np.linalg.det(np.stack([b - a, c - a], axis=1)) < 0
         edges[clockwise] = edges[clockwise, :, ::-1]

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from archord.materials.kinematics import AXISYMMETRIC, kinematics
+from archord.materials.kinematics import AXISYMMETRIC, Kinematics, kinematics
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
+from archord.postprocess.probe_in_space import located, meeting
 from archord.presets.views import ProblemView
 from archord.report.errors import InputError
 
@@ -27,7 +28,7 @@ _CONTACT = {
     "gap": "gap",
     "contact_shear": "shear",
 }
-_OF_LENGTH = ("ux", "uy", "gap")
+_OF_LENGTH = ("ux", "uy", "uz", "gap")
 _OF_STRESS = (*_CONTACT, "hoop", "along", "normal", "shear", "p1", "p2", "p3")
 _PER = {"axisymmetric": "on the whole ring", "space": "on the whole"}
 _PER |= dict.fromkeys(("strain", "stress"), "per unit thickness")
@@ -56,7 +57,7 @@ class Probe:
         The largest force that drives the run at the step, per unit thickness.
     by : str
         The load that exerts it.
-    x : array (n, 2)
+    x : array (n, d)
         The undeformed points.
     s : array (n,)
         How far along its piece of the edge a point is, with the body on the left; on arcs the
@@ -93,7 +94,7 @@ class Probe:
     step: int
     force: float
     by: str
-    x: Array  # (n, 2) undeformed
+    x: Array  # (n, d) undeformed
     # (n,) along each piece of the edge, the body on its left; of arcs the radius times the angle
     s: Array
     values: Array  # (n,)
@@ -165,6 +166,10 @@ class Probed(Protocol):
     columns: dict[str, list[float]]
     steps: int
 
+    @property
+    def kinematics(self) -> Kinematics:
+        """See `Run.kinematics`."""
+
     def fields(self, step: int | None = None) -> Fields:
         """See `Run.fields`."""
 
@@ -182,15 +187,17 @@ class _Along(NamedTuple):
 
 
 def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float]) -> Probe:
-    """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises
-    `InputError`.
+    """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1, in
+    space x0, y0, z0, x1, y1, z1. Raises `InputError`.
 
     At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field:
     "hoop" is the stress along the edge; around an axis it is the stress round the axis, and the
     stress along the edge is "along";
     at the integration points of a surface "pressure", "gap" or, with friction, "contact_shear", or
     "facet_pressure", the mean of each facet, which scatters less where bodies yield. On a line a
-    nodal field (von Mises stress), linear between nodes, or else a field of the cells.
+    nodal field (von Mises stress), linear between nodes, or else a field of the cells. In space an
+    edge is "A & B", where two surfaces meet; it has "hoop" and nodal fields, and nodal fields are
+    quadratic between nodes.
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
@@ -239,6 +246,11 @@ def _contact(run: Probed, edge: str, quantity: str, step: int) -> _Along:
     # with bases, which most readers of runs do without
     from archord.geometry.curve import circle_through
 
+    if run.kinematics.dimension == 3:
+        raise InputError(
+            f"{run.folder}: the {quantity} of a surface in space is no curve; Run.unrolled and "
+            "Run.contact have it, and archord export --csv."
+        )
     arc = run.arc(step, edge)
     at_points = getattr(arc, _CONTACT[quantity])
     if at_points is None:
@@ -268,6 +280,8 @@ def _contact(run: Probed, edge: str, quantity: str, step: int) -> _Along:
 def _stress(run: Probed, edge: str, quantity: str, step: int) -> _Along:
     """Values at the nodes of an edge, with the stress along it and across."""
     fields = run.fields(step)
+    if run.kinematics.dimension == 3:
+        return _at_meeting(run, fields, edge, quantity)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:
         known = ", ".join(edges) or "none"
@@ -290,15 +304,42 @@ def _stress(run: Probed, edge: str, quantity: str, step: int) -> _Along:
     return _Along(fields.coordinates[nodes][shown], s[shown], values[shown], angle)
 
 
+def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> _Along:
+    """Values at the nodes where two surfaces in space meet, with the stress along the edge."""
+    from archord.geometry.curve import Curve
+
+    nodes = meeting(fields, edge)
+    s = Curve(fields.coordinates, 2, nodes).arc_length(np.array([0.0, 0.5, 1.0]))
+    tangent, joined = _tangents(fields.coordinates[nodes], nodes)
+    stresses = {}
+    if fields.stress is not None:
+        xx, yy, zz, xy, yz, zx = np.moveaxis(fields.stress[nodes], -1, 0)
+        a, b, c = np.moveaxis(tangent, -1, 0)
+        normal = xx * a**2 + yy * b**2 + zz * c**2
+        stresses["hoop"] = normal + 2 * (xy * a * b + yz * b * c + zx * c * a)
+    shown = np.ones(nodes.shape, dtype=bool)
+    shown[:, 2] = ~joined
+    values = _nodal(run, fields, quantity, nodes, **stresses)
+    return _Along(fields.coordinates[nodes][shown], s[shown], values[shown])
+
+
 def _inside(run: Probed, line: Sequence[float], quantity: str, step: int) -> _Along:
     """The points of the line that are in a body before it is loaded."""
-    start = np.array(line[:2])
-    end = np.array(line[2:])
+    d = run.kinematics.dimension
+    if len(line) != 2 * d:
+        ends = ", ".join(f"{axis}{k}" for k in (0, 1) for axis in run.kinematics.axes)
+        raise InputError(f"{run.folder}: a line here is {ends}, not {len(line)} numbers.")
+    start = np.array(line[:d])
+    end = np.array(line[d:])
     share = np.linspace(0, 1, _SAMPLES)
     x = start + share[:, None] * (end - start)
     fields = run.fields(step)
     of_cells = fields.cell.get(quantity)
-    if of_cells is None or quantity in fields.nodal_fields():
+    if quantity in fields.nodal_fields():
+        of_cells = None
+    if d == 3:
+        found = _in_cells(run, fields, x, quantity, of_cells)
+    elif of_cells is None:
         found = _between_nodes(fields, x, _nodal(run, fields, quantity))
     else:
         found = _of_cells(fields, x, of_cells)
@@ -306,6 +347,19 @@ def _inside(run: Probed, line: Sequence[float], quantity: str, step: int) -> _Al
     if not inside.any():
         raise InputError(f"{run.folder}: no body lies on the line.")
     return _Along(x[inside], share[inside] * np.linalg.norm(end - start), found[inside])
+
+
+def _in_cells(
+    run: Probed, fields: Fields, x: Array, quantity: str, of_cells: Array | None
+) -> Array:
+    """The quantity at ``x`` ``(k, 3)``, from values ``of_cells`` or from the nodes, NaN outside the
+    bodies."""
+    cell, nodes, weights = located(fields, x)
+    if of_cells is not None:
+        values = of_cells[cell]
+    else:
+        values = np.einsum("ka,ka->k", weights, _nodal(run, fields, quantity, nodes))
+    return np.where(cell >= 0, values, np.nan)
 
 
 def _between_nodes(fields: Fields, x: Array, values: Array) -> Array:
@@ -340,8 +394,9 @@ def _of_cells(fields: Fields, x: Array, values: Array) -> Array:
 
 def _nodal(run: Probed, fields: Fields, quantity: str, nodes: Any = ..., **more: Array) -> Array:
     """The quantity at ``nodes``, any shape: a nodal field, or one ``more`` that is known there."""
-    ux, uy = fields.displacement.T
-    known = fields.nodal_fields() | {"ux": ux, "uy": uy}
+    known = fields.nodal_fields()
+    for axis in range(fields.displacement.shape[1]):
+        known[f"u{'xyz'[axis]}"] = fields.displacement[:, axis]
     known = {name: values[nodes] for name, values in known.items()} | more
     if quantity in known:
         return known[quantity]

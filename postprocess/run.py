@@ -274,8 +274,9 @@ class Run:
         step: int | None = None,
         line: Sequence[float] = (),
     ) -> Probe:
-        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von
-        Mises'): see `archord.postprocess.probe.probe`. Raises `InputError`."""
+        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1, in space
+        x0, y0, z0, x1, y1, z1 (von Mises'): see `archord.postprocess.probe.probe`. Raises
+        `InputError`."""
         return probe(self, edge, quantity, self.number(step), line)
 
     def number(self, step: int | None) -> int:

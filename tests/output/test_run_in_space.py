@@ -22,6 +22,7 @@ from archord.postprocess.export import export_vtk
 from archord.postprocess.pictures.pictures import panels_of
 from archord.postprocess.pictures.report import write_report
 from archord.postprocess.pictures.solids import skin_of
+from archord.postprocess.probe_in_space import located
 from tests import forked
 from tests.output.run_files import accepted_steps
 from tests.postprocess.vtk_reader import VtkFile
@@ -141,7 +142,7 @@ def test_fields_have_six_components_on_quadratic_cells(folders, kind, tmp_path):
         cell = grid.GetCell(k)
         ids = grid.get_cell(k).point_ids
         at = [
-            located(cell, place) for place in np.vstack([np.full((1, 3), 0.2), 0.2 + np.eye(3) / 4])
+            in_vtk(cell, place) for place in np.vstack([np.full((1, 3), 0.2), 0.2 + np.eye(3) / 4])
         ]
         for x, weights in at:
             assert weights @ smooth[ids] == pytest.approx(quadratic(x), abs=1e-9)
@@ -154,7 +155,7 @@ def quadratic(x):
     return x[..., 0] ** 2 + 2 * x[..., 1] * x[..., 2] - x[..., 2] ** 2 + 0.3 * x[..., 1]
 
 
-def located(cell, place):
+def in_vtk(cell, place):
     """Where VTK has a ``place`` of the reference cell, and the weights of the cell's nodes."""
     x = [0.0] * 3
     weights = [0.0] * cell.GetNumberOfPoints()
@@ -307,7 +308,7 @@ def test_a_distributing_coupling_tells_how_its_facets_move_on_average(comm, tmp_
 
 @KINDS
 def test_line_loads_add_up_to_the_force_of_the_history(folders, kind):
-    """Along both axes of the surface, of all components; and so do the pressures of the unrolled facets."""
+    """Along both axes of the surface; and so do the pressures of the unrolled facets."""
     run = archord.load(folders[kind])
     force = [run.columns[f"joint force {axis}"][-1] for axis in "xyz"]
     for direction in np.eye(3)[:2]:
@@ -320,3 +321,35 @@ def test_line_loads_add_up_to_the_force_of_the_history(folders, kind):
     assert (flat.angle > 0).all()  # above the axis, counted from y
     with pytest.raises(archord.InputError, match="has no interaction 'weld'"):
         run.line_load("weld")
+
+
+@KINDS
+def test_fields_are_probed_along_lines_and_edges(folders, kind):
+    """A quadratic field is reproduced; an edge is where two surfaces meet, with its stress."""
+    run = archord.load(folders[kind])
+    fields = run.fields()
+    x = np.random.default_rng(2).uniform([0, 0, -1], [1, 1, 1], (60, 3))
+    cell, nodes, weights = located(fields, np.vstack([x, [[2.0, 0.5, 0.5]]]))
+    assert (cell[:-1] >= 0).all()
+    assert cell[-1] == -1
+    found = np.einsum("ka,ka->k", weights[:-1], quadratic(fields.coordinates)[nodes[:-1]])
+    np.testing.assert_allclose(found, quadratic(x), atol=1e-8)
+    down = run.probe(quantity="uz", line=(0.3, 0.4, 1.0, 0.3, 0.4, -1.0))
+    assert down.values[0] == pytest.approx(-0.01)
+    assert down.values[-1] == pytest.approx(0.0, abs=1e-9)
+    assert down.s[-1] == pytest.approx(2.0)
+    assert (down.unit, down.axes, down.per) == ("mm", ("x", "y", "z"), "on the whole")
+    stress = run.probe(line=(0.3, 0.4, 1.0, 0.3, 0.4, -1.0))
+    assert stress.values.max() > 100
+    edge = run.probe("lid & left")
+    np.testing.assert_allclose(edge.x[:, [0, 2]], np.tile([0.0, 1.0], (len(edge.x), 1)), atol=1e-9)
+    np.testing.assert_allclose(np.abs(np.diff(edge.x[:, 1])), np.diff(edge.s), atol=1e-9)
+    along = run.probe("lid & left", "stress_yy")
+    np.testing.assert_allclose(edge.values, along.values, atol=1e-9 * np.abs(edge.values).max())
+    for place, said in (("left & front", "one curve"), ("left", 'an edge is "A & B"')):
+        with pytest.raises(archord.InputError, match=said):
+            run.probe(place)
+    with pytest.raises(archord.InputError, match="a line here is x0, y0, z0, x1, y1, z1, not 4"):
+        run.probe(line=(0, 0, 1, 1))
+    with pytest.raises(archord.InputError, match=r"is no curve; Run\.unrolled"):
+        run.probe("lower", "pressure")
