@@ -202,11 +202,6 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
     kind = kinematics(run.scene.analysis.plane)
-    if kind.dimension == 3:
-        said = (
-            "is in space, and probes are for planes; archord export writes its fields and contact"
-        )
-        raise InputError(f"{run.folder}: {said}.")
     if line:
         quantity = quantity or "von_mises"
         found = _inside(run, line, quantity, step)

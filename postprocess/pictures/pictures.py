@@ -115,7 +115,7 @@ def panels_of(
     draw_fields, draw_contact, draw_forces = _PANELS[type(run.view)]
     if run.kinematics.dimension == 3:
         if edges:
-            said = "has no edges to draw a field along; archord probe --line draws it along a line"
+            said = "has no edges to draw a field along; archord probe --along draws it along a line"
             raise InputError(f"{run.folder}: is in space, and {said}.")
         draw_fields = partial(solids.field_panel, cut=cut)
         draw_contact = solids.contact_panel

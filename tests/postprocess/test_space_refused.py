@@ -27,7 +27,13 @@ def test_laws_of_planes_are_not_fitted(run):
         assert run.curve
 
 
-@pytest.mark.parametrize("place", [{"edge": "hole"}, {"line": (0.0, 0.0, 1.0, 1.0)}])
-def test_edges_of_planes_are_not_probed(run, place):
-    with pytest.raises(InputError, match="joint: is in space, and probes are for planes"):
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ({"edge": "hole"}, 'an edge is "A & B", where two of the surfaces meet'),
+        ({"line": (0.0, 0.0, 1.0, 1.0)}, "a line here is x0, y0, z0, x1, y1, z1, not 4 numbers"),
+    ],
+)
+def test_edges_and_lines_of_planes_are_not_probed(run, place, said):
+    with pytest.raises(InputError, match=said):
         run.probe(**place)
