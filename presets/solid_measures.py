@@ -1,11 +1,10 @@
-"""What presets in space tell beside the measures of their parts: the pressure on the load axis at
-the middle and at the rim of each hole, how far contact reaches, and how the pin of a clevis bends.
-"""
+"""What presets in space tell beside the measures of their parts: the pressure at the middle and at
+the rim of each hole, how far contact reaches, and how the pin of a clevis bends."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -19,7 +18,12 @@ from archord.scene.problem import ProblemScene
 _STRIP = 0.1  # width over R of the strips across the load axis, beside the middle and the rim
 _PEAK_FRACTION = 0.4  # part of the contact angle over which the parabola of the peak is fitted
 _LEAST = 0.1  # rad, of the same angle
+_PIECE = 0.15  # rad: length of a piece of a strip
+_SLIVER = 0.5  # part of the widest piece below which a piece does not count
 _SHEAR_FACTOR = 0.9  # of a round beam (Cowper 1966)
+
+
+Strip = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Bearing:
     - ``centre``: of the hole ``(x, y)``
     - ``axis``: the direction ``(x, y)`` from the centre in which the pin presses
     - ``span``: the angle to which the hole is modelled on one side of the axis
-    - ``middle``, ``rim``: heights z where pressures are told
+    - ``middle``, ``rim``: strips of the hole, from one z to another, where pressures are told
     """
 
     contact: str
@@ -39,8 +43,8 @@ class Bearing:
     centre: tuple[float, float]
     axis: tuple[float, float]
     span: float
-    middle: float
-    rim: float
+    middle: Strip
+    rim: Strip
 
     def angle(self, X: Array) -> Array:
         """The angle of points ``(n, q, 3)`` from the load axis, whichever way."""
@@ -49,36 +53,41 @@ class Bearing:
         across = to @ np.array([-self.axis[1], self.axis[0]])
         return np.abs(np.arctan2(across, along))
 
-    def strip(self, X: Array, height: float) -> np.ndarray:
-        """Whether points are in the strip at a ``height``."""
-        return np.abs(X[..., 2] - height) <= _STRIP * self.radius
-
     def semi_angle(self, state: Accepted) -> float:
         """The angle from the load axis to which the hole bears, at its middle."""
         hole = state.met[self.contact][-1]
-        weight = np.where(self.strip(hole.X, self.middle), hole.weight, 0.0)
+        weight = np.where(_inside(hole.X, self.middle), hole.weight, 0.0)
         bearing = weight[hole.raw_pressure > 0].sum()
         return float(self.span * bearing / weight.sum())
 
-    def pressure(self, state: Accepted, height: float) -> float:
-        """The pressure on the load axis in the strip at a ``height``, by an even parabola around
-        it."""
+    def peak(self, state: Accepted, strip: Strip) -> float:
+        """The pressure on the load axis in a ``strip``, by an even parabola around it."""
         eps = state.once(f"{self.contact} eps", lambda: self.semi_angle(state))
-        reach = max(_PEAK_FRACTION * eps, _LEAST)
-        angles = []
-        pressures = []
-        weights = []
-        for profile in state.met[self.contact]:
-            angle = self.angle(profile.X)
-            near = self.strip(profile.X, height) & (angle <= reach)
-            angles.append(angle[near])
-            pressures.append(profile.pressure[near])
-            weights.append(profile.weight[near])
-        square = np.concatenate(angles) ** 2
-        w = np.sqrt(np.concatenate(weights))
-        parabola = np.stack([w, w * square], axis=1)
-        peak, _ = np.linalg.lstsq(parabola, w * np.concatenate(pressures), rcond=None)[0]
+        angle, pressure, weight = self._points(state, strip)
+        near = angle <= max(_PEAK_FRACTION * eps, _LEAST)
+        w = np.sqrt(weight[near])
+        parabola = np.stack([w, w * angle[near] ** 2], axis=1)
+        peak, _ = np.linalg.lstsq(parabola, w * pressure[near], rcond=None)[0]
         return max(float(peak), 0.0)
+
+    def largest(self, state: Accepted, strip: Strip) -> float:
+        """The largest mean pressure of a piece of a ``strip``."""
+        angle, pressure, weight = self._points(state, strip)
+        piece = (angle / _PIECE).astype(int)
+        widths = np.bincount(piece, weight)
+        whole = widths > _SLIVER * widths.max()
+        forces = np.bincount(piece, weight * pressure)
+        return max(float((forces[whole] / widths[whole]).max()), 0.0)
+
+    def _points(self, state: Accepted, strip: Strip) -> tuple[Array, Array, Array]:
+        """Angle, pressure and weight ``(k,)`` of the points of both sides in a ``strip``."""
+        found = []
+        for profile in state.met[self.contact]:
+            inside = _inside(profile.X, strip)
+            arrays = (self.angle(profile.X), profile.pressure, profile.weight)
+            found.append([array[inside] for array in arrays])
+        angle, pressure, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return angle, pressure, weight
 
 
 def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
@@ -92,15 +101,37 @@ def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
         return
     for bearing in _bearings(shape, [part.name for part in scene.interaction]):
         name = bearing.contact
-        yield Measure(f"{name} mid pressure", stress, partial(_pressure, bearing, bearing.middle))
-        yield Measure(f"{name} rim pressure", stress, partial(_pressure, bearing, bearing.rim))
+        for where, strip in (("mid", bearing.middle), ("rim", bearing.rim)):
+            largest = partial(_in, bearing.largest, strip)
+            yield Measure(f"{name} {where} pressure", stress, largest)
         yield Measure(f"{name} eps", "rad", bearing.semi_angle)
     if shape.kind == "clevis":
         yield from _bending_measures(scene, shape)
 
 
-def _pressure(bearing: Bearing, height: float, state: Accepted) -> float:
-    return bearing.pressure(state, height)
+def _inside(X: Array, strip: Strip) -> np.ndarray:
+    """Whether points ``(n, q, 3)`` are in a ``strip``."""
+    low, high = strip
+    return (X[..., 2] >= low) & (X[..., 2] <= high)
+
+
+def _in(value: Callable[[Accepted, Strip], float], strip: Strip, state: Accepted) -> float:
+    return value(state, strip)
+
+
+def _middle(shape: Any, height: float = 0.0) -> Strip:
+    """The strip around a ``height``."""
+    width = _STRIP * shape.radius
+    return height - width, height + width
+
+
+def _rim(shape: Any, face: float, into: int) -> Strip:
+    """The strip beside the rim at a ``face``, toward ``into`` (1 or -1), behind its chamfer or
+    fillet."""
+    width = _STRIP * shape.radius
+    blunt = shape.space.chamfer or shape.space.fillet
+    low, high = sorted((face + into * blunt, face + into * (blunt + width)))
+    return low, high
 
 
 def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
@@ -108,12 +139,12 @@ def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     units = scene.units
     contact = scene.interaction[0].name
     load = scene.load[0].name
-    top = shape.space.thickness / 2
-    bearing = Bearing(contact, shape.radius, (0.0, 0.0), (0.0, -1.0), math.pi / 2, 0.0, top)
+    strips = _middle(shape), _rim(shape, shape.space.thickness / 2, -1)
+    bearing = Bearing(contact, shape.radius, (0.0, 0.0), (0.0, -1.0), math.pi / 2, *strips)
     yield Measure("delta", units.length, lambda state: -state.driven[load][0])
     yield Measure("P", units.force_of(1.0), lambda state: -state.driven[load][1])
-    yield Measure("p0", units.stress, partial(_pressure, bearing, 0.0))
-    yield Measure("rim pressure", units.stress, partial(_pressure, bearing, top))
+    yield Measure("p0", units.stress, partial(_in, bearing.peak, bearing.middle))
+    yield Measure("rim pressure", units.stress, partial(_in, bearing.peak, bearing.rim))
     yield Measure("eps", "rad", bearing.semi_angle)
 
 
@@ -121,14 +152,15 @@ def _bearings(shape: Any, contacts: list[str]) -> Iterator[Bearing]:
     """The bearings of a lug, a bushing or a clevis, whose pin is in the hole of ``contacts``."""
     R = shape.radius
     pinned = [name for name in contacts if name.startswith("pin in ")]
+    inside = shape.space.thickness / 2 if shape.kind != "clevis" else shape.inner.thickness / 2
+    strips = _middle(shape), _rim(shape, inside, -1)
+    yield Bearing(pinned[0], R, (0.0, 0.0), (1.0, 0.0), math.pi, *strips)
     if shape.kind != "clevis":
-        top = shape.space.thickness / 2
-        yield Bearing(pinned[0], R, (0.0, 0.0), (1.0, 0.0), math.pi, 0.0, top)
         return
-    inside, bottom, top = _heights(shape)
-    yield Bearing(pinned[0], R, (0.0, 0.0), (1.0, 0.0), math.pi, 0.0, inside)
+    _, bottom, top = _heights(shape)
     at = (2 * shape.clearance, 0.0)
-    yield Bearing(pinned[1], R, at, (-1.0, 0.0), math.pi, (bottom + top) / 2, bottom)
+    strips = _middle(shape, (bottom + top) / 2), _rim(shape, bottom, 1)
+    yield Bearing(pinned[1], R, at, (-1.0, 0.0), math.pi, *strips)
 
 
 def _heights(shape: Any) -> tuple[float, float, float]:
@@ -169,8 +201,8 @@ def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
         return abs(float(of_both_halves)) / 2
 
     def deflection(state: Accepted) -> float:
-        middle = _moved(state, inner, 0.0, R)
-        return abs(middle - _moved(state, outer, (bottom + top) / 2, R))
+        middle = _moved(state, inner, _middle(shape))
+        return abs(middle - _moved(state, outer, _middle(shape, (bottom + top) / 2)))
 
     of_moment = scene.units.energy_of(1.0)
     length = scene.units.length
@@ -180,9 +212,9 @@ def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     yield Measure("pin deflection by hand", length, lambda s: force(s) * (bent + sheared))
 
 
-def _moved(state: Accepted, contact: str, height: float, radius: float) -> float:
-    """How far the pin's surface has moved along x at a ``height``, on average."""
+def _moved(state: Accepted, contact: str, strip: Strip) -> float:
+    """How far the pin's surface in a ``strip`` has moved along x, on average."""
     pin = state.met[contact][0]
-    weight = np.where(np.abs(pin.X[..., 2] - height) <= _STRIP * radius, pin.weight, 0.0)
+    weight = np.where(_inside(pin.X, strip), pin.weight, 0.0)
     moved = pin.coordinates[..., 0] - pin.X[..., 0]
     return float((weight * moved).sum() / weight.sum())

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
@@ -78,7 +79,7 @@ def test_the_scene_of_a_page_is_a_scene(page, displacement, tmp_path):
 def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
     """Each number of the last line of the program to 5 %, as the law may be fitted to more
     joints."""
-    scene, _ = code("docs/tutorial.md", "toml")
+    scene, *_ = code("docs/tutorial.md", "toml")
     [program] = code("docs/tutorial.md", "c")
     (tmp_path / "bolt.toml").write_text(scene, encoding="utf-8")
     (tmp_path / "impact.c").write_text(program, encoding="utf-8")
@@ -98,7 +99,7 @@ def test_the_tutorials_law_says_in_c_what_the_tutorial_says(tmp_path):
 def test_the_tutorials_ball_is_solved_as_the_tutorial_says(tmp_path):
     """Its mesh, coarser, its scene, in fewer steps, and its field and measure."""
     [drawing] = code("docs/tutorial.md", "text")
-    _, scene = code("docs/tutorial.md", "toml")
+    _, scene, _ = code("docs/tutorial.md", "toml")
     [program] = [text for text in code("docs/tutorial.md", "python") if "triaxiality" in text]
     text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
     [mesh] = re.findall(r"^    docker/run python3 -c '(.*?)'$", text, re.M | re.S)
@@ -168,3 +169,9 @@ def test_commands_and_programs_fit_in_the_column_of_the_site(page):
     assert [
         line for line in [*fenced, *typed] if len(line) > 92 and not line.startswith("archord: ")
     ] == []
+
+
+def test_the_tutorials_lug_in_space_is_the_scene_of_that_name():
+    *_, scene = code("docs/tutorial.md", "toml")
+    file = ROOT / "scenes" / "lug_in_space.toml"
+    assert tomllib.loads(scene) == tomllib.loads(file.read_text(encoding="utf-8"))
