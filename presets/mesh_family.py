@@ -2,7 +2,8 @@
 
 Of a joint, lengths are in the size of the contact that is to be expected: a small contact in a
 large pin is resolved as a wide one is, by elements that are as much smaller as it is and grow as
-fast. Of a general scene, a shape gets smaller elements, and of a file the cells are cut in four.
+fast. Of a general scene, a shape gets smaller elements, and of a file the cells are cut
+in four, in space in eight.
 """
 
 from __future__ import annotations
@@ -104,15 +105,18 @@ class ProblemFamily:
     def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
         """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would
         be too large."""
-        if level and self.dofs * self.ratio**2 > _MOST_DOFS:
+        dimension = 3 if self.scene.in_space else 2
+        if level and self.dofs * self.ratio**dimension > _MOST_DOFS:
             return None
         changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _FIRST_OF_SHAPE / self.ratio**level
-            sizes = {
+            sizes: dict[str, Any] = {
                 "element_size": rounded(factor * self.shape.h),
                 "growth": rounded(factor * self.shape.growth),
             }
+            if hasattr(self.shape, "relative_element_size"):
+                sizes["relative_element_size"] = None  # the other way to give the size
             changes = {"shape": self.shape.model_copy(update=sizes)}
         mesh = self.scene.mesh.model_copy(update=changes)
         return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.cost.work_precision_codes import CASES
 from archord.commands.progress import Progress
@@ -325,3 +326,45 @@ def test_ranks_choose_the_same_meshes(tmp_path, comm):
             b.substeps,
             b.dofs,
         )
+
+
+def test_a_file_in_space_is_refined_to_the_accuracy(tmp_path):
+    """A box that is sheared: the cells are cut in eight, and the force falls with them."""
+    comm = MPI.COMM_SELF
+    mesh = archord.boxes({"box": (0.0, 0.0, 0.0, 2.0, 1.0, 1.0)}, size=0.7, comm=comm)
+    problem = archord.Problem(
+        mesh,
+        [archord.Body("box", archord.Elastic(210e3, 0.3))],
+        supports=[archord.Support("wall", on="box left", fixed="xyz")],
+        loads=[archord.Load("bend", on="box right", direction="z", displacement=0.01)],
+        steps=1,
+    )
+    archord.solve(problem, tmp_path / "given", comm=comm)
+    scene = tomllib.loads((tmp_path / "given" / "scene.toml").read_text())
+    del scene["stepping"]
+    scene["mesh"]["file"] = str(tmp_path / "given" / "mesh.npz")
+    scene["analysis"]["accuracy"] = 0.02
+    run = archord.solve(scene, tmp_path / "run", comm=comm)
+    found = run.summary["accuracy"]
+    assert 0 < found["mesh_error"] < 0.02
+    first, last = found["levels"][0]["last"], found["levels"][-1]["last"]
+    assert first > last > 0.9 * first
+    assert found["levels"][1]["dofs"] > 4 * found["levels"][0]["dofs"]
+
+
+def test_a_joint_in_space_is_solved_to_the_accuracy(tmp_path):
+    """Its run can be read and solved again."""
+    steel = {"E": 210e3, "nu": 0.3}
+    scene = {
+        "joint": {"radius": 10.0, "clearance": 0.05},
+        "pin": steel,
+        "block": steel,
+        "space": {"thickness": 5.0, "rim_ratio": 1.0},
+        "load": {"displacement": 1.0, "steps": 1},
+        "analysis": {"accuracy": 0.05},
+    }
+    run = archord.solve(scene, tmp_path / "run", comm=MPI.COMM_SELF)
+    assert run.status == "done"
+    assert 0 < run.summary["accuracy"]["estimated"] < 0.05
+    again = archord.solve(tmp_path / "run" / "scene.toml", tmp_path / "again", comm=MPI.COMM_SELF)
+    assert again.columns["press force"] == run.columns["press force"]
