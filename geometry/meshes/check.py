@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, combinations, permutations
-from typing import NamedTuple
+from itertools import chain, combinations
 
 import basix
 import numpy as np
@@ -13,9 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import Curve, circle_through
+from archord.geometry.curve import circle_through
 from archord.geometry.meshes.cells import (
-    along,
     corners_of,
     distinct,
     entities_of,
@@ -27,16 +25,12 @@ from archord.geometry.meshes.cells import (
 )
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
+from archord.geometry.meshes.overlap import PIECES, Inside, overlaps, polygons
 from archord.geometry.meshes.quality import distorted, faults, place, thin
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
-# of a side: how deep bodies may overlap by their sides being straight, or curved
-_INTO_STRAIGHT = 0.02
-_INTO_CURVED = 1e-3
-_PIECES = 8  # of a side, as a polygon
-_AT_ONCE = 2_000_000  # pairs of points and pieces
 # of the clearance: sagitta from which corners of straight sides show in the pressure
 _POLYGONAL = 1e-3
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
@@ -44,7 +38,6 @@ _STRAIGHT = np.cos(0.5)  # of the angle up to which two facets are of one line
 _NO_CELL = "look whether a cell is missing there"
 _LEFT_OUT = "look whether they are missing"
 
-Inside = Mapping[str, np.ndarray]  # which cells ``(n,)`` are in each body
 Pair = Sequence[str | float]
 
 
@@ -81,7 +74,7 @@ def check_mesh(
             _of_bodies(mesh, inside, millimetres),
             *(_of_surface(mesh, inside, name) for name in surfaces),
             (said for said, spoils in straight if spoils),
-            _overlaps(mesh, inside, overlap) if is_plane else (),
+            overlaps(mesh, inside, overlap),
         )
         fault = next(found, "")
         warnings = distorted(mesh) + thin(mesh) + [said for said, _ in straight]
@@ -145,81 +138,6 @@ def _of_surface(mesh: MeshArrays, inside: Inside, name: str) -> Iterator[str]:
         yield (
             f"the facet set {name!r} lies inside the body {owners[0]!r}; a surface is on a boundary"
         )
-
-
-def _polygons(mesh: MeshArrays, edges: np.ndarray) -> Array:
-    """Points ``(k, pieces + 1, d)`` on ``edges`` ``(k, b)``."""
-    order = edges.shape[1] - 1
-    shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(np.linspace(0, 1, _PIECES + 1))
-    return np.einsum("qa,kai->kqi", shape, mesh.x[along(edges)])
-
-
-class _Outline(NamedTuple):
-    """The boundary of a body of curved sides.
-
-    - ``points`` ``(2 k, 2)``: the first corners of the sides, and the middles of the cells there
-    - ``start``, ``end`` ``(s, 2)``: the straight pieces that the sides are cut into
-    """
-
-    points: Array
-    start: Array
-    end: Array
-
-    @classmethod
-    def of(cls, mesh: MeshArrays, cells: np.ndarray) -> _Outline:
-        sides, behind = outer_sides(mesh.kind, cells)
-        middles = mesh.x[cells[behind]].mean(axis=1)
-        polygon = _polygons(mesh, sides)
-        start = polygon[:, :-1].reshape(-1, 2)
-        end = polygon[:, 1:].reshape(-1, 2)
-        return cls(np.concatenate([mesh.x[sides[:, 0]], middles]), start, end)
-
-    def contains(self, x: Array) -> np.ndarray:
-        """Whether points ``(k, 2)`` lie within: a ray to the right crosses an odd number of
-        pieces."""
-        to = x[:, None] - self.start
-        piece = self.end - self.start
-        # one and the same comparison for both ends, so that it is exact where pieces meet
-        below_start = x[:, None, 1] < self.start[:, 1]
-        below_end = x[:, None, 1] < self.end[:, 1]
-        left = to[..., 0] * piece[:, 1] < to[..., 1] * piece[:, 0]
-        crosses = (below_start != below_end) & (left == (piece[:, 1] > 0))
-        return crosses.sum(axis=1) % 2 == 1
-
-    def depth(self, x: Array, spare: Array) -> Array:
-        """Distance ``(k,)`` of points ``(k, 2)`` from the nearest piece, 0 where it is within what
-        that piece has to ``spare`` ``(s,)``."""
-        to = x[:, None] - self.start
-        piece = self.end - self.start
-        xi = np.clip((to * piece).sum(axis=2) / (piece**2).sum(axis=1), 0, 1)
-        away = np.linalg.norm(to - xi[..., None] * piece, axis=2)
-        nearest = away.argmin(axis=1)
-        depth = away.min(axis=1)
-        return np.where(depth > spare[nearest], depth, 0.0)
-
-
-def _overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
-    """Boundary vertices of a body, or middles of its cells there, that lie in another by more than
-    is ``allowed``."""
-    into = _INTO_CURVED if mesh.order > 1 else _INTO_STRAIGHT
-    outlines = {body: _Outline.of(mesh, mesh.cells[cells]) for body, cells in inside.items()}
-    for (a, inner), (b, outer) in permutations(outlines.items(), 2):
-        x = inner.points
-        near = (x > outer.start.min(axis=0)) & (x < outer.start.max(axis=0))
-        x = x[near.all(axis=1)]
-        spare = allowed + into * _PIECES * np.linalg.norm(outer.end - outer.start, axis=1)
-        for few in np.array_split(x, 1 + len(x) * len(spare) // _AT_ONCE):
-            within = few[outer.contains(few)]
-            depth = outer.depth(within, spare)
-            if depth.any():
-                deep = f"{depth.max():.3g}"
-                at = place(within[depth.argmax()])
-                cure = (
-                    "draw them apart, or, if they are pressed together, give their interaction "
-                    f"overlap = {deep}"
-                )
-                yield f"the body {a!r} lies {deep} deep in the body {b!r} at {at}: {cure}"
-                break
 
 
 def cracks(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
@@ -326,7 +244,7 @@ def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
         if not radius:
             return
         radii.append(radius)
-        start, middle, end = np.swapaxes(polygons[:, :: _PIECES // 2], 0, 1)
+        start, middle, end = np.swapaxes(polygons[:, :: PIECES // 2], 0, 1)
         sagitta = ((end - start) ** 2).sum(axis=1) / (8 * radius)
         bulge = np.linalg.norm(middle - (start + end) / 2, axis=1)
         deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
@@ -349,10 +267,10 @@ def _arcs(mesh: MeshArrays, facets: np.ndarray) -> tuple[float, Array]:
     pieces + 1, d)`` on their edges, in space less what runs along the axis."""
     if mesh.dimension == 2:
         circle = circle_through(mesh.x[np.unique(facets[:, :2])])
-        return circle[1] if circle else 0.0, _polygons(mesh, facets)
+        return circle[1] if circle else 0.0, polygons(mesh, facets)
     cylinder = cylinder_through(mesh.x, facets)
     if cylinder is None:
-        return 0.0, np.zeros((0, _PIECES + 1, 3))
-    points = _polygons(mesh, entities_of(side_kind(mesh.kind), facets, 1))
+        return 0.0, np.zeros((0, PIECES + 1, 3))
+    points = polygons(mesh, entities_of(side_kind(mesh.kind), facets, 1))
     at = points.reshape(-1, 3)
     return cylinder.radius, (at - cylinder.foot(at)).reshape(points.shape)
