@@ -323,6 +323,45 @@ def test_stages_are_a_list_and_directions_are_words():
         archord.Support("base", fixed=3)
 
 
+class Flat(archord.ContactLaw):
+    """A law that answers arrays of this shape."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.shape = shape
+
+    def respond(self, opening, trial, gamma, state, dt):
+        none = np.zeros(len(trial), dtype=int)
+        shears = np.zeros((len(trial), 2, 2))
+        return archord.Response(np.zeros((len(trial), *self.shape)), shears, None, none, state)
+
+
+class Narrow(archord.Elastic):
+    """A material that forgets the stress out of the plane."""
+
+    def update(self, strain, state):
+        stress, tangent, state = super().update(strain, state)
+        return stress[:, :3], tangent, state
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (3,)])
+def test_a_law_answers_each_point(shape):
+    blocks = archord.rectangles({"low": (0, 0, 1, 1), "high": (0, 1, 1, 1)}, size=0.5)
+    steel = archord.Elastic(210e3, 0.3)
+    problem = archord.Problem(
+        blocks,
+        [archord.Body("low", steel), archord.Body("high", steel)],
+        [archord.Interaction("rub", ("high bottom", "low top"), law=Flat(shape))],
+        [archord.Support("low bottom"), archord.Support("high top")],
+    )
+    with pytest.raises(ValueError, match="the contact law of 'rub' must answer a traction of"):
+        archord.System(problem)
+
+
+def test_a_material_answers_each_component():
+    with pytest.raises(ValueError, match=r"stresses of the shape \(2, 4\) at 2 points, not"):
+        archord.System(slab(bodies=[archord.Body("slab", Narrow(210e3, 0.3))]))
+
+
 def test_own_fields_without_fields_are_refused(tmp_path):
     own = {"twice": lambda at: 2 * at.stress[..., 0]}
     with pytest.raises(archord.InputError, match="own_fields need fields"):

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError, RigidCircle
 from archord.report.errors import InputError, in_sentences, require_between, require_of
-from archord.solver.contact.laws.law import ContactLaw
+from archord.solver.contact.laws.law import ContactLaw, fault_of
 from archord.solver.contact.laws.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -161,6 +161,8 @@ class Interface:
                 "it keeps its gaps, and knows no interference or overlap"
             )
         integrated = self._integrated()
+        if fault := fault_of(law, integrated[0].kinematics.dimension):
+            raise ValueError(f"the contact law of {interaction.name!r} {fault}")
         if integrated[0].kinematics.has_hoop:
             self._require_on_axis()
         self.pairs: list[Pair] = []

@@ -189,3 +189,19 @@ class ContactLaw(Protocol):
         """Quantities per area by name, such as a depth of wear: their integrals over the surface
         are reported for each step."""
         return {}
+
+
+def fault_of(law: ContactLaw, d: int) -> str:
+    """What is wrong with the shapes of a ``law``'s answer at points with ``d`` components; empty if
+    nothing is. Arrays of other shapes could be spread over the points without a word."""
+    trial = np.zeros((2, d))
+    trial[:, 0] = [1.0, -1.0]
+    answer = law.respond(np.zeros((2, d)), trial, np.ones((2, d)), law.state(2), 1.0)
+    if not isinstance(answer, Response):
+        return f"must answer a Response, not {type(answer).__name__}"
+    shapes = {"traction": (2, d), "by_trial": (2, d, d), "by_opening": (2, d, d), "branch": (2,)}
+    for name, shape in shapes.items():
+        found = getattr(answer, name)
+        if found is not None and np.shape(found) != shape:
+            return f"must answer a {name} of the shape {shape} at 2 points, not {np.shape(found)}"
+    return ""
