@@ -22,7 +22,10 @@ class Depth(Section):
         default=0.0,
     )
     fillet: NotNegative = key(
-        "radius of the rounded rims of these holes, instead of a chamfer", "length", default=0.0
+        "radius of the rounded rims of these holes, instead of a chamfer; some cells there are "
+        "nearly flat, so solves take longer",
+        "length",
+        default=0.0,
     )
     rim_ratio: float = key(
         "element size at these rims over element_size", default=0.5, ge=0.02, le=1
