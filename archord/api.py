@@ -279,6 +279,9 @@ def _scene_of(given: Any, caller: str = "archord.solve") -> AnyScene:
     if not isinstance(given, AnyScene):
         said = "problem must be a Problem, a scene, a scene file or its table"
         raise InputError(f"{caller}: {said}, not {shortened(repr(given))}.")
+    in_space: Any = given
+    if getattr(in_space, "space", None) is not None:
+        return scene_file.parse_any(in_space.general(), caller)
     return given
 
 

@@ -103,7 +103,7 @@ def curves_of(runs: Sequence[Run]) -> Curves:
     dR and E* of all are the same, else over powers of E*, R and the clearance. Raises `InputError`
     for general runs without a common quantity or unit.
     """
-    if any("P" in run.columns for run in runs):
+    if any("P" in run.columns and run.kinematics.dimension == 2 for run in runs):
         return _curves_of_joints(runs)
     return _common_columns(runs)
 

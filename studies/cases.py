@@ -34,7 +34,6 @@ from archord.scene.file import (
     in_order,
     override_key,
     parse_any,
-    parse_scene,
     put,
     read_targets,
     read_toml,
@@ -360,4 +359,4 @@ def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> AnyScene:
         section, _, name = key.partition(".")
         put(data, section, name, overrides[key], key)
     read_targets(data, path)
-    return parse_scene(data, str(path))
+    return parse_any(data, str(path))

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archord.geometry.curve import circle_through
 from archord.materials.material import Array
 from archord.output.files.vtkhdf import SECOND_ORDER
 from archord.postprocess.fields import Fields
@@ -217,6 +216,9 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
 def _unrolled(surfaces: dict[str, Any]) -> tuple[str, Array, tuple[str, str]]:
     """The surface that is drawn, its facets' corners ``(n, c, 2)`` in the picture, and the words on
     its axes."""
+    # with compiled curves, which other commands do without
+    from archord.geometry.curve import circle_through
+
     for name in reversed(surfaces):
         corners = surfaces[name].corners
         flat = corners.reshape(-1, 3)

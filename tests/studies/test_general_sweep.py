@@ -69,3 +69,46 @@ def test_keys_of_named_parts_vary(tmp_path):
     (tmp_path / "b.sweep.toml").write_text(f'base = "{general}"\n[grid]\nbody.log.E = [1e5]\n')
     with pytest.raises(archord.InputError, match="with a name among"):
         read_sweep(tmp_path / "b.sweep.toml")
+
+
+def test_a_sweep_in_space_varies_the_thickness(tmp_path, capsys):
+    """A thicker joint carries more; the cases are shown, and one that is gone is solved again."""
+    text = """
+[grid]
+space.thickness = [4.0, 8.0]
+[base]
+joint = { radius = 10.0, clearance = 0.05, relative_element_size = 0.5 }
+pin = { E = 210000.0, nu = 0.3 }
+block = { E = 210000.0, nu = 0.3 }
+space = { thickness = 4.0, rim_ratio = 1.0 }
+load = { displacement = 1.0, steps = 1 }
+"""
+    (tmp_path / "t.sweep.toml").write_text(text)
+    assert sweep(tmp_path / "t.sweep.toml", "-o", tmp_path / "out", "-q") == 0
+    rows = table(tmp_path / "out" / "cases.csv")
+    thin, thick = (abs(float(row["press force [N]"])) for row in rows)
+    assert 1.5 * thin < thick < 2.5 * thin
+    assert run(["show", str(tmp_path / "out")]) == 0
+    assert "press force [N]" in capsys.readouterr().out
+    next((tmp_path / "out" / "cases").glob("*/history.csv")).unlink()
+    assert sweep(tmp_path / "t.sweep.toml", "-o", tmp_path / "out", "-q") == 0
+    again = table(tmp_path / "out" / "cases.csv")
+    assert [row["press force [N]"] for row in again] == [row["press force [N]"] for row in rows]
+
+
+def test_a_joint_in_space_from_python_is_no_plane(tmp_path):
+    """As its table."""
+    steel = {"E": 210e3, "nu": 0.3}
+    words = {
+        "joint": {"radius": 10.0, "clearance": 0.05, "relative_element_size": 0.5},
+        "pin": steel,
+        "block": steel,
+        "space": {"thickness": 4.0, "rim_ratio": 1.0},
+        "load": {"displacement": 1.0, "steps": 1},
+    }
+    runs = [
+        archord.solve(given, tmp_path / name)
+        for name, given in (("table", words), ("scene", archord.Scene(**words)))
+    ]
+    assert runs[0].kinematics.dimension == 3
+    assert runs[0].columns["press force"] == runs[1].columns["press force"]
