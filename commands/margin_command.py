@@ -35,7 +35,7 @@ def margin(folder: Path, load: float, plate: str | None, **asked: Any) -> int:
     """Print the margins of safety of a lug, or of the plates of a clevis, under a force: yield and
     ultimate, by hand formulas (net section, bearing, shear-out) and by finite elements.
     """
-    from archord.postprocess.margin import margin_text, margins, plates_of
+    from archord.postprocess.judgement.margin import margin_text, margins, plates_of
     from archord.postprocess.run import Run
     from archord.report.errors import InputError
 

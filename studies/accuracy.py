@@ -25,7 +25,7 @@ from archord.output.files.seal import read_report, report_text
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
-from archord.postprocess.convergence import Curve, mesh_error, step_error
+from archord.postprocess.judgement.convergence import Curve, mesh_error, step_error
 from archord.presets.joint_doubts import UNSEEN
 from archord.presets.views import view_of
 from archord.report.errors import InputError

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from archord.postprocess.convergence import Refined, group
+from archord.postprocess.judgement.convergence import Refined, group
 from archord.postprocess.laws.calibration import POOR, check_compatible, fit_curve
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run

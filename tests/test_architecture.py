@@ -35,6 +35,7 @@ ROOMS = [
     "output.files",
     "output",
     "postprocess",
+    "postprocess.judgement",
     "postprocess.pictures",
     "postprocess.laws.general",
     "postprocess.laws",

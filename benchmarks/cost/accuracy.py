@@ -10,7 +10,7 @@ import numpy as np
 
 from archord.benchmarks.case import Case, E, paper_joint, varied
 from archord.output.run import Outcome
-from archord.postprocess.convergence import difference
+from archord.postprocess.judgement.convergence import difference
 from archord.presets.mesh_family import RATIO, MeshFamily
 from archord.scene.presets.joint import Scene
 

@@ -17,8 +17,8 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from archord.postprocess.convergence import Order, Refined, group
 from archord.postprocess.curve import RunCurve
+from archord.postprocess.judgement.convergence import Order, Refined, group
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint import Array, LawJoint

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archord.postprocess.convergence import group
+from archord.postprocess.judgement.convergence import group
 from archord.postprocess.laws.calibration import calibrate, fit_curve
 from archord.postprocess.laws.fit_report import notes
 from archord.postprocess.laws.general.joint import LawJoint

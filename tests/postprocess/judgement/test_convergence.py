@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from archord.postprocess.convergence import mesh_error, observed_order, richardson, step_error
+from archord.postprocess.judgement.convergence import (
+    mesh_error,
+    observed_order,
+    richardson,
+    step_error,
+)
 
 
 @pytest.mark.parametrize("order", [0.3, 1.5, 2.0, 3.7])

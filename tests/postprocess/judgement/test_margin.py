@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from archord.cli import run as command
-from archord.postprocess.margin import (
+from archord.postprocess.judgement.margin import (
     by_hand,
     load_at,
     margin_text,
