@@ -57,6 +57,7 @@ def cylinder(pressure) -> PatchProfile:
         facet=facet,
         corners=corners[facet],
         facet_pressure=of_facets[facet],
+        corner_pressure=np.repeat(of_facets[facet, None], 4, axis=1),
         traction=-p[:, None, None] * normal[:, None],
     )
 
