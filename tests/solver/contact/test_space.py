@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from dolfinx.mesh import CellType
 from mpi4py import MPI
 
+from archord.materials.finite import LargeStrain
 from archord.solver.conditions import Dirichlet, Drive
 from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.laws.coulomb import Coulomb, FrictionState
@@ -127,10 +128,12 @@ def test_points_lie_on_the_surface(kind):
 
 @every_kind
 @every_law
-def test_tangent_is_the_derivative_of_the_force(kind, law):
-    """Central differences in random directions, on curved surfaces that do not match."""
+@pytest.mark.parametrize("material", [IN_SPACE, LargeStrain(IN_SPACE)], ids=["small", "large"])
+def test_tangent_is_the_derivative_of_the_force(kind, law, material):
+    """Central differences in random directions, on curved surfaces that do not match, at small and
+    large strain."""
     blocks = bodies(MPI.COMM_SELF, upper=INSET, kind=kind, bend=bump)
-    contact = blocks.contact(**law)
+    contact = blocks.contact(material, **law)
     contact_force(contact, pressed(blocks, 0.7 * DEPTH, seed=1))
     commit(contact)
     contact.begin(pressed(blocks, 0.7 * DEPTH, seed=1))
@@ -288,6 +291,29 @@ def test_arcs_between_meshes_that_do_not_match_are_seen_by_their_sagitta(axes, l
         off.append(held_around(blocks, law, gradient)[1])
     assert off[0] < 1e-3
     assert off[1] < 0.2 * off[0]
+
+
+def test_bodies_that_turn_together_at_large_strain_keep_their_pressure():
+    """By 37 degrees about (1, 2, 3): the forces turn with them."""
+    blocks = bodies(MPI.COMM_SELF, upper=INSET, bend=bump)
+    contact = blocks.contact(LargeStrain(IN_SPACE))
+    u = pressed(blocks, DEPTH)
+    x = blocks.V.tabulate_dof_coordinates()
+    straight = contact_force(contact, u)
+    turned = contact_force(contact, (x + u) @ ASKEW.T - x)
+    assert np.abs(straight).max() > 1e-3 * DEPTH * E
+    off = 1e-9 * np.abs(straight).max()
+    np.testing.assert_allclose(turned, straight @ ASKEW.T, rtol=0, atol=off)
+
+
+@every_law
+def test_bodies_in_touch_that_turn_together_at_large_strain_do_not_press(law):
+    """By 37 degrees about (1, 2, 3)."""
+    blocks = bodies(MPI.COMM_SELF, upper=INSET, bend=bump)
+    contact = blocks.contact(LargeStrain(IN_SPACE), **law)
+    x = blocks.V.tabulate_dof_coordinates()
+    force = contact_force(contact, x @ ASKEW.T - x)
+    np.testing.assert_allclose(force, 0.0, rtol=0, atol=1e-9 * E)
 
 
 LAWS_OF_SLIP = {
