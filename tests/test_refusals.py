@@ -63,7 +63,8 @@ OTHER = "{elastic}"
         (["mesh", "nowhere.msh"], "nowhere.msh: No such file or directory."),
         (
             ["mesh", "empty"],
-            "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf, .npz, .step, .stp, .brep.",
+            "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf, .npz, .step, "
+            ".stp, .brep.",
         ),
         (
             ["mesh", "x.msh", "--set", "mesh.scal=2"],
