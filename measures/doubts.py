@@ -82,7 +82,7 @@ def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
         text = f"{cells} turned inside out: stresses and forces mean nothing"
         said.append(Doubt(text, inside_out))
     if not small:
-        return said
+        return said + _turning_pairs(system, angle)
     if strain > LARGE_STRAIN and peeq < _PLASTIC * strain:
         name = next(body.name for body in system.problem.bodies if system.problem.tag(body) == tag)
         off = f"which makes stresses and forces wrong by about {100 * strain:.2g} %"
@@ -93,6 +93,18 @@ def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
         text = f"elements turn by {angle:.2g} rad, which {false_strain}; {LARGE}"
         said.append(Doubt(text, angle))
     return said
+
+
+def _turning_pairs(system: System, angle: float) -> list[str]:
+    """A warning where bodies in space that are tied or rub turn far: see docs/theory.md, turning
+    pairs."""
+    is_in_space = system.problem.kinematics.dimension == 3
+    slips = any(pair.counts_slip for pair in system.contact.pairs)
+    if not (is_in_space and slips and angle > _FAR_TURN):
+        return []
+    text = f"elements turn by {angle:.2g} rad in space, where bodies are tied or rub"
+    inexact = "forces of surfaces that press while both bodies turn are not exact then"
+    return [Doubt(f"{text}: {inexact}", angle)]
 
 
 def round_off_doubts(state: Accepted, tolerance: float) -> list[str]:
