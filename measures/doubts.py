@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt
+from archord.solver.contact.laws.named import Tied
 
 if TYPE_CHECKING:
     from archord.solver.path.system import System
@@ -99,8 +100,9 @@ def _turning_pairs(system: System, angle: float) -> list[str]:
     """A warning where bodies in space that are tied or rub turn far: see docs/theory.md, turning
     pairs."""
     is_in_space = system.problem.kinematics.dimension == 3
-    slips = any(pair.counts_slip for pair in system.contact.pairs)
-    if not (is_in_space and slips and angle > _FAR_TURN):
+    pairs = system.contact.pairs
+    has_shear = any(pair.counts_slip or isinstance(pair.law, Tied) for pair in pairs)
+    if not (is_in_space and has_shear and angle > _FAR_TURN):
         return []
     text = f"elements turn by {angle:.2g} rad in space, where bodies are tied or rub"
     inexact = "forces of surfaces that press while both bodies turn are not exact then"

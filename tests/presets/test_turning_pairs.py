@@ -5,21 +5,23 @@ from types import SimpleNamespace
 import pytest
 
 from archord.measures.doubts import distortion_doubts
+from archord.solver.contact.laws.named import Tied
 
 
 @pytest.mark.parametrize(
-    ("dimension", "slips", "angle", "warned"),
+    ("dimension", "slips", "law", "angle", "warned"),
     [
-        (3, True, 0.5, True),
-        (3, True, 0.1, False),
-        (3, False, 0.5, False),
-        (2, True, 0.5, False),
+        (3, True, None, 0.5, True),
+        (3, False, Tied(), 0.5, True),
+        (3, True, None, 0.1, False),
+        (3, False, None, 0.5, False),
+        (2, True, None, 0.5, False),
     ],
 )
-def test_turning_pairs_are_warned_of(dimension, slips, angle, warned):
+def test_turning_pairs_are_warned_of(dimension, slips, law, angle, warned):
     system = SimpleNamespace(
         problem=SimpleNamespace(kinematics=SimpleNamespace(dimension=dimension)),
-        contact=SimpleNamespace(pairs=[SimpleNamespace(counts_slip=slips)]),
+        contact=SimpleNamespace(pairs=[SimpleNamespace(counts_slip=slips, law=law)]),
         distortion=lambda: (0.3, 1, angle, 0),
     )
     said = distortion_doubts(system, 0.0, small=False)
