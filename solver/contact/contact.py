@@ -193,6 +193,10 @@ class Contact:
             found[f"law {pair.surface.name}"] = pair.surface.piece, pair.points
         return found
 
+    def stored(self) -> float:
+        """Energy that is stored in soft contact, this rank's part."""
+        return sum(pair.stored() for pair in self.pairs)
+
     def dissipated(self) -> float:
         """Energy that the laws dissipated so far, this rank's part."""
         return sum(pair.integral(pair.law.dissipation(pair.points.trial)) for pair in self.pairs)

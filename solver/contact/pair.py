@@ -273,6 +273,11 @@ class Pair:
         share."""
         return float((self.weight * density).sum())
 
+    def stored(self) -> float:
+        """This rank's part of the energy that the law stores at points that touch."""
+        density = self.law.stored(self.opening, self.points.trial)
+        return self.integral(np.where(self.active, density, 0.0))
+
     @property
     def forces(self) -> Array:
         """Weighted contact force ``(m, d)`` of each point on its own body."""

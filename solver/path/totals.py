@@ -115,8 +115,9 @@ class Totals:
         return max(works, key=lambda name: works[name], default="")
 
     def energies(self) -> tuple[float, float]:
-        """Elastic energy and plastic dissipation of the whole."""
+        """Elastic energy, of soft contact too, and plastic dissipation of the whole."""
         parts = np.array(self.bulk.energies(self.equilibrium.displacement()))
+        parts[0] += self.contact.stored()
         stored, dissipated = self.problem.whole * self.comm.allreduce(parts)
         return float(stored), float(dissipated)
 

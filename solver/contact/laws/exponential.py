@@ -64,3 +64,9 @@ class Exponential(ContactLaw):
         by_opening[:, 0, 0] = -scale / self.clearance * (np.expm1(h) + h * np.exp(h))
         branch = np.where(h == 0, OPEN, SLIDE)
         return Response(traction, np.zeros((m, d, d)), by_opening, branch, state)
+
+    def stored(self, opening: Array, state: State) -> Array:
+        """The work of the pressure from the gap at which it begins."""
+        h = np.maximum(1 - opening[:, 0] / self.clearance, 0.0)
+        scale = self.pressure / (np.e - 1)
+        return self.clearance * scale * ((h - 1) * np.exp(h) + 1 - h**2 / 2)

@@ -181,6 +181,10 @@ class ContactLaw(Protocol):
         """The law with two components of slip and shear; None if a law of slip has none."""
         return None if self.has_friction or self.counts_slip else self
 
+    def stored(self, opening: Array, state: State) -> Array | float:
+        """Energy that is stored in the contact per area ``(m,)``, as a soft layer does."""
+        return 0.0
+
     def dissipation(self, state: State) -> Array | float:
         """Energy dissipated so far per area ``(m,)``."""
         return 0.0

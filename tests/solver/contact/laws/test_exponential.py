@@ -35,6 +35,15 @@ def test_the_derivative_is_a_difference_and_the_ends_are_the_parameters():
     np.testing.assert_array_equal(_pressure(gap).branch > 0, gap < 0.01)
 
 
+def test_the_stored_energy_is_the_work_of_the_pressure():
+    gap = np.linspace(-0.02, 0.02, 8)
+    opening = np.stack([gap, np.zeros_like(gap)], axis=1)
+    h = np.array([1e-6, 0.0])
+    slope = (LAW.stored(opening + h, None) - LAW.stored(opening - h, None)) / (2 * h[0])
+    np.testing.assert_allclose(slope, -_pressure(gap).traction[:, 0], rtol=1e-7, atol=1e-7)
+    assert LAW.stored(np.array([[0.01, 0.0]]), None) == pytest.approx(0.0)
+
+
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_parameters_that_make_no_law_are_refused(value):
     for name in ("pressure", "clearance"):
@@ -62,7 +71,7 @@ def strips(law, *, down=0.03, steps=3) -> archord.Problem:
 def test_strips_follow_the_closed_form_and_the_folder_has_the_words(comm, tmp_path):
     """The pressure p of the law at the gap that is left: ``0.02 - down + 2 p/E``."""
     folder = comm.bcast(tmp_path) / "run"
-    run = archord.solve(strips(LAW), folder, comm=comm)
+    run = archord.solve(strips(LAW, steps=12), folder, comm=comm)
 
     def excess(p):
         return _pressure(0.02 - 0.03 + 2 * p / E).traction[0, 0] - p
@@ -70,6 +79,8 @@ def test_strips_follow_the_closed_form_and_the_folder_has_the_words(comm, tmp_pa
     pressure = brentq(excess, 0.0, 100.0, xtol=1e-12)
     assert -run.columns["press force"][-1] == pytest.approx(2 * pressure, rel=1e-8)
     assert run.columns["contact force y"][-1] == pytest.approx(-2 * pressure, rel=1e-8)
+    assert run.columns["elastic_energy"][-1] == pytest.approx(run.columns["work"][-1], rel=3e-3)
+    assert not run.warnings
     section = run.scene.interaction[0]
     assert section.law == "exponential"
     assert section.parameters == {"pressure": 50.0, "clearance": 0.01}
