@@ -3,31 +3,20 @@ work-precision``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, OURS, Point, points
+from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, Point, points
+from archord.benchmarks.cost.work_precision_picture import STEM, cases, draw, short_table
 from archord.benchmarks.timing import Said, Timing, time_all
 from archord.geometry.basis import Array
-from archord.report.figure import new_figure, save
-from archord.report.files import replacing, write_report
-from archord.report.table import Table
+from archord.report.files import replacing, write_rows
 
-Pairs = list[tuple[float, float]]
-LEVELS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7)
-NAMES = {
-    "P": "P",
-    "p0": "p0",
-    "eps": "contact angle",
-    "profile": "pressure profile (L2)",
-    "dissipation": "plastic dissipation",
-}
-_FLOOR = 1e-9  # an error of zero has no place on a logarithmic axis
+NAMES = ("P", "p0", "eps", "profile", "dissipation")
 
 
 @dataclass(frozen=True)
@@ -72,68 +61,26 @@ def profile_error(pressure: Array, reference: Array) -> float:
     return float(np.sqrt(difference / np.trapezoid(reference**2, ANGLES)))
 
 
-def series_of(lines: Sequence[Line]) -> dict[tuple[str, str], list[Line]]:
-    """The lines of one case by code and series, each from coarse to fine, as given."""
-    found: dict[tuple[str, str], list[Line]] = {}
-    for line in lines:
-        found.setdefault((line.point.code, line.point.series), []).append(line)
-    return found
-
-
-def envelopes(lines: Sequence[Line]) -> dict[str, Pairs]:
-    """Per code the best of all its series in one case: pairs (seconds, error of P), where an error
-    counts from the mesh on from which its series stays below it."""
-    found: dict[str, Pairs] = {}
-    for (code, _), members in series_of(lines).items():
-        known = [line for line in members if "P" in line.errors]
-        seconds = [line.timing.median for line in known]
-        errors = lasting([line.errors["P"] for line in known])
-        if known:
-            found.setdefault(code, []).extend(zip(seconds, errors, strict=True))
-    return {code: envelope(pairs) for code, pairs in found.items()}
-
-
-def lasting(errors: Sequence[float]) -> list[float]:
-    """The errors of a series, coarse to fine, each as large as any on a finer mesh: one that passes
-    through zero on its mesh proves nothing of the method."""
-    return [max(errors[k:]) for k in range(len(errors))]
-
-
-def envelope(pairs: Iterable[tuple[float, float]]) -> Pairs:
-    """Those of the pairs (seconds, error) that no other beats in both, in the order of their
-    seconds."""
-    ordered = sorted(pairs)
-    return [
-        pair for k, pair in enumerate(ordered) if all(pair[1] < error for _, error in ordered[:k])
-    ]
-
-
-def seconds_at(error: float, kept: Pairs) -> float | None:
-    """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there.
-    Errors above the cheapest point's cost what that point costs."""
-    if not kept or error < kept[-1][1]:
-        return None
-    seconds, errors = np.log(np.maximum(kept, 1e-300)).T
-    return float(np.exp(np.interp(np.log(error), errors[::-1], seconds[::-1])))
-
-
 def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
-    """Write a table of points, as CSV and Markdown, and a diagram for each case; returns the tables
-    and the files."""
-    texts = []
+    """Write the points of each case as CSV, and a short table and a picture of all cases of
+    ``folder``; returns the table and the files."""
+    folder.mkdir(parents=True, exist_ok=True)
     files = []
-    for case, given in CASES.items():
-        some = [line for line in lines if line.point.case == case]
-        if not some:
-            continue
-        rows = [row(line) for line in some]
-        codes = dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in some)
-        head = f"**{given['title']}**: {', '.join(codes)}\n"
-        text = "\n".join([head, Table.of(rows).markdown(), *ratios(envelopes(some))])
-        texts.append(text)
-        picture = partial(draw, case, some)
-        files += write_report(folder, f"work_precision_{case}", rows, text, picture)
-    return "\n".join(texts), files
+    for case in CASES:
+        rows = [row(line) for line in lines if line.point.case == case]
+        if rows:
+            files.append(folder / f"{STEM}{case}.csv")
+            write_rows(rows, files[-1])
+    tables = cases(folder)
+    codes = dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in lines)
+    parts = [f"{', '.join(codes)}\n"]
+    parts += [f"**{case}**\n\n{short_table(table)}" for case, table in tables.items()]
+    text = "\n".join(parts)
+    files += [folder / "work_precision.md", folder / "work_precision.png"]
+    with replacing(files[-2]) as new:
+        new.write_text(text, encoding="utf-8")
+    draw(tables, files[-1])
+    return text, files
 
 
 def row(line: Line) -> dict[str, object]:
@@ -161,73 +108,10 @@ def row(line: Line) -> dict[str, object]:
         entries["P/(E* R)"] = f"{found['P']:.8f}"
     for name in quantities(point.case):
         entries[f"error of {name}"] = f"{errors[name]:.1e}" if name in errors else ""
+    entries["error of the reference"] = CASES[point.case]["current"]["P"][1]
     return entries | {"failure": line.timing.failure}
 
 
 def quantities(case: str) -> list[str]:
     """What ``case`` is judged by."""
     return [name for name in NAMES if name == "profile" or name in CASES[case]["current"]]
-
-
-def ratios(kept: dict[str, Pairs]) -> list[str]:
-    """Seconds at equal errors of P, of archord, and in multiples of them of the other codes."""
-    others = [code for code in kept if code != OURS]
-    if OURS not in kept or not others:
-        return []
-
-    table = Table("error of P", f"{OURS} [s]", *others)
-    for level in LEVELS:
-        ours = seconds_at(level, kept[OURS])
-        times = [seconds_at(level, kept[code]) for code in others]
-        if ours or any(times):
-            told = [_in_words(seconds, ours) for seconds in times]
-            table.add(f"{level:g}", f"{ours:.2f}" if ours else "never", *told)
-    reached = ", ".join(f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others))
-    return [table.markdown(), f"Smallest errors of P reached: {reached}.\n"]
-
-
-def _in_words(seconds: float | None, ours: float | None) -> str:
-    """How long another code takes, as a multiple of ours where that is known."""
-    if not seconds:
-        return "never"
-    return f"takes {seconds / ours:.2g} times as long" if ours else f"{seconds:.1f} s"
-
-
-def draw(case: str, lines: Sequence[Line], file: Path) -> None:
-    """Draw the errors of ``case`` over seconds (above) and dofs; grey is what the reference does
-    not know."""
-    names = quantities(case)
-    given = CASES[case]
-    codes = list(dict.fromkeys((OURS, *(line.point.code for line in lines))))
-    figure = new_figure(4.1 * len(names), 9)
-    panels = figure.subplots(2, len(names), sharey="col")
-    for number, ((code, series), members) in enumerate(series_of(lines).items()):
-        style = {
-            "color": f"C{codes.index(code)}",
-            "marker": "os^Dvph*"[number % 8],
-            "label": f"{code}, {series}",
-        }
-        for k, name in enumerate(names):
-            known = [line for line in members if name in line.errors]
-            errors = [max(line.errors[name], _FLOOR) for line in known]
-            panels[0, k].loglog([line.timing.median for line in known], errors, **style)
-            panels[1, k].loglog([line.found["dofs"] for line in known], errors, **style)
-    for k, name in enumerate(names):
-        unknown = given["profile_error"] if name == "profile" else given["current"][name][1]
-        panels[0, k].set(
-            xlabel="wall time of the whole process [s]", title=f"relative error of {NAMES[name]}"
-        )
-        panels[1, k].set(xlabel="degrees of freedom")
-        bottom = min(panels[0, k].get_ylim()[0], unknown / 2)
-        for ax in panels[:, k]:
-            ax.axhspan(bottom, unknown, color="0.9", zorder=0)
-            ax.set_ylim(bottom=bottom)
-            ax.grid(True, linewidth=0.4)
-    figure.legend(
-        *panels[0, 0].get_legend_handles_labels(),
-        loc="outside upper center",
-        ncols=4,
-        title=given["title"],
-    )
-    with replacing(file) as new:
-        save(figure, new, dots=80)

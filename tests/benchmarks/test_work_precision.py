@@ -1,4 +1,4 @@
-"""The work-precision benchmark: reference values, errors, envelopes, the codes' results, and its
+"""The work-precision benchmark: reference values, errors, fronts, the codes' results, and its
 command."""
 
 import csv
@@ -8,22 +8,19 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from archord.benchmarks.cost import work_precision_codes as codes
 from archord.benchmarks.cost.work_precision import (
     Line,
-    envelope,
-    envelopes,
-    lasting,
     profile_error,
     quantities,
-    ratios,
     row,
-    seconds_at,
     write,
 )
 from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, DATA, Point, points, profile
+from archord.benchmarks.cost.work_precision_picture import cases, front, short_table
 from archord.benchmarks.timing import Process, Run, Timing, time_all
 from archord.cli import run
 
@@ -55,28 +52,37 @@ def test_sampling_keeps_a_linear_profile():
     np.testing.assert_allclose(profile(angle, 2 - angle), 2 - ANGLES, atol=1e-12)
 
 
-def test_envelopes_keep_what_nothing_beats():
-    """Straight in log-log between points; never beyond the ends. A lucky coarse mesh counts as good
-    as the worst of those that follow."""
-    assert lasting([1e-2, 1e-6, 1e-3, 1e-4]) == [1e-2, 1e-3, 1e-3, 1e-4]
-    kept = envelope([(1, 1e-2), (2, 5e-2), (10, 1e-4), (11, 1e-4), (5, 1e-3)])
-    assert kept == [(1, 1e-2), (5, 1e-3), (10, 1e-4)]
-    for error, seconds in ((1e-3, 5), (math.sqrt(1e-3 * 1e-4), math.sqrt(50)), (0.5, 1)):
-        assert seconds_at(error, kept) == pytest.approx(seconds)
-    assert seconds_at(9e-5, kept) is seconds_at(1e-3, []) is None
+def of_codes(**codes):
+    """A table of points (seconds, error) by code."""
+    rows = [
+        {"code": code, "series": "s", "mesh": "0.1 R", "seconds": seconds, "error of P": error}
+        for code, points in codes.items()
+        for seconds, error in points
+    ]
+    known = {"dofs": 100, "MB": 10, "failure": None, "error of the reference": 1e-5}
+    return pd.DataFrame(rows).assign(**known)
 
 
-def test_ratios_of_synthetic_codes():
-    """A code that always takes ten times as long is said to; one that stops at 1e-3 never gets
-    beyond."""
+def read(tmp_path, table):
+    table.to_csv(tmp_path / "work_precision_elastic.csv", index=False)
+    return cases(tmp_path)["elastic"]
+
+
+def test_a_front_keeps_what_nothing_beats(tmp_path):
+    """A lucky coarse mesh counts as good as the worst of the meshes that follow."""
+    lucky = read(tmp_path, of_codes(a=[(1, 1e-2), (2, 1e-6), (3, 1e-3), (4, 1e-4)]))
+    assert lucky["kept"].tolist() == [1e-2, 1e-3, 1e-3, 1e-4]
+    kept = front(lucky)[["seconds", "kept"]].to_numpy().tolist()
+    assert kept == [[1, 1e-2], [2, 1e-3], [4, 1e-4]]
+
+
+def test_the_short_table_tells_the_cheapest_point_and_what_failed(tmp_path):
     ours = [(10.0**k, 10.0 ** -(k + 2)) for k in range(4)]
-    text = "\n".join(
-        ratios({"archord": ours, "slow": [(10 * s, e) for s, e in ours], "rough": ours[:2]})
-    )
-    (line,) = [line for line in text.splitlines() if line.startswith("| 0.0001 |")]
-    assert line == "| 0.0001 | 100.00 | takes 10 times as long | never |"
-    assert "rough 1.0e-03" in text
-    assert ratios({"archord": ours}) == []
+    table = of_codes(ours=ours, rough=[(10, 0.05), (math.nan, math.nan)])
+    table["failure"] = [None] * 5 + ["too slow"]
+    ours, rough = short_table(read(tmp_path, table)).splitlines()[2:]
+    assert ours.startswith("| ours | 1 s, 100 dofs, 10 MB | 10 s, 100 dofs, 10 MB |")
+    assert rough == "| rough | never | never | never | never | 5.0e-02 | s, 0.1 R: too slow |"
 
 
 def test_errors_are_against_the_reference_of_the_codes_kinematics(tmp_path):
@@ -100,16 +106,11 @@ def test_errors_are_against_the_reference_of_the_codes_kinematics(tmp_path):
         "3.333",
     )
     lines = [*ours, other, broken]
-    assert envelopes(lines) == {
-        "archord": [(0.1 / h, pytest.approx(h**2)) for h in (0.1, 0.03, 0.01)],
-        "peer": [(10.0, pytest.approx(abs(exact / fixed - 1)))],
-    }
     text, files = write(lines, tmp_path)
     assert "archord 1.0, peer 1.0" in text
-    assert "takes 1" in text
-    assert [file.name for file in files] == [
-        f"work_precision_elastic.{kind}" for kind in ("csv", "md", "png")
-    ]
+    assert "it broke" in text
+    names = ["work_precision_elastic.csv", "work_precision.md", "work_precision.png"]
+    assert [file.name for file in files] == names
 
 
 @pytest.mark.parametrize("case", CASES)
