@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,6 +18,7 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import Case, Expected, matches, side_by_side
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
+from archord.benchmarks.stability.picture import draw
 from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
 from archord.presets.views import view_of
@@ -278,8 +280,11 @@ def row(line: Line) -> dict[str, object]:
 
 
 def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
-    """Write stability.csv and stability.md into ``folder``: how many are as they should be, the
-    table, and the sentences of the runs that stopped. Returns the Markdown and the files."""
+    """Write stability.csv, stability.md and a map of the cases, stability.png, into ``folder``.
+
+    The Markdown tells how many cases are as they should be, has the table and the sentences of the
+    runs that stopped. Returns it and the files.
+    """
     rows = [row(line) for line in lines]
     converged = sum(line.result.status == "done" for line in lines)
     solvable = sum(not line.case.stops for line in lines)
@@ -294,4 +299,4 @@ def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
     if stopped:
         said = "".join(f"- {line.case.name}: {line.result.message}.\n" for line in stopped)
         text += f"\nWhat the runs that stopped said:\n\n{said}"
-    return text, write_report(folder, "stability", rows, text)
+    return text, write_report(folder, "stability", rows, text, partial(draw, rows))

@@ -7,9 +7,11 @@ import re
 from dataclasses import replace
 
 import h5py
+import pytest
 
 from archord.benchmarks.case import Expected, slug
 from archord.benchmarks.stability.cases import FILE, FINE, cases, fine_scene
+from archord.benchmarks.stability.picture import what_happened
 from archord.benchmarks.stability.run import (
     Check,
     Result,
@@ -27,6 +29,7 @@ def test_three_cases_through_the_command(tmp_path, capsys, refused):
     """Two loads of zero and one that must stop: table and summary, exit code 0."""
     assert run(["benchmark", "stability", "--only", "zero*", "-o", str(tmp_path)]) == 0
     assert "2 converged of the 2" in capsys.readouterr().out
+    assert (tmp_path / "stability.png").stat().st_size > 1000
     assert "| load | zero force | done |" in (tmp_path / "stability.md").read_text(encoding="utf-8")
     assert run(["benchmark", "stability", "--only", "pulled*", "-q", "-o", str(tmp_path)]) == 0
     assert capsys.readouterr().out == ""
@@ -104,6 +107,21 @@ def test_verdicts():
     assert judge(stops, results, {}).faults == ["went on"]
     stopped = replace(DONE, status="stopped", message="nothing resists the force (singular mode)")
     assert judge(stops, results | {"b": stopped}, {}).verdict == "stops, as it must"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "status", "iterations", "kind"),
+    [
+        ("converges", "done", 12, "up to 6 iterations a step"),
+        ("converges", "done", 13, "up to 20"),
+        ("converges", "done", 41, "more"),
+        ("stops, as it must", "stopped", 9, "no solution: stops and says why"),
+        ("stopped: no equilibrium", "stopped", 9, "not as it should be"),
+    ],
+)
+def test_the_map_tells_what_happened(verdict, status, iterations, kind):
+    row = {"verdict": verdict, "status": status, "iterations": iterations, "steps": 2}
+    assert what_happened(row)[0] == kind
 
 
 def test_blocks_of_quadrilaterals_and_triangles(tmp_path):
