@@ -154,9 +154,15 @@ def side_by_side(
 
 
 def write_table(
-    folder: Path, name: str, rows: Sequence[Row], below: str = ""
+    folder: Path,
+    name: str,
+    rows: Sequence[Row],
+    below: str = "",
+    draw: Callable[[Path], object] | None = None,
 ) -> tuple[str, list[Path]]:
     """`write_report` of a table with a text ``below``; returns the Markdown and the files, nothing
     without rows."""
-    text = Table.of(rows).markdown() + below if rows else ""
-    return text, write_report(folder, name, rows, text) if rows else []
+    if not rows:
+        return "", []
+    text = Table.of(rows).markdown() + below
+    return text, write_report(folder, name, rows, text, draw)

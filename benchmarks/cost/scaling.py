@@ -12,12 +12,14 @@ import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from archord.benchmarks.case import paper_joint, write_table
+from archord.benchmarks.cost.scaling_picture import draw
 from archord.benchmarks.timing import Process, Said, Timing, solving, time_all
 from archord.report.errors import InputError
 from archord.scene.file import resolved
@@ -192,7 +194,8 @@ def row(cost: Cost, costs: Sequence[Cost]) -> dict[str, object]:
 
 
 def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
-    """`write_table` of ``costs``, with the powers of N with which time and memory grow below it."""
+    """`write_table` of ``costs``, with the powers of N with which time and memory grow below it,
+    and a picture."""
     costs = sorted(costs, key=lambda c: (c["material"], c["dofs"], c["ranks"]))
     text = ""
     for material in ("elastic", "plastic"):
@@ -208,4 +211,5 @@ def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
         powers = [f"{name} N^{exponent(dofs, found):.2f}" for name, found in growing.items()]
         text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: "
         text += f"{', '.join(powers)}.\n"
-    return write_table(folder, "scaling", [row(cost, costs) for cost in costs], text)
+    rows = [row(cost, costs) for cost in costs]
+    return write_table(folder, "scaling", rows, text, partial(draw, costs))

@@ -80,7 +80,7 @@ def test_the_command_writes_its_table(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(scaling, "SIZES", {5_000: 0.1})
     monkeypatch.setattr(scaling, "PLASTIC_STEPS", 2)
     assert run(["benchmark", "scaling", "--ranks", "1", "-o", str(tmp_path), "-q"]) == 0
-    assert {"scaling.csv", "scaling.md"} <= {p.name for p in tmp_path.iterdir()}
+    assert {"scaling.csv", "scaling.md", "scaling.png"} <= {p.name for p in tmp_path.iterdir()}
     with (tmp_path / "scaling.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["material"] for row in rows] == ["elastic", "plastic"]
