@@ -66,6 +66,13 @@ class RunSteps:
         return f"{value:.6g} {self.run.units.get(name, '')}".rstrip()
 
     @property
+    def radius(self) -> float | None:
+        """The radius of a joint's pin that has clearance; else None."""
+        if not _is_of_joint(self.run) or self.run.scene.joint.dR <= 0:
+            return None
+        return self.run.scene.joint.radius
+
+    @property
     def units(self) -> dict[str, Any]:
         """Units of x, y and peak as numbers, the names of their units, and the length that forces
         are of, as `JointCurve` has them."""
@@ -77,6 +84,7 @@ class RunSteps:
             "length_unit": length_unit,
             "force_unit": force_unit,
             "pin_length": self.run.scene.thickness,
+            "radius": self.radius,
         }
 
     def require_rising(self, steps: np.ndarray) -> None:

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from archord.postprocess.laws.exports import dents, element
 from archord.postprocess.laws.exports.translate import (
     FUNCTIONS,
     in_c,
@@ -52,6 +53,57 @@ _FORMULA = """The force P and dP/d(delta) follow from the displacement delta by 
 loading: deepest, the largest delta of all accepted steps, changes nothing, as the law knows no way
 back. Beyond RANGE, up to which the law was fitted, the formula goes on, which is a guess; the
 stiffness is nan there, and both are nan of nan."""
+
+
+_ELEMENT = """The force element gives force and torque on the pin, with their derivatives, from the
+eccentricity e of the pin in the hole, its rate v and the relative angular velocity. It remembers
+the deepest displacement of each of its sectors; trial steps leave this memory as it is."""
+# what an element adds to the functions of algorithm.py
+_ELEMENT_FUNCTIONS = ["forces", "sector_deeper", "hunt_crossley", "lankarani_nikravesh"]
+_INNER = {"deeper", "forces", "sector_deeper"}  # which users do not call
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Damping and friction that an exported force element has unless it is told others.
+
+    Parameters
+    ----------
+    damping : float
+        c of the factor ``1 + c d(delta)/dt`` of the force.
+    mu_static, mu_dynamic : float
+        The coefficients of friction, of which the static one is not smaller.
+    stick_speed : float
+        The slip speed up to which friction rises.
+
+    Raises
+    ------
+    ValueError
+        For values that no contact has.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.exports.export import Contact
+    >>> Contact(mu_static=0.2, mu_dynamic=0.15, stick_speed=1.0).damping
+    0.0
+    """
+
+    damping: float = 0.0
+    mu_static: float = 0.0
+    mu_dynamic: float = 0.0
+    stick_speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if not 0 <= self.damping < np.inf:
+            raise ValueError(f"damping = {self.damping:g} must be a number that is not negative.")
+        if not 0 <= self.mu_dynamic <= self.mu_static < np.inf:
+            raise ValueError(
+                f"friction of {self.mu_static:g} (static) and {self.mu_dynamic:g} (dynamic): the "
+                "dynamic one must not be negative, and the static one not smaller."
+            )
+        if not 0 < self.stick_speed < np.inf:
+            raise ValueError(f"stick_speed = {self.stick_speed:g} must be a positive number.")
 
 
 @dataclass(frozen=True)
@@ -144,7 +196,7 @@ _FORMS = {
     ),
     ".h": _Form(
         "c",
-        "static const int {name}_{key} = {value};",
+        "enum {{ {name}_{key} = {value} }};",
         "static const double {name}_{key} = {value};",
         "static const double {name}_{key}[] = {{\n    {value}\n}};",
         ",\n    ",
@@ -197,11 +249,14 @@ _SPOKEN = {
     "octave": "Matlab and Octave",
     "javascript": "JavaScript",
 }
+_ELEMENT_NUMBERS: Tables = {
+    key: getattr(element, key) for key in ("SECTORS", "SECTOR", "SMOOTHED", "FADED")
+}
 _UNKNOWN_END = 1e300  # of the range of a law that does not tell it
 _LONGEST = 63  # characters of a name in Matlab, and those that C99 tells apart
 
 
-def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
+def export_law(law: JointCurve | FittedLaw, target: Path, contact: Contact | None = None) -> str:
     """The text of a file with the law of one joint, for another program.
 
     Parameters
@@ -212,6 +267,8 @@ def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
         The file, which is not written. Its suffix names the language: .py, .h (C99), .mo
         (Modelica), .m (Matlab, Octave), .mjs (a module of JavaScript) or .json. Its stem becomes
         the name of the law, but in JSON.
+    contact : Contact
+        Damping and friction of the force element; None is neither.
 
     Returns
     -------
@@ -248,11 +305,14 @@ def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
     _check_name(target, form.template)
     functions, used = select(program.functions, program.flags)
     used |= {"RANGE", "REACH"}
+    if "forces" in program.functions:
+        used.add("SECTORS")
     numbers = {key: values for key, values in program.numbers.items() if key in used}
     _check(numbers)
     for key in ("length_unit", "force_unit", "pin_length"):
         numbers[key.upper()] = getattr(program, key)
     title = program.about["title"]
+    parts = _element_parts(form.template, name, program, contact or Contact())
     return Template(_TEMPLATES[form.template].lstrip()).substitute(
         name=name,
         title=title.replace("\\", "/").replace('"', "'"),
@@ -263,9 +323,21 @@ def export_law(law: JointCurve | FittedLaw, target: Path) -> str:
         handles="\n".join(
             f"    the_law.{function} = @{function};"
             for function in program.functions
-            if function != "deeper"
-        ),
+            if function not in _INNER
+        )
+        + parts["handles"],
+        element=parts["element"],
     )
+
+
+def _element_parts(language: str, name: str, program: Program, contact: Contact) -> dict[str, str]:
+    """What surrounds the force element: functions, and Octave's handles; empty without one."""
+    if "forces" not in program.functions:
+        return {"element": "", "handles": ""}
+    given = {"name": name} | {key: repr(float(value)) for key, value in vars(contact).items()}
+    wanted = {"element": f"{language}_element", "handles": f"{language}_handles"}
+    texts = {key: _TEMPLATES.get(template, "") for key, template in wanted.items()}
+    return {key: Template(text.rstrip()).substitute(given) for key, text in texts.items()}
 
 
 def _check_name(target: Path, language: str) -> None:
@@ -320,13 +392,24 @@ def _of_tables(curve: JointCurve) -> Program:
         "WIDEST": float(curve.widest),
     }
     functions = ["force", "deeper", "residual", "expected_error"]
+    rule = _STATE if curve.yields else f"{_STATE} {_ELASTIC}"
+    if curve.radius is not None:
+        functions += [*_ELEMENT_FUNCTIONS, "stored_energy"]
+        rule = f"{rule} {_ELEMENT}"
+        numbers |= _ELEMENT_NUMBERS | {"RADIUS": curve.radius}
+        shift, shift_slope = dents.shift(curve)
+        arrays |= {
+            "SHIFT": length * shift,
+            "SHIFT_SLOPE": shift_slope,
+            "STORED": length * force * dents.stored(curve),
+        }
     if np.isfinite(curve.peak).all():
         functions.append("peak_pressure")
     if np.isfinite(curve.angle).all():
         functions.append("contact_angle")
     return Program(
         about={"title": "law of a pin joint"} | curve.about,
-        rule=_STATE if curve.yields else f"{_STATE} {_ELASTIC}",
+        rule=rule,
         functions=functions,
         flags={
             "WITH_TOUCH": curve.touch.size > 0,
@@ -347,10 +430,11 @@ def _of_formula(law: FittedLaw) -> Program:
     end = law.fitted_range[1] * law.dR or _UNKNOWN_END
     return Program(
         about=law.about,
-        rule=_FORMULA,
-        functions=["force", "deeper"],
+        rule=f"{_FORMULA} {_ELEMENT}",
+        functions=["force", "deeper", *_ELEMENT_FUNCTIONS],
         flags={"WITH_CHORD": True, "WITH_PLATEAU": plastic, "WITH_WAY_BACK": False},
-        numbers={
+        numbers=_ELEMENT_NUMBERS
+        | {
             "RANGE": end,
             "REACH": end * (1 + ROUND_OFF),
             "LENGTH": law.dR,

@@ -1,5 +1,5 @@
-"""The functions of ``algorithm.py`` in other languages: their syntax trees, pruned and printed line
-by line."""
+"""The functions of ``algorithm.py`` and ``element.py`` in other languages: their syntax trees,
+pruned and printed line by line."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
-from archord.postprocess.laws.exports import algorithm
+from archord.postprocess.laws.exports import algorithm, element
 
-_TREE = ast.parse(inspect.getsource(algorithm))
-FUNCTIONS = {node.name: node for node in _TREE.body if isinstance(node, ast.FunctionDef)}
-TABLES = {name for name in vars(algorithm) if name.isupper()}
+_TREES = [ast.parse(inspect.getsource(module)) for module in (algorithm, element)]
+FUNCTIONS = {
+    node.name: node for tree in _TREES for node in tree.body if isinstance(node, ast.FunctionDef)
+}
+TABLES = {name for module in (algorithm, element) for name in vars(module) if name.isupper()}
 
 
 def select(wanted: list[str], flags: dict[str, bool]) -> tuple[list[ast.FunctionDef], set[str]]:
@@ -69,6 +71,7 @@ class Language:
     types: dict[str, str]
     table: str = "{}"
     function: str = "{}"
+    between: str = ", "
 
     def expression(self, node: ast.AST) -> str:
         """An expression of ``algorithm.py``."""
@@ -80,9 +83,10 @@ class Language:
 
     def _statement(self, node: ast.stmt) -> list[str]:
         match node:
-            case ast.Assign(targets=[ast.Tuple(elts=[first, second])], value=value):
+            case ast.Assign(targets=[ast.Tuple(elts=[first, *more])], value=value):
                 open_call = self.expression(value)[:-1]
-                return [self.several.format(ast.unparse(first), ast.unparse(second), open_call)]
+                others = self.between.join(ast.unparse(name) for name in more)
+                return [self.several.format(ast.unparse(first), others, open_call)]
             case (
                 ast.Assign(targets=[target], value=value)
                 | ast.AnnAssign(target=target, value=ast.expr() as value)
@@ -177,7 +181,7 @@ def in_python(node: ast.FunctionDef, name: str) -> str:
 
 
 def in_c(node: ast.FunctionDef, name: str) -> str:
-    """The function in C99; the second of two results by a pointer."""
+    """The function in C99; all results but the first by pointers."""
     f = Signature.of(node)
     c = _c(f"{name}_")
     result, *more = f.outputs
@@ -231,7 +235,7 @@ def in_javascript(node: ast.FunctionDef, name: str) -> str:
 
 def _c(prefix: str) -> Language:
     return Language(
-        words={"min": "fmin", "max": "fmax", "abs": "fabs"},
+        words={"min": "fmin", "max": "fmax", "abs": "fabs", "int": "(int)"},
         base=0,
         entry="{}[{}]",
         half="({}) / 2",
@@ -245,11 +249,12 @@ def _c(prefix: str) -> Language:
         types={"Table": "const double *", "float": "double ", "int": "int "},
         table=f"{prefix}{{}}",
         function=f"{prefix}{{}}",
+        between=", &",
     )
 
 
 MODELICA = Language(
-    words={},
+    words={"int": "integer"},
     base=1,
     entry="{}[{}]",
     half="div({}, 2)",
@@ -265,7 +270,7 @@ MODELICA = Language(
 )
 
 OCTAVE = Language(
-    words={},
+    words={"int": "floor"},
     base=1,
     entry="{}({})",
     half="floor(({}) / 2)",
@@ -287,6 +292,10 @@ JAVASCRIPT = Language(
         "abs": "Math.abs",
         "sqrt": "Math.sqrt",
         "log": "Math.log",
+        "sin": "Math.sin",
+        "cos": "Math.cos",
+        "atan2": "Math.atan2",
+        "int": "Math.floor",
     },
     base=0,
     entry="{}[{}]",

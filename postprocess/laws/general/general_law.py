@@ -80,7 +80,14 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
         "expected error": "unknown" if reason else _error_in_words(law),
     }
     pressure = joint.unit / joint.radius
-    return replace(law, length=joint.clearance, force=joint.unit, pressure=pressure, about=about)
+    return replace(
+        law,
+        length=joint.clearance,
+        force=joint.unit,
+        pressure=pressure,
+        about=about,
+        radius=joint.radius,
+    )
 
 
 def _error_in_words(law: JointCurve) -> str:

@@ -33,7 +33,8 @@ from archord.report.readable import json_of
 _ITERATIONS = 6
 _INSIDE = 1 + 1e-9  # of the last node, but for round-off
 _NUMBER = 1e300  # beyond it nothing is a displacement
-_NEWER = ("length_unit", "force_unit", "pin_length")  # which files of earlier versions lack
+# which files of earlier versions lack
+_NEWER = ("length_unit", "force_unit", "pin_length", "radius")
 _BEND = np.sqrt(2) - 1
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
@@ -88,6 +89,8 @@ class JointCurve:
         Names of the units of displacement and force.
     pin_length : float
         The length of the pin that carries the force; 1 for forces per unit length.
+    radius : float
+        The radius of the pin, in the unit of ``length``; None if unknown.
 
     Examples
     --------
@@ -125,6 +128,7 @@ class JointCurve:
     length_unit: str = "unit of R"
     force_unit: str = "unit of E* times unit of R"
     pin_length: float = 1.0
+    radius: float | None = None
 
     @property
     def yields(self) -> bool:

@@ -9,7 +9,8 @@ from typing import Any
 
 def functions_of(package: str) -> dict[str, Any]:
     """The package's functions and tables by name; tables count from 1, and asserts are left out."""
-    lines = ["from math import log, sqrt", "def div(a, b): return a // b"]
+    lines = ["from math import atan2, cos, floor as integer, log, sin, sqrt"]
+    lines.append("def div(a, b): return a // b")
     for name, value in re.findall(
         r"constant (?:Real|Integer) (\w+)(?:\[\d+\])? = (.*?);", package, re.S
     ):
