@@ -1,0 +1,117 @@
+"""Many joints at once: tables of joints in, forces out; a joint outside the range costs its own row
+alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint_curve import JointCurve
+
+KNOWN = tuple(field.name for field in fields(LawJoint))
+
+
+class Loads(NamedTuple):
+    """What the law says of ``n`` joints; a row with a reason is nan.
+
+    - ``load``, ``error`` ``(n,)`` or ``(n, k)``: forces, and errors that 9 in 10 joints keep
+    - ``reason`` ``(n,)``: why a joint has no forces, empty if it has
+    """
+
+    load: Array
+    error: Array
+    reason: npt.NDArray[np.object_]
+
+
+def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLike = 0.0) -> Loads:
+    """The forces of many joints by the general law.
+
+    Parameters
+    ----------
+    joints : DataFrame or dict of arrays
+        Columns ``(n,)`` named as the parameters of `LawJoint`, and numbers or words that hold for
+        all rows. A missing value (nan, None) is the default of the parameter.
+    delta : array (n,) or (n, k), or float
+        Displacements of each joint, in the unit of its clearance.
+    deepest : array (n,) or (n, k), or float
+        The largest displacements before.
+
+    Returns
+    -------
+    Loads
+        Forces per unit length, their expected errors, and a reason for each row without.
+
+    Raises
+    ------
+    ValueError
+        For columns that no joint has, and for arrays of different lengths.
+
+    Examples
+    --------
+    >>> from archord.postprocess.laws.general.many import loads
+    >>> joints = {"radius": 10.0, "E_star": 115e3, "plane": "strain", "nu": 0.3}
+    >>> found = loads(joints | {"clearance": [0.05, 0.1, 1.0]}, delta=0.05)
+    >>> found.load.round()
+    array([6341., 5065.,   nan])
+    >>> found.reason[2]
+    'archord: dR/R = 0.1 is outside 0.001 to 0.02'
+    """
+    rows = _rows(joints)
+    n = len(rows)
+    delta = np.asarray(delta, float)
+    shape = np.broadcast_shapes(delta.shape, np.shape(deepest))
+    shape = (n, *shape[1:])
+    deltas = np.broadcast_to(delta, shape)
+    deepests = np.broadcast_to(np.asarray(deepest, float), shape)
+    load = np.full(shape, np.nan)
+    error = np.full(shape, np.nan)
+    reason = np.full(n, "", dtype=object)
+    for row, given in enumerate(rows):
+        try:
+            law = _law(given)
+        except (TypeError, ValueError) as fault:
+            reason[row] = str(fault).removesuffix(".")
+            continue
+        farthest = max(np.max(deltas[row], initial=0.0), np.max(deepests[row], initial=0.0))
+        if farthest > law.limit * law.reach / law.x[-1]:
+            reason[row] = f"archord: delta = {farthest:g} is beyond {law.limit:g}, 3 dR"
+            continue
+        state = law.at(deltas[row], deepests[row])
+        load[row] = state.load
+        error[row] = state.error
+    return Loads(load, error, reason)
+
+
+def _rows(joints: Mapping[str, Any]) -> list[tuple[tuple[str, Any], ...]]:
+    """The parameters of each joint that are given."""
+    columns = {str(name): np.asarray(joints[name]) for name in joints}
+    unknown = [name for name in columns if name not in KNOWN]
+    if unknown:
+        raise ValueError(f"{', '.join(unknown)}: no parameter of a joint; {', '.join(KNOWN)} are.")
+    try:
+        every = np.broadcast_arrays(*map(np.atleast_1d, columns.values()))
+    except ValueError:
+        lengths = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
+        raise ValueError(f"joints: columns of different lengths: {lengths}.") from None
+    values = zip(*(column.tolist() for column in every), strict=True)
+    return [
+        tuple(pair for pair in zip(columns, row, strict=True) if _is_given(pair[1]))
+        for row in values
+    ]
+
+
+def _is_given(value: Any) -> bool:
+    return value is not None and value == value
+
+
+@lru_cache(maxsize=4096)
+def _law(given: tuple[tuple[str, Any], ...]) -> JointCurve:
+    """The law of the joint with the parameters ``given``. Raises ValueError, TypeError."""
+    return general_law(LawJoint(**dict(given)))

@@ -1,0 +1,56 @@
+"""Forces of many joints at once."""
+
+import numpy as np
+import pytest
+
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.general.many import loads
+
+SAME = {"radius": 10.0, "E_star": 115e3, "plane": "strain", "nu": 0.3}
+
+
+def test_each_row_is_the_law_of_its_joint_and_faults_stay_in_their_rows():
+    """A joint outside the range, one beyond the table and one that is none have nan and a
+    reason."""
+    given = {"clearance": [0.05, 0.04, 1.0, -1.0, 0.05], "block_yield": [np.nan, 300, 1, 1, 300]}
+    delta = np.array([0.05, 0.08, 0.05, 0.05, 0.2])
+    found = loads(SAME | given, delta)
+    joint = LawJoint(**SAME, clearance=0.04, block_yield=300.0)
+    assert found.load[1] == general_law(joint).at(0.08).load
+    assert found.load[0] == general_law(LawJoint(**SAME, clearance=0.05)).at(0.05).load
+    assert np.isnan(found.load[2:]).all()
+    assert [*found.reason[:2]] == ["", ""]
+    assert "dR/R = 0.1 is outside" in found.reason[2]
+    assert "clearance = -1 must be a positive number" in found.reason[3]
+    assert "beyond 0.15, 3 dR" in found.reason[4]
+
+
+def test_a_frame_is_a_table_of_joints():
+    """Columns of words and missing values too; ways back have a deepest displacement."""
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(
+        {
+            "radius": 10.0,
+            "clearance": [0.05, 0.06],
+            "E_star": 115e3,
+            "plane": ["strain", "stress"],
+            "nu": 0.3,
+            "pin_yield": [250.0, None],
+            "block_yield": 250.0,
+        }
+    )
+    delta = np.array([[0.02, 0.08, 0.06], [0.02, 0.08, 0.06]])
+    deepest = np.array([0.0, 0.0, 0.08])
+    found = loads(frame, delta, np.broadcast_to(deepest, delta.shape))
+    law = general_law(LawJoint(10.0, 0.06, 115e3, plane="stress", nu=0.3, block_yield=250.0))
+    assert found.load[1] == pytest.approx(law.at(delta[1], deepest).load, rel=1e-12)
+    assert (found.load[:, 2] < found.load[:, 1]).all()
+    assert not found.reason.any()
+
+
+def test_unknown_columns_and_lengths_are_refused():
+    with pytest.raises(ValueError, match="gap: no parameter of a joint"):
+        loads(SAME | {"clearance": 0.05, "gap": 1.0}, 0.05)
+    with pytest.raises(ValueError, match="different lengths"):
+        loads(SAME | {"clearance": [0.05, 0.06], "nu": [0.1, 0.2, 0.3]}, 0.05)
