@@ -30,14 +30,14 @@ from archord.report.errors import InputError
     "exports",
     type=Path,
     multiple=True,
-    help="write the fitted law: .py .h .mo .m .mjs .json",
+    help="write the fitted law: .py .h .mo .m .mjs .fmu .json",
 )
 @click.option(
     "--table",
     "tables",
     type=Path,
     multiple=True,
-    help="write P(delta) of one run, and back: .json .py .h .mo .m .mjs",
+    help="write P(delta) of one run, and back: .json .py .h .mo .m .mjs .fmu",
 )
 @click.option(
     "--of", help="--table: the load of a general scene that P and delta are of, if it has several"

@@ -87,7 +87,7 @@ def laws() -> int:
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), "
-    ".mjs (JavaScript) or .json",
+    ".mjs (JavaScript), .fmu (FMI 2.0) or .json",
 )
 @flag("--force", "overwrite exports")
 @sentences()

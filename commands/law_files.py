@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from archord.postprocess.laws.fitted_law import FittedLaw
     from archord.postprocess.laws.general.joint_curve import JointCurve
 
-Text = tuple[Path, Callable[[], str]]  # a file, and what makes its text
+Text = tuple[Path, Callable[[], str | bytes]]  # a file, and what makes its content
 
 
 @contextmanager
@@ -36,8 +37,15 @@ def warn(*messages: str) -> None:
 def exports_of(law: JointCurve | FittedLaw, targets: Iterable[Path]) -> list[Text]:
     """The files ``targets`` with a law, for `write`."""
     from archord.postprocess.laws.exports.export import export_law
+    from archord.postprocess.laws.exports.fmu import export_fmu
 
-    return [(target, partial(export_law, law, target)) for target in targets]
+    texts: list[Text] = []
+    for target in targets:
+        if target.suffix == ".fmu":
+            texts.append((target, partial(export_fmu, law, target)))
+        else:
+            texts.append((target, partial(export_law, law, target)))
+    return texts
 
 
 def write(texts: list[Text], inputs: list[Path], force: bool) -> list[Path]:
@@ -50,7 +58,11 @@ def write(texts: list[Text], inputs: list[Path], force: bool) -> list[Path]:
         check_target(target, inputs, force=force)
     if len({target.resolve() for target in targets}) < len(targets):
         raise InputError(f"{targets[0]}: is named for two files; choose different ones.")
-    for target, text in [(target, text()) for target, text in texts]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        contents = [make() for _, make in texts]
+    for target, content in zip(targets, contents, strict=True):
         with writing(target) as new:
-            new.write_text(text, encoding="utf-8", newline="")
+            new.write_bytes(content.encode() if isinstance(content, str) else content)
+    warn(*(str(warning.message) for warning in caught))
     return targets

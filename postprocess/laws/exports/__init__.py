@@ -1,1 +1,2 @@
-"""A joint's law as a file for other programs: Python, C, Modelica, Matlab/Octave and JSON."""
+"""A joint's law as a file for other programs: Python, C, Modelica, Matlab/Octave, JavaScript,
+JSON and FMU."""

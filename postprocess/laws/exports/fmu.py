@@ -1,0 +1,310 @@
+"""A joint's law as an FMU (FMI 2.0): the C header of the law, ``fmu.c`` around it, a description,
+and a library for Linux where a C compiler is at hand.
+
+The file depends on the law and the compiler alone: times within the archive are fixed, and the GUID
+is a hash of the contents.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shlex
+import subprocess
+import tempfile
+import uuid
+import warnings
+import zipfile
+from dataclasses import dataclass
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from xml.etree import ElementTree
+
+from archord.postprocess.laws.exports.export import Program, export_law
+from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.report.version import VERSION
+
+_SOURCE = Path(__file__).with_name("fmu.c")
+_MODEL = """/* What fmu.c has to know of the law {name}. */
+#include "{name}.h"
+
+#define LAW(name) {name}_##name
+#define WITH_ERROR {error:d}
+#define CLEARANCE {clearance!r}
+"""
+_GUID = '#define GUID "{guid}"\n'
+_LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "inch": 0.0254}  # in m
+_FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}  # in N
+_FLAGS = ["-std=c99", "-O2", "-fPIC", "-shared", "-s", "-Wl,--build-id=none"]
+_ABILITIES = {  # of both kinds of FMU
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+    "providesDirectionalDerivative": "true",
+}
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that a zip can hold
+
+
+@dataclass(frozen=True)
+class _Variable:
+    """A variable of the FMU; variables have the order of the value references in ``fmu.c``."""
+
+    name: str
+    causality: str
+    unit: str  # of _units
+    meaning: str
+    start: float | None = None
+    depends: tuple[str, ...] = ()  # on which inputs
+    from_start: tuple[str, ...] = ()  # on which variables in addition while it is initialized
+
+
+_VARIABLES = (
+    _Variable(
+        "delta",
+        "input",
+        "length",
+        "displacement of the pin towards the hole, 0 at first touch",
+        0.0,
+    ),
+    _Variable(
+        "delta_rate",
+        "input",
+        "speed",
+        "rate of delta, by which a solver finds where the joint turns back; may stay 0",
+        0.0,
+    ),
+    _Variable("length", "parameter", "length", "length of the pin", 1.0),
+    _Variable(
+        "deepest_start", "parameter", "length", "deepest displacement before the simulation", 0.0
+    ),
+    _Variable(
+        "P",
+        "output",
+        "force",
+        "force, total",
+        None,
+        ("delta",),
+        ("length", "deepest_start"),
+    ),
+    _Variable(
+        "stiffness",
+        "output",
+        "stiffness",
+        "dP/d(delta); nan beyond the range of the law",
+        None,
+        ("delta",),
+        ("length", "deepest_start"),
+    ),
+    _Variable(
+        "deepest",
+        "output",
+        "length",
+        "deepest displacement so far",
+        None,
+        ("delta",),
+        ("deepest_start",),
+    ),
+    _Variable(
+        "residual",
+        "output",
+        "length",
+        "displacement at which the joint opens on its way back",
+        None,
+        ("delta",),
+        ("deepest_start",),
+    ),
+    _Variable(
+        "expected_error",
+        "output",
+        "force",
+        "error of P below which 9 of 10 joints stay",
+        None,
+        ("delta",),
+        ("length", "deepest_start"),
+    ),
+)
+_OF_ERROR = ("residual", "expected_error")  # which only some laws tell
+
+
+def export_fmu(law: JointCurve | FittedLaw, target: Path) -> bytes:
+    """The content of a file with the law of one joint as an FMU.
+
+    It warns if there is no C compiler for a library: the FMU then holds sources alone.
+
+    Parameters
+    ----------
+    law : JointCurve or FittedLaw
+        The law.
+    target : Path
+        The file, which is not written. Its stem becomes the name of the model.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ValueError
+        As `export_law` for C.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from archord.postprocess.laws.exports.fmu import export_fmu
+    >>> from archord.postprocess.laws.general.general_law import general_law
+    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
+    >>> content = export_fmu(general_law(joint), Path("pin_law.fmu"))
+    >>> content[:2]
+    b'PK'
+    """
+    name = target.stem
+    program = Program.of(law)
+    header = export_law(law, target.with_suffix(".h"))
+    has_error = "expected_error" in program.functions
+    unknown = () if has_error else _OF_ERROR
+    variables = tuple(one for one in _VARIABLES if one.name not in unknown)
+    model = _MODEL.format(name=name, error=has_error, clearance=program.numbers["LENGTH"])
+    source = _SOURCE.read_text(encoding="utf-8")
+    unsigned = "\0".join([header, model, source, _description(program, name, variables, "")])
+    digest = hashlib.sha256(unsigned.encode()).hexdigest()
+    guid = f"{{{uuid.UUID(digest[:32])}}}"
+    sources = {
+        f"{name}.h": header,
+        "model.h": model + _GUID.format(guid=guid),
+        "fmu.c": source,
+    }
+    description = _description(program, name, variables, guid)
+    contents = {"modelDescription.xml": description.encode()}
+    contents["documentation/index.html"] = f"<pre>{escape(program.header)}</pre>\n".encode()
+    contents |= {f"sources/{file}": text.encode() for file, text in sources.items()}
+    library = _library(sources, target)
+    if library:
+        contents[f"binaries/linux64/{name}.so"] = library
+    return _archive(contents)
+
+
+def _archive(contents: dict[str, bytes]) -> bytes:
+    """A zip of files by their names."""
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content)
+    return buffer.getvalue()
+
+
+def _library(sources: dict[str, str], target: Path) -> bytes | None:
+    """The sources as a library for Linux on x86-64; None, with a warning, if that cannot be."""
+    if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
+        fault = "this is not Linux on x86-64"
+    else:
+        with tempfile.TemporaryDirectory(prefix="archord-") as folder:
+            for name, text in sources.items():
+                Path(folder, name).write_text(text, encoding="utf-8")
+            command = shlex.split(os.environ.get("CC", "cc"))
+            command += [*_FLAGS, "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "fmu.c", "-o", "law.so", "-lm"]
+            try:
+                subprocess.run(command, cwd=folder, check=True, capture_output=True)
+                return Path(folder, "law.so").read_bytes()
+            except OSError:
+                fault = "no C compiler is here"
+            except subprocess.CalledProcessError:
+                fault = f"the C compiler {command[0]} failed"
+    warnings.warn(
+        f"{target.name}: {fault}, so the FMU holds sources alone, which the importing program has "
+        "to compile",
+        stacklevel=3,
+    )
+    return None
+
+
+def _description(program: Program, name: str, variables: tuple[_Variable, ...], guid: str) -> str:
+    """The text of modelDescription.xml."""
+    root = ElementTree.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=name,
+        guid=guid,
+        description=program.about["title"],
+        generationTool=f"archord {VERSION}",
+        variableNamingConvention="flat",
+        numberOfEventIndicators="1",
+    )
+    for kind, own in (
+        ("ModelExchange", {}),
+        ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"}),
+    ):
+        element = ElementTree.SubElement(root, kind, {"modelIdentifier": name} | _ABILITIES | own)
+        files = ElementTree.SubElement(element, "SourceFiles")
+        ElementTree.SubElement(files, "File", name="fmu.c")
+    units = _units(program)
+    if units:
+        definitions = ElementTree.SubElement(root, "UnitDefinitions")
+        for unit, base in dict(units.values()).items():
+            element = ElementTree.SubElement(definitions, "Unit", name=unit)
+            ElementTree.SubElement(element, "BaseUnit", base)
+    categories = ElementTree.SubElement(root, "LogCategories")
+    for category in ("logStatusWarning", "logStatusError"):
+        ElementTree.SubElement(categories, "Category", name=category)
+    starts = {"length": program.pin_length}
+    listed = ElementTree.SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(variables):
+        element = ElementTree.SubElement(
+            listed,
+            "ScalarVariable",
+            name=variable.name,
+            valueReference=str(reference),
+            causality=variable.causality,
+            variability="fixed" if variable.causality == "parameter" else "continuous",
+            description=variable.meaning,
+        )
+        real = ElementTree.SubElement(element, "Real")
+        if units:
+            real.set("unit", units[variable.unit][0])
+        if variable.start is not None:
+            real.set("start", repr(starts.get(variable.name, variable.start)))
+    _structure(ElementTree.SubElement(root, "ModelStructure"), variables)
+    ElementTree.indent(root)
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    return head + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _structure(parent: ElementTree.Element, variables: tuple[_Variable, ...]) -> None:
+    """Add the outputs and what they depend on, in the course of time and at the start."""
+    index = {variable.name: str(i) for i, variable in enumerate(variables, 1)}
+    outputs = [variable for variable in variables if variable.causality == "output"]
+    for kind, initially in (("Outputs", False), ("InitialUnknowns", True)):
+        element = ElementTree.SubElement(parent, kind)
+        for output in outputs:
+            names = output.depends + (output.from_start if initially else ())
+            ElementTree.SubElement(
+                element,
+                "Unknown",
+                index=index[output.name],
+                dependencies=" ".join(index[name] for name in names),
+            )
+
+
+def _units(program: Program) -> dict[str, tuple[str, dict[str, str]]]:
+    """Name and base of the unit of every quantity; none if the law's units are not known ones."""
+    length = program.length_unit
+    force = program.force_unit.removesuffix(f"/{length}")
+    if length not in _LENGTHS or force not in _FORCES:
+        return {}
+    metre = _LENGTHS[length]
+    newton = _FORCES[force]
+    return {
+        "length": (length, {"m": "1", "factor": repr(metre)}),
+        "speed": (f"{length}/s", {"m": "1", "s": "-1", "factor": repr(metre)}),
+        "force": (force, {"kg": "1", "m": "1", "s": "-2", "factor": repr(newton)}),
+        "stiffness": (
+            f"{force}/{length}",
+            {"kg": "1", "s": "-2", "factor": repr(newton / metre)},
+        ),
+    }
