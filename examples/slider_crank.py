@@ -1,24 +1,22 @@
-"""A slider-crank with clearance in its small end, in Exudyn: the law of the joint as its contact
-force, with impacts.
+"""A slider-crank with clearance in its small end, in Exudyn: an exported law as the force element
+of the joint, with impacts, friction and a contact that wanders.
 
     pip install exudyn
     python3 examples/slider_crank.py docs/slider_crank.png
 
 A crank of constant speed drives a slider in a plane by a rod. The slider's pin has clearance in the
-rod's hole: ``e`` goes from the hole's centre to the pin's, ``delta = |e| - dR``, and the pin is
-pressed back along e by ``P(delta, deepest) (1 + c d(delta)/dt)``, the law of the joint and what an
-oil film damps (Hunt and Crossley 1975). ``deepest``, the memory of a joint that yields, belongs to
-a place, and the contact wanders. Here one number serves for the whole hole, as if it were flattened
-all round: no spot yields twice, and the energy lost is a lower bound. (With a number for each
-impact every one would meet a fresh hole: an upper bound, in which no joint settles.) It advances
-with accepted steps, never within Newton's iterations. Units: mm, N, s, so tonnes and N mm.
+rod's hole. The element takes the eccentricity of the pin in axes of the rod, its rate and the
+relative angular velocity, and gives force and torque on the pin. It remembers by direction how deep
+the hole has been. This memory advances with accepted steps, never within Newton's iterations. The
+damping is an oil film's. Units: mm, N, s, so tonnes and N mm.
 """
 
 import sys
 from dataclasses import replace
-from math import hypot, pi
+from math import pi
 from pathlib import Path
 from time import perf_counter
+from types import ModuleType
 
 import exudyn
 import numpy as np
@@ -27,7 +25,7 @@ from matplotlib.patches import Circle
 from scipy.integrate import cumulative_trapezoid
 
 import archord
-from archord.postprocess.laws.exports.export import export_law
+from archord.postprocess.laws.exports.export import Contact, export_law
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
@@ -47,7 +45,8 @@ TURNS = 2
 ROD_MASS = 2e-3
 SLIDER_MASS = 15e-3
 ROD_INERTIA = ROD_MASS * ROD**2 / 12
-FILM = 0.002  # c [s/mm]: what comes at 100 mm/s goes back at 88
+# damping c [s/mm]: what comes at 100 mm/s goes back at 88; friction, rising to 2 mm/s of slip
+CONTACT = Contact(damping=0.002, mu_static=0.12, mu_dynamic=0.1, stick_speed=2.0)
 STEPS = 40000  # a turn: 2.5 microseconds, 1/200 of an impact
 # P in the outer dead centre, where all begins
 START = SLIDER_MASS * CRANK * SPEED**2 * (1 + CRANK / ROD) / WIDTH
@@ -58,16 +57,20 @@ def mechanism(force, start):
     and its drive."""
     mbs = exudyn.SystemContainer().AddSystem()
 
-    def body(mass, inertia, x, *velocity):
+    def body(mass, inertia, x, *velocity, moved=0.0):
         node = mbs.AddNode(
-            item.NodeRigidBody2D(referenceCoordinates=[x, 0, 0], initialVelocities=[0, *velocity])
+            item.NodeRigidBody2D(
+                referenceCoordinates=[x, 0, 0],
+                initialCoordinates=[moved, 0, 0],
+                initialVelocities=[0, *velocity],
+            )
         )
         return node, mbs.AddObject(
             item.ObjectRigidBody2D(nodeNumber=node, mass=mass, inertia=inertia)
         )
 
     def at(body, x):
-        return mbs.AddMarker(item.MarkerBodyPosition(bodyNumber=body, localPosition=[x, 0, 0]))
+        return mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=body, localPosition=[x, 0, 0]))
 
     def coordinate(node, i):
         return mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
@@ -79,13 +82,11 @@ def mechanism(force, start):
     ground = mbs.AddObject(item.ObjectGround())
     shaft, crank = body(1.0, 1.0, 0, 0, SPEED)
     _, rod = body(ROD_MASS, ROD_INERTIA, CRANK + ROD / 2, CRANK * SPEED / 2, -CRANK * SPEED / ROD)
-    guide = mbs.AddNode(
-        item.NodePoint2D(referenceCoordinates=[CRANK + ROD, 0], initialCoordinates=[start, 0])
-    )
-    slider = mbs.AddObject(item.ObjectMassPoint2D(nodeNumber=guide, mass=SLIDER_MASS))
+    guide, slider = body(SLIDER_MASS, 1.0, CRANK + ROD, 0, 0, moved=start)
     join(item.ObjectJointRevolute2D, at(ground, 0), at(crank, 0))
     join(item.ObjectJointRevolute2D, at(crank, CRANK), at(rod, -ROD / 2))
     join(item.ObjectConnectorCoordinate, fixed, coordinate(guide, 1))
+    join(item.ObjectConnectorCoordinate, fixed, coordinate(guide, 2))
     drive = join(
         item.ObjectConnectorCoordinate,
         fixed,
@@ -93,40 +94,54 @@ def mechanism(force, start):
         velocityLevel=True,
         offset=SPEED,
     )
-    spring = item.ObjectConnectorCartesianSpringDamper
-    return mbs, join(spring, at(rod, ROD / 2), at(slider, 0), springForceUserFunction=force), drive
+    spring = item.ObjectConnectorRigidBodySpringDamper
+    ends = at(rod, ROD / 2), at(slider, 0)
+    return mbs, join(spring, *ends, springForceTorqueUserFunction=force), drive
+
+
+def relative(velocity, spin, e):
+    """The rate of e in axes of the rod, whose angular velocity is less by ``spin`` than the pin's,
+    from the difference of velocities in these axes."""
+    return velocity[0] - spin * e[1], velocity[1] + spin * e[0]
 
 
 def simulate(law, start, steps=STEPS, turns=TURNS):
-    """Turn the crank with ``law(delta, deepest)`` [N/mm] in the joint, first at ``start``. Returns
-    a column a step (time, e, its rate, deepest, torque, velocities), the seconds it took, those in
-    the law, and its calls."""
-    deepest = start
+    """Turn the crank with the element of ``law``, first at ``start``.
+
+    Returns a column a step (time, e, deepest, stored energy, quasi-static force, size of the force,
+    power lost by film and friction, torque of the drive, velocities), the memory, the seconds it
+    took, those in the element, and its calls.
+    """
+    memory = law.advance_element(law.new_element(), DR + start, 0.0)
     columns = []
     calls = 0
     seconds = 0.0
     kinds = exudyn.OutputVariableType
 
-    def force(mbs, t, number, e, rate, *unused):
+    def force(mbs, t, number, displacement, rotation, velocity, spin, *unused):
         nonlocal calls, seconds
-        distance = hypot(e[0], e[1])
-        if distance <= DR:
-            return [0, 0, 0]
+        e = displacement[:2]
         begin = perf_counter()
-        P, _ = law(distance - DR, deepest)
+        (Fx, Fy, T), _ = law.element(memory, e, relative(velocity, spin[2], e), spin[2])
         seconds += perf_counter() - begin
         calls += 1
-        opening = (e[0] * rate[0] + e[1] * rate[1]) / distance
-        F = P * WIDTH * (1 + FILM * opening) / distance
-        return [F * e[0], F * e[1], 0]
+        moment = T + e[0] * Fy - e[1] * Fx  # on the rod, whose hole's centre is not the pin's
+        return [-WIDTH * Fx, -WIDTH * Fy, 0, 0, 0, -WIDTH * moment]
 
     def accept(mbs, t):
-        nonlocal deepest
-        e = mbs.GetObjectOutput(joint, kinds.Displacement)[:2]
-        rate = mbs.GetObjectOutput(joint, kinds.Velocity)[:2]
+        nonlocal memory
+        e = mbs.GetObjectOutput(joint, kinds.DisplacementLocal)[:2]
+        spin = mbs.GetObjectOutput(joint, kinds.AngularVelocityLocal)[2]
+        v = relative(mbs.GetObjectOutput(joint, kinds.VelocityLocal), spin, e)
+        (Fx, Fy, T), _ = law.element(memory, e, v, spin)
+        (Qx, Qy, _), _ = law.element(memory, e)
+        memory = law.advance_element(memory, *e)
+        lost = -WIDTH * ((Fx - Qx) * v[0] + (Fy - Qy) * v[1] + T * spin)
+        stored = WIDTH * law.stored_energy(memory, *e)
         torque = -mbs.GetObjectOutput(drive, kinds.Force)
-        columns.append((t, *e, *rate, deepest, torque, *mbs.systemData.GetODE2Coordinates_t()))
-        deepest = max(deepest, hypot(*e) - DR)
+        velocities = mbs.systemData.GetODE2Coordinates_t()
+        forces = (WIDTH * Qx, WIDTH * Qy, WIDTH * np.hypot(Fx, Fy))
+        columns.append((t, *e, max(memory), stored, *forces, lost, torque, *velocities))
         return True
 
     mbs, joint, drive = mechanism(force, DR + start)
@@ -138,31 +153,21 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
     settings.timeIntegration.numberOfSteps = turns * steps
     begin = perf_counter()
     mbs.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.TrapezoidalIndex2)
-    return np.array(columns).T, perf_counter() - begin, seconds, calls
+    return np.array(columns).T, memory, perf_counter() - begin, seconds, calls
 
 
-def energies(columns, curve):
-    """The force P [N] at all steps, and energies [N mm] by name, whose sum stays. What the joint
-    has stored is what it gives back until it opens."""
-    (t,), e, rate, (deepest,), (torque,), v = np.split(columns, [1, 3, 5, 6, 7])
-    distance = np.hypot(*e)
-    delta = np.maximum(distance - DR, 0)
-    P = curve.at(delta, deepest).load * WIDTH
-    most, where = np.unique(np.maximum(deepest, delta), return_inverse=True)
-    opens = curve.residual(most)[where]
-    half = np.maximum(delta - opens, 0) / 2
-    points, weights = np.polynomial.legendre.leggauss(12)
-    loads = curve.at(opens + half * (points[:, None] + 1), most[where]).load
-    stored = WIDTH * half * (weights @ loads)
-    lost = stored[0] - stored + cumulative_trapezoid(P, delta, initial=0)
-    film = cumulative_trapezoid(P * FILM * (e * rate).sum(0) / distance, delta, initial=0)
+def energies(columns):
+    """Energies [N mm] by name, whose sum stays. What the joint has stored is what it gives back
+    until it opens."""
+    t, x, y, _, stored, Qx, Qy, _, lost, torque, *v = columns
+    work = -cumulative_trapezoid(Qx, x, initial=0) - cumulative_trapezoid(Qy, y, initial=0)
     rod = [ROD_MASS, ROD_MASS, ROD_INERTIA]
-    masses = np.array([0, 0, 0, *rod, SLIDER_MASS, SLIDER_MASS])
-    return P, {
+    masses = np.array([0, 0, 0, *rod, SLIDER_MASS, SLIDER_MASS, 0])
+    return {
         "stored": stored,
-        "lost, law": lost,
-        "lost, film": film,
-        "kinetic": masses @ v**2 / 2,
+        "lost, law": work - stored + stored[0],
+        "lost, film and friction": cumulative_trapezoid(lost, t, initial=0),
+        "kinetic": masses @ np.square(v) / 2,
         "drive": -cumulative_trapezoid(torque * SPEED, t, initial=0),
     }
 
@@ -195,24 +200,27 @@ def table(law):
         back_error=none,
         length=DR,
         force=JOINT.unit,
+        radius=JOINT.radius,
     )
 
 
 def study(curve, steps=STEPS, turns=TURNS):
-    """The crank turned with a law, exported: columns of `simulate`, force, energies, and numbers by
-    name."""
-    module = {"__name__": "joint"}
-    exec(export_law(curve, Path("joint.py")), module)  # `archord law --export` writes it
+    """The crank turned with a law, exported: columns of `simulate`, memory, energies, and numbers
+    by name."""
+    law = ModuleType("joint")
+    # `archord law --export` writes it
+    exec(export_law(curve, Path("joint.py"), CONTACT), vars(law))
     start = float(curve.displacement(START))
-    columns, whole, inside, calls = simulate(module["force"], start, steps, turns)
-    P, parts = energies(columns, curve)
+    columns, memory, whole, inside, calls = simulate(law, start, steps, turns)
+    parts = energies(columns)
     angle = columns[0] * SPEED
-    return columns, P, parts, {
+    P = columns[7]
+    return columns, memory, parts, {
         "first impacts [kN]": f"{P[(angle > pi / 3) & (angle < pi)].max() / 1e3:.3f}",
         "largest force [kN]": f"{P.max() / 1e3:.3f}",
-        "deepest/dR": f"{columns[5, -1] / DR:.3f}",
+        "deepest/dR": f"{columns[3, -1] / DR:.3f}",
         "lost by the law [N mm]": f"{parts['lost, law'][-1]:.1f}",
-        "in the film [N mm]": f"{parts['lost, film'][-1]:.0f}",
+        "film and friction [N mm]": f"{parts['lost, film and friction'][-1]:.0f}",
         "balance": f"{np.ptp(sum(parts.values())) / parts['stored'].max():.2%}",
         "a call [us]": f"{1e6 * inside / calls:.1f}",
         "of the time": f"{inside / whole:.0%}",
@@ -223,25 +231,29 @@ def draw(runs, target):
     """First impacts, the orbit of the pin, and where the energy of the last run is."""
     figure = new_figure(14, 4.5)
     impacts, orbit, energy = figure.subplots(1, 3)
-    for name, (columns, P, *_) in runs.items():
+    for name, (columns, *_) in runs.items():
+        P = columns[7]
         angle = np.degrees(columns[0] * SPEED)
         first = (angle > 70) & (angle < 90)
         second = angle > 360
         impacts.plot(angle[first], P[first] / 1e3, lw=1, label=name)
         if name in ("elastic", "yielding"):
             orbit.plot(*columns[1:3, second] / DR, lw=0.7, label=name)
+    memory = runs[name][1]
+    directions = np.linspace(-pi, pi, len(memory) + 1)
+    remembered = 1 + np.append(memory, memory[0]) / DR
+    outline = remembered * [np.cos(directions), np.sin(directions)]
+    orbit.plot(*outline, "k", lw=0.7, label="remembered")
     parts = runs[name][2]
     total = sum(parts.values())
-    for name, values in (
-        *list(parts.items())[:3],
-        ("balance, times 100", 100 * (total - total[0])),
-    ):
+    balance = ("balance, times 100", 100 * (total - total[0]))
+    for name, values in (*list(parts.items())[:2], balance):
         energy.plot(angle, values, lw=0.7, label=name)
     orbit.add_patch(Circle((0, 0), 1, fill=False, ls=":"))
     impacts.set(
         xlabel="crank angle [degrees]", ylabel="force of the joint [kN]", title="first impacts"
     )
-    orbit.set(xlabel="$e_x$/dR", ylabel="$e_y$/dR", title="the pin in its hole", aspect="equal")
+    orbit.set(xlabel="$e_x$/dR", ylabel="$e_y$/dR", title="the pin in the hole", aspect="equal")
     energy.set(
         xlabel="crank angle [degrees]", ylabel="N mm", title="energies of the yielding joint"
     )
