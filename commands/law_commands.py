@@ -19,6 +19,7 @@ from archord.commands.options import argument, file, flag, overrides
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
+    from archord.postprocess.laws.exports.export import Contact
     from archord.postprocess.laws.general.joint import LawJoint
     from archord.postprocess.laws.law import Law, LawState
 
@@ -89,6 +90,10 @@ def laws() -> int:
     help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave), "
     ".mjs (JavaScript), .fmu (FMI 2.0) or .json",
 )
+@click.option("--damping", type=float, help="force element: c of 1 + c d(delta)/dt [0]")
+@click.option("--mu-static", type=float, help="force element: friction at the stick speed [0]")
+@click.option("--mu-dynamic", type=float, help="force element: friction beyond [--mu-static]")
+@click.option("--stick-speed", type=float, help="force element: slip speed that sticks [1]")
 @flag("--force", "overwrite exports")
 @sentences()
 def law(
@@ -102,6 +107,10 @@ def law(
     deepest: float,
     plot: Path | None,
     exports: tuple[Path, ...],
+    damping: float | None,
+    mu_static: float | None,
+    mu_dynamic: float | None,
+    stick_speed: float | None,
     force: bool,
     **given: Any,
 ) -> int:
@@ -128,7 +137,8 @@ def law(
         _require_archord("--export" if exports else "--deepest", chosen)
         _require_within(chosen[0], joint, deepest)
     if exports:
-        return _export(joint, units, thickness, exports, inputs, force)
+        contact = _contact(damping, mu_static, mu_dynamic, stick_speed)
+        return _export(joint, units, thickness, exports, contact, inputs, force)
     if plot:
         check_target(plot, inputs, force=True)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
@@ -170,11 +180,32 @@ def _sampled(
     return states, [*said, *silent]
 
 
+def _contact(
+    damping: float | None,
+    mu_static: float | None,
+    mu_dynamic: float | None,
+    stick_speed: float | None,
+) -> Contact:
+    """The contact of the options that are given."""
+    from archord.postprocess.laws.exports.export import Contact
+
+    if mu_dynamic is None:
+        mu_dynamic = mu_static
+    options = {
+        "damping": damping,
+        "mu_static": mu_static,
+        "mu_dynamic": mu_dynamic,
+        "stick_speed": stick_speed,
+    }
+    return Contact(**{name: value for name, value in options.items() if value is not None})
+
+
 def _export(
     joint: LawJoint,
     units: dict[str, str],
     thickness: float,
     exports: tuple[Path, ...],
+    contact: Contact,
     inputs: list[Path],
     force: bool,
 ) -> int:
@@ -192,7 +223,7 @@ def _export(
     if units:
         law = dataclasses.replace(law, length_unit=units["length"], force_unit=units["force"])
     law = dataclasses.replace(law, force=law.force * thickness, pin_length=thickness, about=about)
-    print(*write(exports_of(law, exports), inputs, force), sep="\n")
+    print(*write(exports_of(law, exports, contact), inputs, force), sep="\n")
     warn(*(str(warning.message) for warning in caught))
     return 0
 
@@ -225,8 +256,13 @@ def _refuse_contradictions() -> None:
         clash = [typed[name] for name in idle if name in typed]
         if option in typed and clash:
             raise InputError(f"{typed[option]}: does not go with {' or '.join(clash)}.")
-    if "force" in typed and "exports" not in typed:
+    if "exports" in typed:
+        return
+    if "force" in typed:
         raise InputError("--force: overwrites exports, and there is no --export.")
+    for name in ("damping", "mu_static", "mu_dynamic", "stick_speed"):
+        if name in typed:
+            raise InputError(f"{typed[name]}: is of an export's element, and there is no --export.")
 
 
 def _refuse_unused(chosen: list[Law], given: dict[str, Any]) -> None:

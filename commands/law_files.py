@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
+    from archord.postprocess.laws.exports.export import Contact
     from archord.postprocess.laws.fitted_law import FittedLaw
     from archord.postprocess.laws.general.joint_curve import JointCurve
 
@@ -34,8 +35,10 @@ def warn(*messages: str) -> None:
         print(f"archord: warning: {message}.", file=sys.stderr)
 
 
-def exports_of(law: JointCurve | FittedLaw, targets: Iterable[Path]) -> list[Text]:
-    """The files ``targets`` with a law, for `write`."""
+def exports_of(
+    law: JointCurve | FittedLaw, targets: Iterable[Path], contact: Contact | None = None
+) -> list[Text]:
+    """The files ``targets`` with a law, for `write`; ``contact`` of its force element."""
     from archord.postprocess.laws.exports.export import export_law
     from archord.postprocess.laws.exports.fmu import export_fmu
 
@@ -44,7 +47,7 @@ def exports_of(law: JointCurve | FittedLaw, targets: Iterable[Path]) -> list[Tex
         if target.suffix == ".fmu":
             texts.append((target, partial(export_fmu, law, target)))
         else:
-            texts.append((target, partial(export_law, law, target)))
+            texts.append((target, partial(export_law, law, target, contact)))
     return texts
 
 

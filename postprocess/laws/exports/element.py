@@ -306,7 +306,7 @@ def forces(
     none = beyond(distance, 1e300) + beyond(abs(vx) + abs(vy) + abs(omega), 1e300)
     Fx = none
     Fy = none
-    T = none
+    torque = none
     Fx_ex = none
     Fx_ey = none
     Fy_ex = none
@@ -334,7 +334,7 @@ def forces(
         side = -turn_force / distance - mu * N
         Fx = -N * nx - side * ny
         Fy = -N * ny + side * nx
-        T = -mu * N * RADIUS
+        torque = -mu * N * RADIUS
         N_e = stiffness * factor
         N_turn = (mixed * factor + P * gain * across) / distance
         mu_turn = -steep * rate / distance
@@ -358,7 +358,7 @@ def forces(
     return (
         Fx,
         Fy,
-        T,
+        torque,
         Fx_ex,
         Fx_ey,
         Fx_vx,

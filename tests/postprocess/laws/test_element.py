@@ -13,6 +13,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from archord.cli import run
 from archord.postprocess.laws.exports.export import Contact, export_law
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.general_law import general_law
@@ -371,6 +372,41 @@ def test_an_impact_comes_back_with_its_restitution(restitution: float) -> None:
         kept = c * speed - np.log(1 + c * speed)
         assert c * v - np.log(1 + c * v) == pytest.approx(kept, rel=1e-2)
         assert -v / speed == pytest.approx(restitution, abs=0.12)
+
+
+def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
+    """Python's of the force element in docs/law_exports.md, and C's, which says the same."""
+    page = (Path(__file__).parents[3] / "docs" / "law_exports.md").read_text(encoding="utf-8")
+    section = page.split("## The force element")[1]
+    code = {name: section.split(f"```{name}\n")[1].split("```")[0] for name in ("py", "cpp")}
+    curve = yielding()
+    law = python(curve)
+    space = {"lug_pin": law}
+    exec(code["py"].replace("import lug_pin\n", ""), space)
+    assert max(space["memory"]) > 0
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is not here")
+    (tmp_path / "lug_pin.h").write_text(export_law(curve, tmp_path / "lug_pin.h"))
+    body = code["cpp"] + 'printf("%.15g %.15g %.15g", force[0], force[1], force[2]);'
+    (tmp_path / "main.c").write_text(
+        '#include <stdio.h>\n#include "lug_pin.h"\nint main(void) {' + body + "}"
+    )
+    subprocess.run(["gcc", "main.c", "-o", "main", "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
+    memory = law.new_element()
+    given = {"damping": 0.002, "mu_static": 0.15, "mu_dynamic": 0.1, "stick_speed": 1.0}
+    wanted, _ = law.element(memory, space["e"], space["v"], space["omega"], **given)
+    np.testing.assert_allclose([float(word) for word in done.stdout.split()], wanted, rtol=1e-12)
+
+
+def test_options_set_the_contact_of_an_export(tmp_path: Path) -> None:
+    """They stand in the file; without --export they are refused."""
+    scene = str(Path(__file__).parents[3] / "scenes" / "steel_pin.toml")
+    target = tmp_path / "pin.h"
+    options = ["--mu-static", "0.2", "--stick-speed", "2", "--damping", "0.5"]
+    assert run(["law", "--scene", scene, "--export", str(target), *options]) == 0
+    assert "pin_CONTACT = {0.5, 0.2, 0.2, 2.0};" in target.read_text()
+    assert run(["law", "--scene", scene, *options]) == 2
 
 
 def test_contacts_that_cannot_be() -> None:
