@@ -15,7 +15,6 @@ import sys
 from dataclasses import replace
 from math import pi
 from pathlib import Path
-from time import perf_counter
 from types import ModuleType
 
 import exudyn
@@ -109,22 +108,15 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
     """Turn the crank with the element of ``law``, first at ``start``.
 
     Returns a column a step (time, e, deepest, stored energy, quasi-static force, size of the force,
-    power lost by film and friction, torque of the drive, velocities), the memory, the seconds it
-    took, those in the element, and its calls.
+    power lost by film and friction, torque of the drive, velocities), and the memory.
     """
     memory = law.advance_element(law.new_element(), DR + start, 0.0)
     columns = []
-    calls = 0
-    seconds = 0.0
     kinds = exudyn.OutputVariableType
 
     def force(mbs, t, number, displacement, rotation, velocity, spin, *unused):
-        nonlocal calls, seconds
         e = displacement[:2]
-        begin = perf_counter()
         (Fx, Fy, T), _ = law.element(memory, e, relative(velocity, spin[2], e), spin[2])
-        seconds += perf_counter() - begin
-        calls += 1
         moment = T + e[0] * Fy - e[1] * Fx  # on the rod, whose hole's centre is not the pin's
         return [-WIDTH * Fx, -WIDTH * Fy, 0, 0, 0, -WIDTH * moment]
 
@@ -151,9 +143,8 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
     settings.solution.file.write = False
     settings.timeIntegration.endTime = turns * 2 * pi / SPEED
     settings.timeIntegration.numberOfSteps = turns * steps
-    begin = perf_counter()
     mbs.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.TrapezoidalIndex2)
-    return np.array(columns).T, memory, perf_counter() - begin, seconds, calls
+    return np.array(columns).T, memory
 
 
 def energies(columns):
@@ -211,7 +202,7 @@ def study(curve, steps=STEPS, turns=TURNS):
     # `archord law --export` writes it
     exec(export_law(curve, Path("joint.py"), CONTACT), vars(law))
     start = float(curve.displacement(START))
-    columns, memory, whole, inside, calls = simulate(law, start, steps, turns)
+    columns, memory = simulate(law, start, steps, turns)
     parts = energies(columns)
     angle = columns[0] * SPEED
     P = columns[7]
@@ -222,8 +213,6 @@ def study(curve, steps=STEPS, turns=TURNS):
         "lost by the law [N mm]": f"{parts['lost, law'][-1]:.1f}",
         "film and friction [N mm]": f"{parts['lost, film and friction'][-1]:.0f}",
         "balance": f"{np.ptp(sum(parts.values())) / parts['stored'].max():.2%}",
-        "a call [us]": f"{1e6 * inside / calls:.1f}",
-        "of the time": f"{inside / whole:.0%}",
     }  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch, hermite
 
 _SAMPLES = 400  # of phi, up to its largest argument
+_FIRST = 1e-3  # of them, over the last node
 
 
 def stored(curve: JointCurve) -> Array:
@@ -73,7 +74,7 @@ def _losing(curve: JointCurve, z: Array, dz: Array, h: Array) -> tuple[Array, Ar
 
 def _phi(curve: JointCurve, h: Array) -> Array:
     """The largest ``phi`` up to ``h`` (any shape)."""
-    u = np.linspace(0.0, max(h.max(), curve.x[-1]), _SAMPLES)[1:]
+    u = np.geomspace(_FIRST * curve.x[-1], max(h.max(), curve.x[-1]), _SAMPLES)
     back, _ = curve._curve(curve.back, curve.dback, u)
     energy = _energy(curve, u)
     phi = np.maximum.accumulate(u - 2 * energy / back)
