@@ -6,7 +6,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -162,35 +161,27 @@ def test_memory_only_loses_energy(name: str) -> None:
             assert law.elastic(delta, most)[1] <= 1e-12 * unit / curve.length
 
 
-@pytest.mark.parametrize("name", ["yielding", "plane stress"])
-@pytest.mark.parametrize("seed", range(3))
-def test_no_orbit_gains_energy(name: str, seed: int) -> None:
-    """Random closed orbits, slow, without friction: the work done on the joint is not negative,
-    and on the second round, when the joint remembers all of it, it is nil."""
+@pytest.mark.parametrize("name", ["yielding", "plane strain", "plane stress"])
+def test_no_orbit_gains_energy(name: str, tmp_path: Path) -> None:
+    """Random closed orbits, slow, without friction: the work done on the joint is not negative. On
+    the second round the joint remembers all of it, and the work is nil."""
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is not here")
     curve = LAWS[name]()
-    law = python(curve)
-    rng = np.random.default_rng(seed)
-    memory = law.new_element()
-    scale = curve.force * curve.length
-    waves = np.arange(1, 5)
-    size = rng.normal(size=(2, 2, 4)) / waves
-    phase = np.linspace(0, 2 * np.pi, 1501)
-    orbit = np.einsum(
-        "akw,kwt->ta", size, [np.cos(np.outer(waves, phase)), np.sin(np.outer(waves, phase))]
+    (tmp_path / "law.h").write_text(export_law(curve, tmp_path / "law.h"))
+    shutil.copy(Path(__file__).with_name("orbits.c"), tmp_path)
+    subprocess.run(["gcc", "-O2", "orbits.c", "-o", "orbits", "-lm"], cwd=tmp_path, check=True)
+    rng = np.random.default_rng(4)
+    orbits = rng.normal(size=(2, 2, 2, 4)) / np.arange(1, 5)
+    largest = curve.length * rng.uniform(1.5, 3.5, 2)
+    data = np.hstack([orbits.reshape(2, -1), largest[:, None]])
+    done = subprocess.run(
+        [tmp_path / "orbits"], input=data.tobytes(), capture_output=True, check=True
     )
-    orbit *= 2.2 * curve.length / np.hypot(*orbit.T).max()
-    points, weights = np.polynomial.legendre.leggauss(3)
-    works = []
-    for _ in range(2):
-        work = 0.0
-        for start, end in pairwise(orbit):
-            for point, weight in zip(points, weights, strict=True):
-                e = start + (end - start) * (1 + point) / 2
-                work -= weight / 2 * np.dot(law.element(memory, e.tolist())[0][:2], end - start)
-            memory = law.advance_element(memory, *end.tolist())
-        works.append(work / scale)
-    assert works[0] > 0.01
-    assert abs(works[1]) < 1e-6
+    first, second = np.frombuffer(done.stdout).reshape(-1, 2).T / (curve.force * curve.length)
+    assert (first > -1e-9).all()
+    assert first.max() > 0.1
+    assert (np.abs(second) < 1e-9).all()
 
 
 C_CLIENT = """
