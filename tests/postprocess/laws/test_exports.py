@@ -171,6 +171,12 @@ def test_python_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
     check(curve, pairs, values)
     assert curve.about == law.ABOUT
     assert law.advance(0.1, 0.2) == 0.2
+    delta = curve.limit * np.array([-0.1, 0.3, 0.8])
+    P, stiffness = law.force(delta, 0.5 * curve.limit)
+    state = curve.at(delta, 0.5 * curve.limit)
+    np.testing.assert_allclose(P, state.load, rtol=1e-10)
+    np.testing.assert_allclose(stiffness, state.stiffness, rtol=1e-7)
+    assert law.force(delta.tolist(), 0.5 * curve.limit) == (P.tolist(), stiffness.tolist())
     assert law.in_range(curve.limit)
     assert not law.in_range(1.001 * curve.limit)
     assert np.isnan([law.advance(0.1, np.nan), law.advance(np.nan, 0.1)]).all()
