@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import shutil
 from pathlib import Path
 
 import archord
@@ -46,6 +47,20 @@ def pages_above(app: object, name: str, source: list[str]) -> None:
         )
 
 
+def link_law(app: object, name: str, source: list[str]) -> None:
+    """Lead links to law.html, whose name a page has, to its copy."""
+    copy = r'<a href="law_page.html">\1</a>'
+    source[0] = re.sub(r"\[([^\]]*)\]\(law\.html\)", copy, source[0])
+
+
+def copy_law(app: object, error: Exception | None) -> None:
+    """Add the page that computes the law to the site."""
+    if error is None and app.builder.format == "html":
+        shutil.copy(Path(__file__).with_name("law.html"), Path(app.outdir) / "law_page.html")
+
+
 def setup(app: object) -> None:
     """Sphinx calls this."""
     app.connect("source-read", pages_above)
+    app.connect("source-read", link_law)
+    app.connect("build-finished", copy_law)

@@ -40,6 +40,7 @@ ROOMS = [
     "postprocess.laws.general",
     "postprocess.laws",
     "postprocess.laws.exports",
+    "postprocess.laws.page",
     "postprocess.decks",
     "studies",
     "benchmarks",
@@ -53,6 +54,8 @@ ROOMS = [
     "commands",
     "archord",
 ]
+
+DATA = (".py", ".c", ".h", ".toml", ".json", ".npz", ".csv", ".mjs", ".html", ".css")
 
 FE = ["dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "gmsh"]
 # What else a room must not import, beside the rooms below its line.
@@ -72,6 +75,7 @@ BANNED = {
     "postprocess.laws": [*FE, "archord.solver", "archord.benchmarks"],
     "postprocess.laws.general": [*FE, "archord.solver", "archord.benchmarks"],
     "postprocess.laws.exports": [*FE, "archord.solver", "archord.benchmarks"],
+    "postprocess.laws.page": [*FE, "archord.solver", "archord.benchmarks"],
     "postprocess": ["archord.benchmarks"],
 }
 
@@ -247,7 +251,7 @@ def test_an_installation_has_all_data_and_tells_type_checkers_that_archord_is_ty
         wanted = {
             path
             for path in folder.iterdir()
-            if path.suffix in (".py", ".c", ".h", ".toml", ".json", ".csv")
+            if path.suffix in DATA
         }
         place = tmp_path / "lib" / "archord" / ("" if room == "archord" else room.replace(".", "/"))
         assert not {path.name for path in wanted if not (place / path.name).is_file()}

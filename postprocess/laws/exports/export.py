@@ -466,3 +466,28 @@ def _table(form: _Form, name: str, key: str, values: Any) -> str:
         return form.words.format(name=name, key=key, value=form.text(values))
     kind = form.whole if isinstance(values, int) else form.number
     return kind.format(name=name, key=key, value=repr(values))
+
+
+def skeleton(law: JointCurve, suffix: str) -> str:
+    """What `export_law` writes into a file with this ``suffix``, with ``@name@``, ``@title@``,
+    ``@header@``, ``@about@`` and ``@TABLE@``, of each table, where it tells of the joint: for
+    programs that fill them in for other joints of this kind and these units."""
+    program = Program.of(law)
+    form = _FORMS[suffix]
+    name = "name_of_the_law"
+    text = export_law(law, Path(name + suffix))
+    numbers = program.numbers | {"PIN_LENGTH": program.pin_length}
+    for key, values in numbers.items():
+        if not isinstance(values, int):
+            text = text.replace(_table(form, name, key, values), f"@{key}@", 1)
+    text = text.replace(program.header, "@header@")
+    text = text.replace(form.text(program.about), "@about@")
+    return text.replace(program.about["title"], "@title@").replace(name, "@name@")
+
+
+def forms() -> dict[str, dict[str, str]]:
+    """How each language writes a number, a table and the ends of its lines, by suffix."""
+    names = ("number", "table", "line_end")
+    return {
+        suffix: {name: getattr(form, name) for name in names} for suffix, form in _FORMS.items()
+    }

@@ -54,7 +54,7 @@ _DEEPER = 3.0
 _CURVES = ("force", "peak", "angle")
 _NINE_IN_TEN = 1.645  # standard deviations
 # of stored logarithms, and what stands for nan
-_STEP = 1e-4
+CURVE_STEP = 1e-4
 _UNKNOWN = -32768
 _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
 
@@ -271,10 +271,10 @@ class SolvedJoints:
         return SolvedJoints(**_numbers(self.compact()))
 
     def compact(self) -> dict[str, Array]:
-        """Arrays for a small file: curves in steps of `_STEP`."""
+        """Arrays for a small file: curves in steps of `CURVE_STEP`."""
         found = {name: np.asarray(value, np.float32) for name, value in vars(self).items()}
         for name in _CURVES:
-            steps = np.round(found[name] / _STEP)
+            steps = np.round(found[name] / CURVE_STEP)
             found[name] = np.where(np.isnan(steps), _UNKNOWN, steps).astype(np.int16)
         return found
 
@@ -315,7 +315,7 @@ def sides_of(numbers: Any) -> tuple[str, ...]:
 def _numbers(compact: Mapping[str, Array]) -> dict[str, Array]:
     found = {name: values.astype(float) for name, values in compact.items()}
     for name in _CURVES:
-        found[name] = np.where(found[name] == _UNKNOWN, np.nan, found[name] * _STEP)
+        found[name] = np.where(found[name] == _UNKNOWN, np.nan, found[name] * CURVE_STEP)
     return found
 
 
