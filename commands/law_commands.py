@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from archord.postprocess.laws.general.joint import LawJoint
     from archord.postprocess.laws.law import Law, LawState
 
+_CONTACT = ("damping", "mu_static", "mu_dynamic", "stick_speed")  # options of a force element
 _LINE = 400  # points of a line of the picture
 # Options of `archord law` by those beside which they say nothing.
 _IDLE = {
@@ -107,10 +108,6 @@ def law(
     deepest: float,
     plot: Path | None,
     exports: tuple[Path, ...],
-    damping: float | None,
-    mu_static: float | None,
-    mu_dynamic: float | None,
-    stick_speed: float | None,
     force: bool,
     **given: Any,
 ) -> int:
@@ -121,6 +118,7 @@ def law(
     from archord.scene.file import files_read
 
     _refuse_contradictions()
+    contact = {name: given.pop(name) for name in _CONTACT}
     chosen = [find_law(name) for name in dict.fromkeys(names)]
     if not 0 < to < math.inf:
         raise InputError(f"--to {to:g}: must be a positive number.")
@@ -137,8 +135,7 @@ def law(
         _require_archord("--export" if exports else "--deepest", chosen)
         _require_within(chosen[0], joint, deepest)
     if exports:
-        contact = _contact(damping, mu_static, mu_dynamic, stick_speed)
-        return _export(joint, units, thickness, exports, contact, inputs, force)
+        return _export(joint, units, thickness, exports, _contact(contact), inputs, force)
     if plot:
         check_target(plot, inputs, force=True)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
@@ -180,24 +177,14 @@ def _sampled(
     return states, [*said, *silent]
 
 
-def _contact(
-    damping: float | None,
-    mu_static: float | None,
-    mu_dynamic: float | None,
-    stick_speed: float | None,
-) -> Contact:
-    """The contact of the options that are given."""
+def _contact(options: dict[str, float | None]) -> Contact:
+    """The contact of the ``options`` that are given."""
     from archord.postprocess.laws.exports.export import Contact
 
-    if mu_dynamic is None:
-        mu_dynamic = mu_static
-    options = {
-        "damping": damping,
-        "mu_static": mu_static,
-        "mu_dynamic": mu_dynamic,
-        "stick_speed": stick_speed,
-    }
-    return Contact(**{name: value for name, value in options.items() if value is not None})
+    given = {name: value for name, value in options.items() if value is not None}
+    if "mu_static" in given:
+        given.setdefault("mu_dynamic", given["mu_static"])
+    return Contact(**given)
 
 
 def _export(
@@ -260,7 +247,7 @@ def _refuse_contradictions() -> None:
         return
     if "force" in typed:
         raise InputError("--force: overwrites exports, and there is no --export.")
-    for name in ("damping", "mu_static", "mu_dynamic", "stick_speed"):
+    for name in _CONTACT:
         if name in typed:
             raise InputError(f"{typed[name]}: is of an export's element, and there is no --export.")
 

@@ -103,22 +103,27 @@ def interval(table: Table, value: float) -> int:
     return low
 
 
+def piece(f: Table, df: Table, i: int) -> tuple[float, float, float, float]:
+    """Hermite's cubic from node i to the next, f + t (first + t (square + t cube)) with t from 0 to
+    1: width, first, square, cube."""
+    width = NODES[i + 1] - NODES[i]
+    rise = f[i + 1] - f[i]
+    first = width * df[i]
+    last = width * df[i + 1]
+    square = 3 * rise - 2 * first - last
+    cube = first + last - 2 * rise
+    return width, first, square, cube
+
+
 def cubic(f: Table, df: Table, x: float) -> tuple[float, float]:
     """Hermite's cubic through f with slopes df at x, and its slope; straight on beyond the last
     node."""
     i: int = interval(NODES, x)
     inside = min(x, NODES[LAST])
-    width = NODES[i + 1] - NODES[i]
+    width, first, square, cube = piece(f, df, i)
     t = (inside - NODES[i]) / width
-    rise = f[i + 1] - f[i]
-    d0 = width * df[i]
-    d1 = width * df[i + 1]
-    slope = (d0 + t * (2 * (3 * rise - 2 * d0 - d1) + t * 3 * (d0 + d1 - 2 * rise))) / width
-    value = (
-        f[i]
-        + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise)))
-        + slope * (x - inside)
-    )
+    slope = (first + t * (2 * square + t * 3 * cube)) / width
+    value = f[i] + t * (first + t * (square + t * cube)) + slope * (x - inside)
     return value, slope
 
 
@@ -197,16 +202,13 @@ def table_displacement(P: float) -> float:
     """The displacement between nodes at which the table BACK has the force P: Newton's method,
     bracketed."""
     i: int = interval(BACK, P)
-    width = NODES[i + 1] - NODES[i]
-    rise = BACK[i + 1] - BACK[i]
-    d0 = width * BACK_SLOPE[i]
-    d1 = width * BACK_SLOPE[i + 1]
+    width, first, square, cube = piece(BACK, BACK_SLOPE, i)
     low = 0.0
     high = 1.0
-    t = (P - BACK[i]) / rise
+    t = (P - BACK[i]) / (BACK[i + 1] - BACK[i])
     for _ in range(12):
-        miss = BACK[i] + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise))) - P
-        slope = d0 + t * (2 * (3 * rise - 2 * d0 - d1) + t * 3 * (d0 + d1 - 2 * rise))
+        miss = BACK[i] + t * (first + t * (square + t * cube)) - P
+        slope = first + t * (2 * square + t * 3 * cube)
         if miss < 0:
             low = t
         else:

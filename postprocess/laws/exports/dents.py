@@ -16,9 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from archord.postprocess.laws.general.joint import Array
-from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch, hermite
+from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch
 
-_SAMPLES = 400  # of phi, up to its largest argument
+_SAMPLES = 4000  # of phi, up to its largest argument
 _FIRST = 1e-3  # of them, over the last node
 
 
@@ -76,20 +76,7 @@ def _phi(curve: JointCurve, h: Array) -> Array:
     """The largest ``phi`` up to ``h`` (any shape)."""
     u = np.geomspace(_FIRST * curve.x[-1], max(h.max(), curve.x[-1]), _SAMPLES)
     back, _ = curve._curve(curve.back, curve.dback, u)
-    energy = _energy(curve, u)
+    pieces = np.diff(u) * (back[1:] + back[:-1]) / 2
+    energy = np.cumsum(np.append(u[0] * back[0] / 2, pieces))
     phi = np.maximum.accumulate(u - 2 * energy / back)
     return phi[np.minimum(np.searchsorted(u, h), len(u) - 1)]
-
-
-def _energy(curve: JointCurve, u: Array) -> Array:
-    """The energy of ``back`` at ``u > 0``: Gauss's rule from the node before."""
-    i = np.clip(np.searchsorted(curve.x, u, "right") - 1, 0, len(curve.x) - 1)
-    start = curve.x[i]
-    points, weights = np.polynomial.legendre.leggauss(4)
-    half = (u - start) / 2
-    at = start + half * (points[:, None] + 1)
-    energy = stored(curve)[i] + half * (weights @ hermite(curve.x, curve.back, curve.dback, at)[0])
-    if curve.touch.size:
-        early = u < curve.x[1]
-        energy = np.where(early, _touch_energy(curve.touch, np.minimum(u, curve.x[1])), energy)
-    return energy

@@ -41,6 +41,7 @@ from archord.postprocess.laws.exports.algorithm import (
     cubic,
     curve,
     interval,
+    piece,
     warn_outside,
 )
 
@@ -116,12 +117,9 @@ def remembered(dents: Table, angle: float) -> tuple[float, float, float]:
 def curvature(f: Table, df: Table, x: float) -> float:
     """The second derivative of `cubic`."""
     i: int = interval(NODES, x)
-    width = NODES[i + 1] - NODES[i]
+    width, first, square, cube = piece(f, df, i)
     t = (x - NODES[i]) / width
-    rise = f[i + 1] - f[i]
-    d0 = width * df[i]
-    d1 = width * df[i + 1]
-    bend = (2 * (3 * rise - 2 * d0 - d1) + 6 * t * (d0 + d1 - 2 * rise)) / (width * width)
+    bend = (2 * square + 6 * t * cube) / (width * width)
     return bend
 
 
@@ -143,14 +141,10 @@ def energy_of_back(x: float, P: float, stiffness: float) -> float:
         i: int = interval(NODES, x)
         inside = min(x, NODES[LAST])
         over = x - inside
-        width = NODES[i + 1] - NODES[i]
+        width, first, square, cube = piece(BACK, BACK_SLOPE, i)
         t = (inside - NODES[i]) / width
-        rise = BACK[i + 1] - BACK[i]
-        d0 = width * BACK_SLOPE[i]
-        d1 = width * BACK_SLOPE[i + 1]
-        square = 3 * rise - 2 * d0 - d1
-        cube = d0 + d1 - 2 * rise
-        energy = STORED[i] + width * t * (BACK[i] + t * (d0 / 2 + t * (square / 3 + t * cube / 4)))
+        mean = BACK[i] + t * (first / 2 + t * (square / 3 + t * cube / 4))
+        energy = STORED[i] + width * t * mean
         energy = energy + over * (P - stiffness * over / 2)
         if WITH_TOUCH:
             if x < NODES[1]:
@@ -304,57 +298,45 @@ def forces(
     delta = distance - LENGTH
     warn_outside(delta)
     none = beyond(distance, 1e300) + beyond(abs(vx) + abs(vy) + abs(omega), 1e300)
-    Fx = none
-    Fy = none
-    torque = none
-    Fx_ex = none
-    Fx_ey = none
-    Fy_ex = none
-    Fy_ey = none
-    Fx_vx = none
-    Fx_vy = none
-    Fy_vx = none
-    Fy_vy = none
-    T_ex = none
-    T_ey = none
-    T_vx = none
-    T_vy = none
-    Fx_omega = none
-    Fy_omega = none
-    T_omega = none
+    far = max(distance, LENGTH)
+    nx = ex / far
+    ny = ey / far
+    rate = nx * vx + ny * vy + none
+    across = nx * vy - ny * vx
+    P = 0.0
+    turn_force = 0.0
+    stiffness = 0.0
+    mixed = 0.0
+    turn_stiffness = 0.0
     if delta > 0:
-        nx = ex / distance
-        ny = ey / distance
-        rate = nx * vx + ny * vy + none
-        across = nx * vy - ny * vx
         P, turn_force, stiffness, mixed, turn_stiffness = pressed(dents, math.atan2(ey, ex), delta)
-        factor, gain = damped(rate, damping)
-        mu, steep = friction(across + omega * RADIUS, mu_static, mu_dynamic, stick_speed)
-        N = P * factor
-        side = -turn_force / distance - mu * N
-        Fx = -N * nx - side * ny
-        Fy = -N * ny + side * nx
-        torque = -mu * N * RADIUS
-        N_e = stiffness * factor
-        N_turn = (mixed * factor + P * gain * across) / distance
-        mu_turn = -steep * rate / distance
-        side_e = (turn_force / distance - mixed) / distance - mu * N_e
-        side_turn = -turn_stiffness / (distance * distance) - mu * N_turn - mu_turn * N
-        Fx_ex, Fx_ey, Fy_ex, Fy_ey = turned(
-            -N_e, -N_turn - side / distance, side_e, side_turn - N / distance, nx, ny
-        )
-        T_e = -RADIUS * mu * N_e
-        T_turn = -RADIUS * (mu * N_turn + mu_turn * N)
-        T_ex = T_e * nx - T_turn * ny
-        T_ey = T_e * ny + T_turn * nx
-        N_v = P * gain
-        rub = steep * N
-        Fx_vx, Fx_vy, Fy_vx, Fy_vy = turned(-N_v, 0.0, -mu * N_v, -rub, nx, ny)
-        T_vx = -RADIUS * (mu * N_v * nx - rub * ny)
-        T_vy = -RADIUS * (mu * N_v * ny + rub * nx)
-        Fx_omega = rub * RADIUS * ny
-        Fy_omega = -rub * RADIUS * nx
-        T_omega = -rub * RADIUS * RADIUS
+    factor, gain = damped(rate, damping)
+    mu, steep = friction(across + omega * RADIUS, mu_static, mu_dynamic, stick_speed)
+    N = P * factor
+    side = -turn_force / far - mu * N
+    Fx = -N * nx - side * ny
+    Fy = -N * ny + side * nx
+    torque = -mu * N * RADIUS
+    N_e = stiffness * factor
+    N_turn = (mixed * factor + P * gain * across) / far
+    mu_turn = -steep * rate / far
+    side_e = (turn_force / far - mixed) / far - mu * N_e
+    side_turn = -turn_stiffness / (far * far) - mu * N_turn - mu_turn * N
+    Fx_ex, Fx_ey, Fy_ex, Fy_ey = turned(
+        -N_e, -N_turn - side / far, side_e, side_turn - N / far, nx, ny
+    )
+    T_e = -RADIUS * mu * N_e
+    T_turn = -RADIUS * (mu * N_turn + mu_turn * N)
+    T_ex = T_e * nx - T_turn * ny
+    T_ey = T_e * ny + T_turn * nx
+    N_v = P * gain
+    rub = steep * N
+    Fx_vx, Fx_vy, Fy_vx, Fy_vy = turned(-N_v, 0.0, -mu * N_v, -rub, nx, ny)
+    T_vx = -RADIUS * (mu * N_v * nx - rub * ny)
+    T_vy = -RADIUS * (mu * N_v * ny + rub * nx)
+    Fx_omega = rub * RADIUS * ny
+    Fy_omega = -rub * RADIUS * nx
+    T_omega = -rub * RADIUS * RADIUS
     return (
         Fx,
         Fy,
