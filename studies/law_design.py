@@ -72,7 +72,7 @@ _FRESH_ELASTIC = [*_FRESH_EARLY, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]
 _BEYOND = 0.03  # part by which the joints to fit to exceed the range of the law
 # Parts of the way back at which a joint is solved.
 _WAY = np.array([0.2, 0.45, 0.66, 0.8, 0.9, 0.97, 1.03, 1.1])
-_FRESH_WAY = np.array(
+FRESH_WAY = np.array(
     [0.15, 0.35, 0.53, 0.67, 0.78, 0.86, 0.92, 0.96, 1.0, 1.04, 1.09, 1.16, 1.25, 1.4]
 )
 _CYCLES = 0.25  # share of joints that are also unloaded from a smaller displacement
@@ -192,11 +192,16 @@ def training() -> Iterator[Row]:
                     "joint.relative_element_size": 0.03,
                 }
                 continue
-            x = joint.last * MULTIPLES
-            x = x[: np.searchsorted(x, 3.0) + 1]
-            before = 0.95 * joint.first * 1.25 ** np.arange(30)
-            x = np.concatenate([before[before < 0.85 * joint.last], x])
-            yield from _yielding(joint, x, _WAY, joint.chance / _CYCLES, lambda _: next(opens))
+            x = loading_nodes(joint)
+            yield from yielding_rows(joint, x, _WAY, joint.chance / _CYCLES, lambda _: next(opens))
+
+
+def loading_nodes(joint: Drawn) -> Array:
+    """The x at which a joint that yields is solved on first loading, to fit a law."""
+    x = joint.last * MULTIPLES
+    x = x[: np.searchsorted(x, 3.0) + 1]
+    before = 0.95 * joint.first * 1.25 ** np.arange(30)
+    return np.concatenate([before[before < 0.85 * joint.last], x])
 
 
 def fresh(number: int, seed: int) -> Iterator[Row]:
@@ -206,18 +211,23 @@ def fresh(number: int, seed: int) -> Iterator[Row]:
     shares = np.diff(np.round(ends * number / ends[-1])).astype(int)
     for seed_of_kind, (kind, share) in enumerate(zip(FRESH, shares, strict=True), 1000 * seed):
         for joint in joints(kind, int(share), seed_of_kind):
-            x0 = joint.first
-            if np.isinf(x0):
+            if np.isinf(joint.first):
                 yield joint.own | {"load.displacement": _FRESH_ELASTIC}
                 continue
-            x = x0 * (0.9 + 0.2 * joint.odd) * 1.16 ** np.arange(30)
-            early = [each for each in _FRESH_EARLY if each < 0.8 * x0]
-            x = np.array([*early, *x[x < 2.9], 3.0])
             law = law_of_numbers(joint.numbers)
-            yield from _yielding(joint, x, _FRESH_WAY, joint.chance, law.residual)
+            x = fresh_nodes(joint)
+            yield from yielding_rows(joint, x, FRESH_WAY, joint.chance, law.residual)
 
 
-def _yielding(
+def fresh_nodes(joint: Drawn) -> Array:
+    """The x at which a joint that yields is solved on first loading, to check a law."""
+    x0 = joint.first
+    x = x0 * (0.9 + 0.2 * joint.odd) * 1.16 ** np.arange(30)
+    early = [each for each in _FRESH_EARLY if each < 0.8 * x0]
+    return np.array([*early, *x[x < 2.9], 3.0])
+
+
+def yielding_rows(
     joint: Drawn, x: Array, way: Array, chance: float, opens: Callable[[float], Any]
 ) -> Iterator[Row]:
     """Scenes of one joint that yields: to the last of ``x`` and back, twice as fine where it yields
@@ -241,10 +251,10 @@ def _yielding(
 def sweep_file(rows: Iterable[Row]) -> str:
     """The sweep of ``rows``, in short numbers."""
 
-    def short(value: Any) -> Any:
+    def short(value: Any, digits: int = 5) -> Any:
         if isinstance(value, list):
-            return [float(f"{v:.4g}") for v in value]
-        return float(f"{value:.5g}") if isinstance(value, float) else value
+            return [short(each, 4) for each in value]
+        return float(f"{value:.{digits}g}") if isinstance(value, float) else value
 
     lines = []
     for row in rows:

@@ -204,7 +204,7 @@ class Law:
                 "for half a pin, cut where it is pressed; of a whole one P is higher: 2 %, beyond "
                 "yield 10 %"
             )
-        if joint.hardens and self.plastic:
+        if joint.hardens and self.plastic and not self.solved:
             said.append(
                 "of perfect plasticity; of bodies that harden its P is too low beyond yield"
             )

@@ -7,11 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model
+from archord.postprocess.laws.general.hardening_model import Flows, flows, hardened_loss
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent
 from archord.postprocess.laws.general.yield_model import (
@@ -20,7 +22,6 @@ from archord.postprocess.laws.general.yield_model import (
     Yielding,
     first_yield,
     loss,
-    sides_of,
 )
 from archord.report.version import VERSION
 
@@ -71,11 +72,11 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
     if reason and not extrapolate:
         raise ValueError(f"archord: {reason}.")
-    law = law_of_numbers(joint_numbers(joint))
+    law = law_of_numbers(joint_numbers(joint), flows(joint))
     about = {
         "title": f"a pin joint in plane {joint.plane}, by archord's law of solved joints",
         "archord": VERSION,
-        "joint": {name: value for name, value in vars(joint).items() if value},
+        "joint": _in_numbers(joint),
         "outside": reason or "nothing: inside the range of solved joints",
         "expected error": "unknown" if reason else _error_in_words(law),
     }
@@ -90,6 +91,16 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     )
 
 
+def _in_numbers(joint: LawJoint) -> dict[str, Any]:
+    """What decides ``joint``, as JSON has it: a hardening curve as points [PEEQ, yield stress]."""
+    told = {name: value for name, value in vars(joint).items() if value}
+    for name in ("pin_hardening", "block_hardening"):
+        if name in told:
+            peeq = told[name].knots()
+            told[name] = np.column_stack([peeq, told[name].stress(peeq)]).tolist()
+    return told
+
+
 def _error_in_words(law: JointCurve) -> str:
     """The errors that 9 in 10 joints like the joint of ``law`` keep, at most."""
     usual, most = (law.error[(NODES >= 0.1) & (end >= NODES)].max() for end in (2.0, 3.0))
@@ -99,9 +110,10 @@ def _error_in_words(law: JointCurve) -> str:
     return said
 
 
-def law_of_numbers(numbers: Sequence[float]) -> JointCurve:
+def law_of_numbers(numbers: Sequence[float], given: Flows = (None, None)) -> JointCurve:
     """The law of a joint with these seven ``numbers`` (see `joint_numbers`) in units of dR, E* dR
-    and E* dR/R; a body that yields beyond the range is elastic."""
+    and E* dR/R, whose bodies harden as ``given``; a body that yields beyond the range is
+    elastic."""
     strain, *of_bodies, pin, block = numbers
     joint = Elastic(*of_bodies)
     stresses = np.array([pin, block])
@@ -109,8 +121,13 @@ def law_of_numbers(numbers: Sequence[float]) -> JointCurve:
     stresses[ELASTIC_BELOW * begins >= NODES[-1]] = np.inf
     if np.isinf(stresses).all():
         return reduce_joint(joint)
-    side = sides_of([strain, *of_bodies, *stresses])[0]
-    return reduce_joint(joint, loss(side, elastic_model(), joint, Yielding(*stresses), NODES[1:]))
+    x = NODES[1:]
+    hardens = [flow is not None and np.isfinite(s) for flow, s in zip(given, stresses, strict=True)]
+    if any(hardens):
+        lost = hardened_loss([strain, *of_bodies, *stresses], given, x)
+    else:
+        lost = loss(numbers, Yielding(*stresses), x)
+    return reduce_joint(joint, lost)
 
 
 def outside(joint: LawJoint) -> str:
@@ -138,10 +155,10 @@ def outside(joint: LawJoint) -> str:
     >>> outside(LawJoint(radius=10.0, clearance=1.0, E_star=115e3, plane="strain", nu=0.3))
     'dR/R = 0.1 is outside 0.001 to 0.02'
     """
-    if joint.hardens:
+    if joint.kinematic:
         return (
-            "a body hardens, and the law is of perfect plasticity; archord fit RUN --table makes "
-            "the law of one joint"
+            "a body has back stresses, and the law is of isotropic hardening; archord fit RUN "
+            "--table makes the law of one joint"
         )
     strain, p, m, n, clearance, *stresses = joint_numbers(joint)
     pin_nu, nu = (value / (1 + value) if strain else value for value in (m, n))

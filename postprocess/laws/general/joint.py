@@ -12,6 +12,7 @@ import numpy.typing as npt
 from archord.materials.elasticity import contact_modulus
 
 if TYPE_CHECKING:
+    from archord.materials.hardening import Hardening
     from archord.scene.presets.joint import Scene
     from archord.scene.sections.bodies import Solid
 
@@ -52,9 +53,11 @@ class LawJoint:
         Poisson's ratio of the block.
     pin_nu : float
         Poisson's ratio of the pin; None is the block's ratio, or a rigid pin.
-    pin_hardening, block_hardening : float
-        d(yield stress)/d(PEEQ) over Young's modulus of the body: 0 is perfect plasticity, None is
-        no straight line.
+    pin_hardening, block_hardening : Hardening
+        How the yield stress grows with PEEQ, in the units of ``E_star``; None is perfect
+        plasticity.
+    kinematic : bool
+        Whether a body that yields has back stresses, which no law knows.
     ring : bool
         Whether the pin is in a ring, not in a block.
     block_size : float
@@ -95,8 +98,9 @@ class LawJoint:
     plane: str | None = None
     nu: float | None = None
     pin_nu: float | None = None
-    pin_hardening: float | None = 0.0
-    block_hardening: float | None = 0.0
+    pin_hardening: Hardening | None = None
+    block_hardening: Hardening | None = None
+    kinematic: bool = False
     ring: bool = False
     block_size: float | None = None
     whole: bool = False
@@ -117,10 +121,15 @@ class LawJoint:
             value = getattr(self, name)
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
-        for name in ("pin_hardening", "block_hardening"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} = {value:g} must be a number that is not negative.")
+        for body in ("pin", "block"):
+            law = getattr(self, f"{body}_hardening")
+            stress = getattr(self, f"{body}_yield")
+            if law is None or stress is None:
+                continue
+            begins = float(law.stress(np.zeros(1))[0])
+            if not math.isclose(begins, stress, rel_tol=1e-6):
+                said = f"{body}_hardening begins at {begins:g}, not at {body}_yield = {stress:g}"
+                raise ValueError(f"{said}.")
         if self.plane not in (None, "strain", "stress"):
             raise ValueError(f"plane = {self.plane!r} must be one of strain, stress.")
 
@@ -154,6 +163,7 @@ class LawJoint:
             friction=scene.analysis.friction,
             large_strain=scene.analysis.strain == "large",
             fixed_pairs=scene.analysis.kinematics == "reference",
+            kinematic=any(solid.back_stresses for solid in scene.solids.values()),
             **given,
         )
 
@@ -180,7 +190,8 @@ class LawJoint:
     def hardens(self) -> bool:
         """Whether a body that yields hardens."""
         pairs = (self.pin_yield, self.pin_hardening), (self.block_yield, self.block_hardening)
-        return any(stress is not None and hardening != 0 for stress, hardening in pairs)
+        isotropic = any(stress is not None and law is not None for stress, law in pairs)
+        return self.kinematic or isotropic
 
     @property
     def dundurs_alpha(self) -> float:
@@ -235,10 +246,12 @@ class LawJoint:
         return self.radius * self.threshold / (self.k * self.E_star)
 
 
-def _hardening(solid: Solid) -> float | None:
-    """d(yield stress)/d(PEEQ) over Young's modulus; None where that is no constant."""
-    straight = None if solid.back_stresses else solid.law.linear
-    return None if straight is None else straight[1] / solid.E
+def _hardening(solid: Solid) -> Hardening | None:
+    """The curve of a ``solid`` that hardens."""
+    if solid.yield_stress is None:
+        return None
+    straight = solid.law.linear
+    return solid.law if straight is None or straight[1] else None
 
 
 def _transverse(nu: float, plane: str) -> float:

@@ -17,7 +17,7 @@ law_fit.py makes both.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel
+from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel, elastic_model
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.joint import Array
 
@@ -61,7 +61,8 @@ _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
 
 class Yielding(NamedTuple):
     """What decides a joint that yields, or ``(m,)`` joints, beside `Elastic`: ``s = sigY R/(E*
-    dR)`` of pin and block, infinite of a body that stays elastic."""
+    dR)`` of pin and block, infinite of a body that stays elastic. Of a joint that hardens both are
+    ``(k,)``, the s at each x."""
 
     pin: Any
     block: Any
@@ -98,16 +99,18 @@ def first_yield(
 
 def onset(
     side: str, model: ElasticModel, joint: Elastic, yielding: Yielding, x: Array, lost: Array
-) -> tuple[float, float]:
-    """About the x of first yield of the body of one of `SIDES`, and how far ``ln(p0/p0_el)`` is
-    lost to a weaker pin some way beyond; ``lost`` ``(k,)`` is the loss at ``x`` ``(k,)``."""
+) -> tuple[Any, Any]:
+    """About the x of first yield of the body of one of `SIDES`, for each of its s (any shape), and
+    how far ``ln(p0/p0_el)`` is lost to a weaker pin some way beyond; ``lost`` ``(k,)`` is the loss
+    at ``x`` ``(k,)``."""
     strain = side.startswith("strain")
     s = yielding.of(side)
     if side != PIN_WEAKER:
-        return float(first_yield(model, strain, joint, s)), 0.0
+        x0 = first_yield(model, strain, joint, s)
+        return x0, np.zeros_like(x0)
     left = np.exp(np.interp(_GRID, x, lost)) * _GRID / 0.7
-    x0 = float(first_yield(model, strain, joint, s, left**_FELT))
-    return x0, float(np.interp(_DEEPER * x0, x, lost))
+    x0 = first_yield(model, strain, joint, s, left**_FELT)
+    return x0, np.interp(_DEEPER * x0, x, lost)
 
 
 def _pressure_at_yield(strain: bool, x: Array) -> Array:
@@ -126,7 +129,7 @@ def features(side: str, joints: Elastic, yielding: Yielding, lost: npt.ArrayLike
         share = s / (yielding.block if side == "stress pin" else yielding.pin)
         plane = side.split()[0]
         inputs += [np.minimum((1 - share) / within, 1.0) for within in _STRONGER[plane]]
-    return np.stack(inputs, axis=-1)
+    return np.stack(np.broadcast_arrays(*inputs), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -161,16 +164,16 @@ class YieldModel:
             "back": Process(self.kernels["back"], self.back_inputs, self.back - [1, 0, 0, 0]),
         }
 
-    def at(self, inputs: Array, x0: float, x: Array) -> Loss:
-        """What yielding does to a joint with these `features` ``(d,)``; ``x0`` is about first
-        yield, at ``x`` ``(k,)``; of side `PIN_WEAKER` what the block's yielding adds, but for
-        the way back."""
+    def at(self, inputs: Array, x0: Array, x: Array) -> Loss:
+        """What yielding does to a joint with these `features` ``(d,)``; ``x0`` ``()`` is about
+        first yield, at ``x`` ``(k,)``; of side `PIN_WEAKER` what the block's yielding adds, but for
+        the way back. Of a joint that hardens inputs are ``(k, d)``, x0 ``(k,)``."""
         u = np.log(x / x0)
-        force, deviation = self.processes["force"].predict(inputs[None])
-        shape, _ = self.processes["shape"].predict(inputs[None])
-        nodes = np.concatenate([force, *np.split(shape, 2, axis=1), deviation]).T
+        force, deviation = self.processes["force"].predict(np.atleast_2d(inputs))
+        shape, _ = self.processes["shape"].predict(np.atleast_2d(inputs))
+        nodes = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=-1)
         force, slope, peak, angle, deviation = _between(nodes, u, x[-1] / x0).T
-        deep = np.column_stack([np.tile(inputs, (len(x), 1)), u])
+        deep = np.column_stack([np.broadcast_to(inputs, (len(x), inputs.shape[-1])), u])
         way, uncertain = self.processes["back"].predict(deep)
         travel, toe, misfit, again = way.T
         errors = [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again]
@@ -186,11 +189,22 @@ class YieldModel:
         )
 
 
-def loss(side: str, model: ElasticModel, joint: Elastic, yielding: Yielding, x: Array) -> Loss:
-    """What yielding does to a ``joint`` of one side at ``x`` ``(k,)``, with the processes that come
-    with archord."""
-    models = {name: yield_model(name) for name in needed(side)}
-    return total_loss(models, model, joint, yielding, x)
+def loss(
+    numbers: Sequence[float], yielding: Yielding, x: Array, model: ElasticModel | None = None
+) -> Loss:
+    """What yielding does at ``x`` ``(k,)`` to a joint with these ``numbers`` (see `SolvedJoints`),
+    but for its ``yielding``, with the processes that come with archord. The weaker body at each x
+    tells of it."""
+    strain, *of_bodies = numbers[:5]
+    joint = Elastic(*of_bodies)
+    stresses = np.transpose(np.broadcast_arrays(*np.atleast_1d(*yielding)))
+    sides = np.array([sides_of([strain, *of_bodies, *pair])[0] for pair in stresses])
+    found: list[Array] = [np.zeros(len(x))] * len(Loss._fields)
+    for side in dict.fromkeys(sides):
+        models = {name: yield_model(name) for name in needed(side)}
+        told = total_loss(models, model or elastic_model(), joint, yielding, x)
+        found = [np.where(sides == side, *pair) for pair in zip(told, found, strict=True)]
+    return Loss(*found)
 
 
 def needed(side: str) -> tuple[str, ...]:
@@ -210,7 +224,7 @@ def total_loss(
     total = Loss(none, none, none, none, none, none + 1, none, none)
     for side, told in models.items():
         x0, lost = onset(side, model, joint, yielding, x, total.peak)
-        if not ELASTIC_BELOW * x0 < x[-1]:
+        if (ELASTIC_BELOW * x0 >= x[-1]).all():
             continue
         own = told.at(features(side, joint, yielding, lost), x0, x)
         begun = np.clip(np.log(x / (ELASTIC_BELOW * x0)) / 0.2, 0.0, 1.0)
@@ -227,18 +241,32 @@ def total_loss(
     return total
 
 
-def _between(nodes: Array, u: Array, most: float) -> Array:
-    """The first of four columns of ``nodes`` ``(multiples, 4)`` at ``ln(x/x0) = u`` ``(k,)``, its
-    slope by u, and the others ``(k, 5)``: smooth between nodes; only nodes up to ``most``
-    x0 and one beyond are known."""
-    known = np.searchsorted(MULTIPLES, most) + 1
-    at = np.log([ELASTIC_BELOW, *MULTIPLES[:known]])
-    values = np.insert(nodes[:known], 0, 0.0, axis=0)
-    spline = CubicSpline(at, values, bc_type=((1, np.zeros(4)), "not-a-knot"))
-    force, peak, angle, _ = spline(u).T
-    deviation = np.interp(u, at, values[:, 3])
-    found = np.stack([force, spline(u, 1)[:, 0], peak, angle, deviation], axis=1)
-    return np.where(u[:, None] > at[0], found, 0.0)
+def _between(nodes: Array, u: Array, most: Array) -> Array:
+    """The first of four curves of ``nodes`` ``(1 or k, multiples, 4)`` at ``ln(x/x0) = u``
+    ``(k,)``, its slope by u, and the others ``(k, 5)``: smooth between nodes; only nodes up to
+    ``most`` x0 ``()`` or ``(k,)`` and one beyond are known."""
+    known = np.broadcast_to(np.searchsorted(MULTIPLES, most) + 1, u.shape)
+    found = np.zeros((len(u), 5))
+    for count in np.unique(known):
+        own = known == count
+        rows = nodes if len(nodes) == 1 else nodes[own]
+        found[own] = _curves(rows[:, :count], u[own])
+    return np.where(u[:, None] > np.log(ELASTIC_BELOW), found, 0.0)
+
+
+def _curves(nodes: Array, u: Array) -> Array:
+    """The numbers of `_between` by all ``nodes`` ``(1 or k, known, 4)``."""
+    at = np.log([ELASTIC_BELOW, *MULTIPLES[: nodes.shape[1]]])
+    values = np.insert(np.moveaxis(nodes, 1, 0), 0, 0.0, axis=0)
+    spline = CubicSpline(at, values, bc_type=((1, np.zeros(values.shape[1:])), "not-a-knot"))
+    each = np.arange(len(u))
+    row = each if len(nodes) > 1 else 0 * each
+    force, peak, angle, _ = spline(u)[each, row].T
+    slope = spline(u, 1)[each, row, 0]
+    i = np.clip(np.searchsorted(at, u) - 1, 0, len(at) - 2)
+    share = np.clip((u - at[i]) / (at[i + 1] - at[i]), 0.0, 1.0)
+    deviation = (1 - share) * values[i, row, 3] + share * values[i + 1, row, 3]
+    return np.stack([force, slope, peak, angle, deviation], axis=1)
 
 
 @dataclass(frozen=True)

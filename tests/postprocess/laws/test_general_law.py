@@ -193,8 +193,7 @@ def test_both_planes_are_one_elastic_law() -> None:
         ({"clearance": 0.03}, "dR/R = 0.03 is outside 0.001 to 0.02"),
         ({"pin_share": 0.9}, "E(pin)/E(block) = 0.1111 is outside 0.333333 to 10"),
         ({"block_yield": 0.1 * 0.005}, "sigY R/(E* dR) = 0.1 is outside 0.15 and more"),
-        ({"block_hardening": 0.01}, "a body hardens, and the law is of perfect plasticity"),
-        ({"block_hardening": None}, "a body hardens"),
+        ({"kinematic": True}, "a body has back stresses, and the law is of isotropic hardening"),
         ({}, ""),
     ],
 )

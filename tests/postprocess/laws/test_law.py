@@ -4,12 +4,12 @@ import re
 import subprocess
 import sys
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from archord.materials.hardening import LinearHardening, TabularHardening
 from archord.postprocess.laws.general.joint import LARGE, LawJoint
 from archord.postprocess.laws.law import LawRangeWarning, rising_root
 from archord.postprocess.laws.laws import LAWS
@@ -160,13 +160,18 @@ NO_JOINT = {
     "length": 0.0,
     "plane": "axial",
 }
-NO_JOINT |= {"nu": 0.5, "pin_nu": -1.0, "pin_yield": 0.0, "block_hardening": -0.1}
+NO_JOINT |= {"nu": 0.5, "pin_nu": -1.0, "pin_yield": 0.0, "block_yield": np.nan}
 
 
 @pytest.mark.parametrize("name", NO_JOINT)
 def test_values_that_make_no_joint_are_refused(name):
     with pytest.raises(ValueError, match=f"{name} = "):
         LawJoint(**({"radius": 1.0, "clearance": 0.01, "E_star": 1.0} | {name: NO_JOINT[name]}))
+
+
+def test_a_curve_begins_at_the_yield_stress():
+    with pytest.raises(ValueError, match="begins at 2, not at block_yield = 1"):
+        LawJoint(1.0, 0.01, 1.0, block_yield=1.0, block_hardening=LinearHardening(2.0))
 
 
 def test_joint_of_a_scene():
@@ -193,18 +198,20 @@ def test_joint_of_a_scene():
     )  # like nu: beta = alpha (1 - 2 nu)/(2 (1 - nu))
 
 
+TABLE = TabularHardening(((0.0, 230.77), (0.1, 300.0)))
 METALS = [
-    ([], "both", 1.0, (0.0, 0.0)),
-    (["pin.yield_stress=400"], "unlike", 400 / 230.77, (0.0, 0.0)),
-    (["pin.hardening=2100"], "both", 1.0, (0.01, 0.0)),
-    (["block.hardening=[[0, 230.77], [0.1, 300]]"], "both", 1.0, (0.0, None)),
-    (["block.back_stresses=[[1000, 10]]"], "both", 1.0, (0.0, None)),
+    ([], "both", 1.0, {}),
+    (["pin.yield_stress=400"], "unlike", 400 / 230.77, {}),
+    (["pin.hardening=2100"], "both", 1.0, {"pin": LinearHardening(230.77, 2100.0)}),
+    (["block.hardening=[[0, 230.77], [0.1, 300]]"], "both", 1.0, {"block": TABLE}),
+    (["block.hardening=[[0, 230.77]]"], "both", 1.0, {}),
+    (["block.back_stresses=[[1000, 10]]"], "both", 1.0, {"kinematic": True}),
 ]
 
 
 @pytest.mark.parametrize(("change", "yielding", "ratio", "hardening"), METALS)
 def test_yielding_of_a_scene(change, yielding, ratio, hardening):
-    """Each body's yield stress and H/E; the weaker body's decides the onset."""
+    """Each body's yield stress and hardening; the weaker body's decides the onset."""
     scene = load_scene(
         SCENES / "steel_pin.toml", ["pin.yield_stress=230.77", "block.yield_stress=230.77", *change]
     )
@@ -213,9 +220,10 @@ def test_yielding_of_a_scene(change, yielding, ratio, hardening):
     assert (joint.pin_yield, joint.block_yield, joint.yield_stress) == pytest.approx(
         (230.77 * ratio, 230.77, 230.77)
     )
-    assert (joint.pin_hardening, joint.block_hardening) == hardening
-    assert joint.hardens == (hardening != (0.0, 0.0))
-    assert not replace(joint, pin_yield=None, block_yield=None).hardens
+    found = {"pin": joint.pin_hardening, "block": joint.block_hardening}
+    found["kinematic"] = joint.kinematic or None
+    assert {name: law for name, law in found.items() if law} == hardening
+    assert joint.hardens == bool(hardening)
 
 
 def test_roots_of_rising_functions():
