@@ -99,7 +99,7 @@ def mechanism(force, start):
 
 
 def relative(velocity, spin, e):
-    """The rate of e in axes of the rod, whose angular velocity is less by ``spin`` than the pin's,
+    """The rate of e in axes of the rod, which turns by -``spin`` under a pin that does not turn,
     from the difference of velocities in these axes."""
     return velocity[0] - spin * e[1], velocity[1] + spin * e[0]
 

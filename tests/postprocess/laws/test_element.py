@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from archord.cli import run
 from archord.postprocess.laws.exports.export import Contact, export_law
@@ -302,6 +303,52 @@ def test_all_languages_give_the_same_forces(suffix: str, name: str, tmp_path: Pa
     size = np.abs(wanted).max(axis=0)
     assert (np.abs(found - wanted) <= 1e-12 * size).all()
     assert (wanted[-2] == 0).all()
+
+
+HIT = """
+model Hit "a pin that hits its hole along a line and crosses to the other side"
+  Law.Element joint(interval = {interval});
+  Real ex(start = {start}, fixed = true);
+  Real ey(start = 0.0, fixed = true);
+  Real vx(start = {speed}, fixed = true);
+  Real vy(start = 0.0, fixed = true);
+equation
+  joint.ex = ex;
+  joint.ey = ey;
+  joint.omega = 0.0;
+  der(ex) = vx;
+  der(ey) = vy;
+  {mass} * der(vx) = joint.Fx;
+  {mass} * der(vy) = joint.Fy;
+end Hit;
+"""
+
+
+def test_a_modelica_compiler_simulates_the_element() -> None:
+    """Rumoca's motion is what scipy integrates with the export in Python, but for the moments at
+    which the memory is updated."""
+    rumoca = pytest.importorskip("rumoca", reason="rumoca is not here (pip install rumoca)")
+    curve = yielding()
+    law = python(curve)
+    mass = 0.2
+    speed = 0.5 * np.sqrt(2 * curve.force * curve.limit / mass)
+    end = 2.5 * curve.limit / speed
+    given = {"interval": end / 500, "start": curve.length, "speed": speed, "mass": mass}
+    source = export_law(curve, Path("Law.mo"), CONTACT) + HIT.format(**given)
+    model = rumoca.Session().loads(source=source, model="Hit")
+    found = model.simulate(t=end, dt=end / 2000, config=rumoca.SimConfig(rtol=1e-9, atol=1e-12))
+
+    def motion(t, state):
+        e, v, deepest = state
+        memory = law.advance_element(law.new_element(), max(deepest, e), 0.0)
+        (Fx, _, _), _ = law.element(memory, (e, 0.0), (v, 0.0))
+        return [v, Fx / mass, max(v, 0.0) * (e >= deepest)]
+
+    wanted = solve_ivp(
+        motion, (0, end), [curve.length, speed, curve.length], rtol=1e-8, max_step=end / 1000
+    )
+    assert wanted.y[1, -1] < 0
+    assert found.to_dataframe()["vx"].iloc[-1] == pytest.approx(wanted.y[1, -1], rel=1e-4)
 
 
 def test_within_the_clearance_nothing_acts() -> None:
