@@ -504,6 +504,7 @@ const STEEPEST = 0.999; // secant of the way back over the elastic joint's steep
 /** A number as Python's `g` prints it, in this many digits. */
 export function inDigits(value, digits = 6) {
     if (value === Infinity) return "inf";
+    if (Number.isNaN(value)) return "nan";
     const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
     const power = Number(exponent);
     const short = (text) => (text.includes(".") ? text.replace(/\.?0+$/, "") : text);
@@ -517,7 +518,7 @@ export function faultsOf(joint) {
     for (const name of ["radius", "clearance", "E_star", "pin_yield", "block_yield", "length"]) {
         const value = joint[name];
         if (value != null && !(Number.isFinite(value) && value > 0)) {
-            said.push(`${name} = ${Number.isNaN(value) ? "nan" : inDigits(value)} must be a positive number.`);
+            said.push(`${name} = ${inDigits(value)} must be a positive number.`);
         }
     }
     for (const name of ["nu", "pin_nu"]) {
@@ -562,8 +563,7 @@ function numbersOf(joint) {
 
 /** What puts a joint outside the range of the law: parameter, value and range; empty inside. */
 export function outside(data, joint) {
-    const { nu: ofNu, clearances, ratios, smallest, hardens } = data.range;
-    if (hardens && (joint.pin_hardening || joint.block_hardening)) return hardens;
+    const { nu: ofNu, clearances, ratios, smallest } = data.range;
     const { strain, p, m, n, clearance, pin, block } = numbersOf(joint);
     const [pinNu, nu] = [m, n].map((value) => (strain ? value / (1 + value) : value));
     const softer = strain ? (1 - pinNu ** 2) / (1 - nu ** 2) : 1;

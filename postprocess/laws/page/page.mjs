@@ -8,10 +8,11 @@ const $ = (id) => document.getElementById(id);
 const POINTS = 300; // of a curve
 const SLIDER = 3000; // of the slider
 const FORM = ["diameter", "by", "fit", "take", "clearance", "length", "plane"];
-const OF_BODIES = ["metal", "E", "nu", "yield", "flow"];
+const OF_BODIES = ["metal", "E", "nu", "yield", "slope", "flow"];
 const FIELDS = [...FORM, ...["pin", "block"].flatMap((body) => OF_BODIES.map((name) => `${body}-${name}`)), "delta", "deepest"];
+const FAR = 10; // PEEQ to which a straight line of hardening goes
 // Left, right, top and bottom margin, and the size of a chart.
-const BOX = { left: 62, right: 14, top: 30, bottom: 40, width: 420, height: 270 };
+const BOX = { left: 72, right: 14, top: 30, bottom: 40, width: 420, height: 270 };
 
 let data = null;
 let shown = null; // the joint, its law, and what it is made of
@@ -23,7 +24,7 @@ function plain(value) {
     if (!Number.isFinite(value)) return "–";
     const text = inDigits(value, 5);
     const whole = Math.abs(value) >= 1e5 && Math.abs(value) < 1e10 ? Number(text).toFixed(0) : text;
-    return /^-?\d{5,}(\.|$)/.test(whole) ? whole.replace(/\B(?=(\d{3})+(?!\d))/g, "\u2009") : whole;
+    return /^-?\d{5,}(\.|$)/.test(whole) ? whole.replace(/\B(?=(\d{3})+(?!\d))/g, "\u202f") : whole;
 }
 
 const degrees = (angle) => (angle * 180) / Math.PI;
@@ -46,8 +47,11 @@ function bodyOf(body) {
     if (metal === "own") {
         const E = positive(`${body}-E`, `E of the ${body}`);
         const nu = number(`${body}-nu`);
-        const strength = number(`${body}-yield`);
-        return { E, nu: nu ?? NaN, yield: strength === null ? null : positive(`${body}-yield`, "The yield stress") };
+        if (number(`${body}-yield`) === null) return { E, nu: nu ?? NaN, yield: null };
+        const strength = positive(`${body}-yield`, `The yield stress of the ${body}`);
+        if (!number(`${body}-slope`)) return { E, nu: nu ?? NaN, yield: strength };
+        const rise = positive(`${body}-slope`, `The hardening slope of the ${body}`);
+        return { E, nu: nu ?? NaN, yield: strength, hardening: [[0, strength], [FAR, strength + FAR * rise]] };
     }
     const named = data.metals[metal];
     const flow = $(`${body}-flow`).value;
@@ -57,11 +61,12 @@ function bodyOf(body) {
     return { E: named.E, nu: named.nu, yield: points[0][1], hardening: points };
 }
 
-/** The joint of the form. */
+/** The joint of the form, and its clearances [mm] at the limits of a fit. */
 function asked() {
     const diameter = positive("diameter", "The diameter");
     const length = positive("length", "The length");
     let clearance = null;
+    let limits = [];
     if ($("by").value === "fit") {
         $("fit").setAttribute("aria-invalid", "true");
         const fit = fitOf($("fit").value, diameter);
@@ -71,6 +76,7 @@ function asked() {
             `Hole ${range(fit.hole)} µm, shaft ${range(fit.shaft)} µm, clearance of diameters ${fit.least} to ${fit.largest} µm: ` +
             `dR = ${fit.least / 2000} to ${fit.largest / 2000} mm, here ${fit[$("take").value] / 2000} mm.`;
         clearance = fit[$("take").value] / 2000;
+        limits = [fit.least / 2000, fit.largest / 2000];
         if (!(clearance > 0)) throw new RangeError(`${$("fit").value} has no clearance here: the law needs one.`);
         $("fit").setAttribute("aria-invalid", "false");
     } else {
@@ -78,7 +84,17 @@ function asked() {
         clearance = positive("clearance", "The clearance");
     }
     const bodies = { pin: bodyOf("pin"), block: bodyOf("block") };
-    return jointOf({ radius: diameter / 2, clearance, plane: $("plane").value, length, ...bodies });
+    return { joint: jointOf({ radius: diameter / 2, clearance, plane: $("plane").value, length, ...bodies }), limits };
+}
+
+/** The law of a joint with another clearance; null where there is none. */
+function lawAt(joint, clearance) {
+    try {
+        return generalLaw(data, { ...joint, clearance });
+    } catch (error) {
+        if (error instanceof RangeError) return null;
+        throw error;
+    }
 }
 
 /** Show which fields matter, and what the metals are. */
@@ -101,8 +117,9 @@ function compute() {
     arrange();
     $("law").setAttribute("aria-busy", "false");
     try {
-        const joint = asked();
-        shown = { joint, law: generalLaw(data, joint) };
+        const { joint, limits } = asked();
+        const law = generalLaw(data, joint);
+        shown = { joint, law, extremes: limits.map((clearance) => lawAt(joint, clearance)) };
     } catch (error) {
         if (!(error instanceof RangeError)) throw error;
         shown = null;
@@ -148,7 +165,7 @@ function deepestOf(law) {
 
 /** Numbers and charts at the cursor. */
 function show(from = "") {
-    const { law, joint } = shown;
+    const { law, joint, extremes } = shown;
     const delta = number("delta");
     const deepest = deepestOf(law);
     const state = law.at(delta, deepest);
@@ -170,6 +187,10 @@ function show(from = "") {
         ["First yield about at", yields ? `${plain(law.firstYield)} mm` : "none to 3 dR", yields ? `P ${plain(law.at(law.firstYield).load * length)} N` : ""],
         ["Residual clearance", `${plain(residual)} mm`, `back from ${plain(Math.max(deepest, delta))} mm`],
     ];
+    for (const [i, own] of extremes.entries()) {
+        const load = own && delta <= own.limit ? `${plain(own.at(delta).load * length)} N` : "outside the law";
+        rows.push([`First loading, ${i ? "largest" : "least"} clearance`, load, "at this delta"]);
+    }
     $("values").replaceChildren(...rows.map(([name, value, more]) => {
         const box = document.createElement("div");
         const note = Object.assign(document.createElement("small"), { textContent: more && ` ${more}` });
@@ -366,13 +387,17 @@ async function start() {
     $("joint").addEventListener("submit", (event) => event.preventDefault());
     $("cursor").addEventListener("input", () => moveTo((Number($("cursor").value) / SLIDER) * shown.law.limit));
     $("delta").addEventListener("change", () => moveTo(number("delta")));
-    $("load").addEventListener("change", () => moveTo(shown.law.displacement(number("load") / shown.joint.length)));
+    $("load").addEventListener("change", () => {
+        const delta = shown.law.displacement(number("load") / shown.joint.length);
+        $("load").setAttribute("aria-invalid", String(Number.isNaN(delta)));
+        if (!Number.isNaN(delta)) moveTo(delta);
+    });
     $("deepest").addEventListener("input", () => { show(); remember(); });
     for (const kind of ["pointerdown", "pointermove"]) $("charts").addEventListener(kind, follow);
     for (const button of document.querySelectorAll("[data-save]")) button.addEventListener("click", () => save(button.dataset.save));
     $("share").addEventListener("click", async () => {
-        await navigator.clipboard.writeText(location.href);
-        $("copied").textContent = "copied";
+        const copied = await navigator.clipboard.writeText(location.href).then(() => true, () => false);
+        $("copied").textContent = copied ? "copied" : "not allowed here: copy the address of this page";
     });
     window.addEventListener("hashchange", () => { recall(); compute(); });
     compute();

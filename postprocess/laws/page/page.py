@@ -22,13 +22,18 @@ import numpy as np
 
 from archord.materials.named import metals
 from archord.postprocess.laws.exports.export import Program, forms, skeleton
-from archord.postprocess.laws.general import elastic_model, general_law, yield_model
+from archord.postprocess.laws.general import (
+    elastic_model,
+    general_law,
+    hardening_model,
+    yield_model,
+)
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.version import VERSION
 
 HERE = Path(__file__).parent
-FLOWS = {"perfect": "perfectly plastic", "elastic": "does not yield"}
+FLOWS = {"hardens": "hardens", "perfect": "perfectly plastic", "elastic": "does not yield"}
 MODULES = ("law.mjs", "fits.mjs", "exports.mjs", "page.mjs")
 _LENGTH = 12345.0  # which stands for any length of a pin
 _CURVES = ("force", "peak", "angle")
@@ -53,7 +58,7 @@ def _body(body: str, other: dict[str, str]) -> str:
     """The fields of a ``body``, which can be an ``other`` thing than a metal."""
     named = dict.fromkeys(metals()) | {"own": "own E, nu, yield stress"} | other
     return Template(_source("body.html")).substitute(
-        body=body, options=_options(named, "S355"), flows=_options(FLOWS, "perfect")
+        body=body, options=_options(named, "S355"), flows=_options(FLOWS, "hardens")
     )
 
 
@@ -79,6 +84,7 @@ def law_data() -> tuple[str, bytes]:
         "multiples": yield_model.MULTIPLES.tolist(),
         "elastic": _json(elastic_model.TABLE),
         "kernels": _json(yield_model.KERNELS),
+        "hardening": _json(hardening_model.TABLE),
         "range": _range(),
         "metals": metals(),
         "exports": _exports(),

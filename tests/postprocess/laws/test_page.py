@@ -16,14 +16,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from archord.materials.hardening import TabularHardening
 from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.page.page import HERE, law_data, law_page
+from archord.scene.file import load_scene
 from tests.postprocess.laws import browser
 
 PAGE = Path(__file__).parents[3] / "docs" / "law.html"
+PEEQ = (0.0, 0.004, 0.03, 0.2)  # of the points of a hardening curve
 CLIENT = """
 import { readFileSync } from "node:fs";
 import { generalLaw, lawData } from "HERE/law.mjs";
@@ -85,14 +88,6 @@ def case(joint: dict[str, Any], places: Any = (), suffixes: Any = ()) -> dict[st
     }
 
 
-def law_or_reason(given: dict[str, Any]) -> JointCurve | str:
-    """The law of a joint, or the sentence that refuses it."""
-    try:
-        return general_law(LawJoint(**given))
-    except ValueError as error:
-        return str(error)
-
-
 def random_joints(count: int) -> list[dict[str, Any]]:
     """Joints of all kinds, some of them outside the range."""
     rng = np.random.default_rng(3604)
@@ -101,7 +96,7 @@ def random_joints(count: int) -> list[dict[str, Any]]:
         radius = 10 ** rng.uniform(0, 2)
         clearance = radius * 10 ** rng.uniform(-3, -1.7)
         modulus = 10 ** rng.uniform(4, 5.5)
-        stresses = modulus * clearance / radius * 10 ** rng.uniform(-0.75, 0.8, 2)
+        stresses = modulus * clearance / radius * 10 ** rng.uniform(-0.9, 0.8, 2)
         given = {
             "radius": radius,
             "clearance": clearance,
@@ -115,8 +110,26 @@ def random_joints(count: int) -> list[dict[str, Any]]:
             given["pin_yield"] = stresses[0]
         if kind in ("block", "both", "unlike"):
             given["block_yield"] = stresses[1 if kind == "unlike" else 0]
+        for body in ("pin", "block"):
+            if f"{body}_yield" in given and rng.uniform() < 0.4:
+                rises = np.array([1.0, 1.0, rng.uniform(1, 1.6), rng.uniform(1.6, 2)])
+                stress = given[f"{body}_yield"] * rises
+                given[f"{body}_hardening"] = np.column_stack([PEEQ, stress]).tolist()
         joints.append(given)
     return joints
+
+
+def law_or_reason(given: dict[str, Any]) -> JointCurve | str:
+    """The law of a joint, whose hardening is points, or the sentence that refuses it."""
+    curves = {
+        name: TabularHardening(tuple((peeq, stress) for peeq, stress in points))
+        for name, points in given.items()
+        if name.endswith("hardening")
+    }
+    try:
+        return general_law(LawJoint(**given | curves))
+    except ValueError as error:
+        return str(error)
 
 
 def test_the_page_is_the_one_that_its_sources_make():
@@ -281,6 +294,20 @@ def test_the_page_says_what_python_says_and_its_address_keeps_the_joint(opened):
     opened.run("new Promise((done) => setTimeout(done, 100))")
     said = opened.run("document.getElementById('refused').textContent")
     assert said == "archord: dR/R = 0.5 is outside 0.001 to 0.02."
+
+
+def test_metals_by_name_are_the_metals_of_scenes(opened):
+    sizes = "diameter=20&by=given&clearance=0.05&length=1&plane=strain&deepest=0"
+    opened.run(f"location.hash = '{sizes}&pin-metal=4340&block-metal=2024-T3&delta=0.12'")
+    opened.run("new Promise((done) => setTimeout(done, 100))")
+    assert opened.run(READY)
+    metals = {"pin.material": '"4340"', "block.material": '"2024-T3"'}
+    told = [f"{key}={value}" for key, value in metals.items()]
+    joint = LawJoint.from_scene(load_scene(PAGE.parents[1] / "scenes" / "steel_pin.toml", told))
+    state = general_law(joint).at(0.12)
+    assert (joint.radius, joint.plane) == (10.0, "strain")
+    load = float(opened.run("document.getElementById('load').value"))
+    assert load == pytest.approx(state.load, rel=1e-5)
 
 
 def test_all_files_can_be_saved(opened):
