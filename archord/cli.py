@@ -30,6 +30,7 @@ FILES = {
     "sweep_commands": ("sweep",),
     "law_commands": ("laws", "law"),
     "fit_command": ("fit",),
+    "identify_command": ("identify",),
     "benchmark_commands": ("reproduce", "benchmark"),
 }
 SOLVERS = (

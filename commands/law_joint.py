@@ -79,7 +79,7 @@ def _joint_of_scene(
             "--set"
         )
         raise InputError(f"--E-star {values['E_star']:g}: {said}.")
-    before = _law_scene(path, overrides)
+    before = law_scene(path, overrides)
     changes = {
         f"{key}={value}": name for name, value in values.items() for key in _keys(before, name)
     }
@@ -90,7 +90,7 @@ def _joint_of_scene(
         if same:
             raise InputError(f"{option}: does not go with --set {same}; give one of them.")
     try:
-        found = _law_scene(path, (*overrides, *changes))
+        found = law_scene(path, (*overrides, *changes))
     except InputError as error:
         said = str(error)
         for change, option in typed.items():
@@ -106,7 +106,7 @@ def _joint_of_scene(
     return joint, units, found.thickness
 
 
-def _law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
+def law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
     """The scene in ``path``. The closed-form laws are of the paper's joint alone: raises
     `InputError` for a scene that has none."""
     from archord.scene.file import load_scene

@@ -1,0 +1,184 @@
+"""Joints identified from measured curves: what comes back, how sure it is, and what is refused."""
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archord
+from archord.cli import run
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.identification.identification import identify
+from archord.postprocess.laws.identification.identify_report import doubts
+from archord.postprocess.laws.identification.measured import MeasuredCurve, read_curve
+from archord.postprocess.laws.identification.unknowns import COMPLIANCE, OFFSET
+from archord.report.errors import InputError
+
+SCENES = Path(__file__).parents[3] / "scenes"
+STEEL = str(SCENES / "steel_pin.toml")
+ELASTIC = str(SCENES / "elastic_pin.toml")
+BOTH = "block.yield_stress,pin.yield_stress"
+OFF = 0.013
+SOFT = 2e-6  # compliance of the machine
+
+
+def measured(path, changes, seed, turns=(-0.1, 2.0, 0.6), n=400, noise=0.01, soft=SOFT):
+    """A curve of the law of a scene through ``turns`` (over dR), with noise over its largest
+    force."""
+    scene = archord.load_scene(path, changes)
+    law = general_law(LawJoint.from_scene(scene))
+    ways = itertools.pairwise(turns)
+    delta = scene.joint.dR * np.concatenate([np.linspace(*way, n // 2) for way in ways])
+    load = law.at(delta, np.maximum.accumulate(delta)).load
+    stray = noise * load.max() * np.random.default_rng(seed).normal(size=len(load))
+    return MeasuredCurve(delta + OFF + soft * load, load + stray)
+
+
+def said(found):
+    return "\n".join(doubts(found))
+
+
+@pytest.fixture(scope="module")
+def steel():
+    """A joint with another clearance and yield stress than the scene's, of which both are sought,
+    beside offset and machine."""
+    changes = {"joint.clearance": 0.06, "block.yield_stress": 260.0, "pin.yield_stress": 260.0}
+    curve = measured(STEEL, changes, seed=4)
+    return identify(archord.load_scene(STEEL), curve, ["joint.clearance", BOTH])
+
+
+def test_clearance_and_yield_stress_come_back_from_a_noisy_curve(steel):
+    """With 1 % noise, an unknown offset and an unknown machine: 2 % and 3 %."""
+    clearance, strength, offset, softness = (one.value for one in steel.estimates)
+    assert clearance == pytest.approx(0.06, rel=0.02)
+    assert strength == pytest.approx(260.0, rel=0.03)
+    assert offset == pytest.approx(OFF, abs=0.0006)
+    assert softness == pytest.approx(SOFT, rel=0.05)
+    assert all(one.low < one.value < one.high for one in steel.estimates)
+    assert doubts(steel) == []
+
+
+def test_95_percent_intervals_hold_the_truth_in_88_to_99_of_100_curves():
+    """Of an elastic joint, whose law is fast, over fixed seeds."""
+    scene = archord.load_scene(ELASTIC)
+    dR = scene.joint.dR
+    inside = []
+    for seed in range(40):
+        curve = measured(ELASTIC, {}, seed, n=60, soft=0.0)
+        found = identify(scene, curve, ["joint.clearance"], stiffness=np.inf)
+        truth = [dR, OFF]
+        inside += [one.low <= t <= one.high for one, t in zip(found.estimates, truth, strict=True)]
+    assert 0.88 <= np.mean(inside) <= 0.99
+
+
+def test_stray_points_move_nothing():
+    """Six of 200 points are wild; the loss of each is bounded in its slope."""
+    curve = measured(ELASTIC, {}, 1, n=200, noise=0.005)
+    load = curve.load.copy()
+    load[20::35] += 0.6 * curve.largest
+    scene = archord.load_scene(ELASTIC)
+    found = identify(
+        scene, MeasuredCurve(curve.displacement, load), ["joint.clearance"], stiffness=1 / SOFT
+    )
+    assert found.estimates[0].value == pytest.approx(scene.joint.dR, rel=0.03)
+
+
+def test_what_cannot_be_told_apart_is_said():
+    """A yield stress of an elastic curve; an offset without a point before first touch."""
+    curve = measured(STEEL, {}, 2, turns=(0.03, 0.15), n=100)
+    found = identify(
+        archord.load_scene(STEEL), curve, ["joint.clearance", BOTH], stiffness=1 / SOFT
+    )
+    assert "yield_stress: cannot be told, the curve does not depend on it" in said(found)
+    found = identify(archord.load_scene(STEEL), curve, ["joint.clearance", "block.E,pin.E"])
+    assert "can hardly be told apart" in said(found)
+    assert "no points before first touch" in said(found)
+
+
+def test_units_that_are_wrong_by_1000_end_at_a_bound():
+    curve = measured(STEEL, {}, 3, n=100, soft=0.0)
+    kilo = MeasuredCurve(curve.displacement, curve.load / 1000)
+    found = identify(archord.load_scene(STEEL), kilo, ["block.E,pin.E", BOTH], stiffness=np.inf)
+    assert "is at a bound of what was allowed" in said(found)
+    assert "check the units" in said(found)
+
+
+@pytest.mark.parametrize(
+    ("free", "words"),
+    [
+        ("analysis.friction", "is no positive number"),
+        ("joint.block_size", "the law does not depend on joint.block_size"),
+        ("block.strength", "a scene has no key block.strength"),
+        ("joint.clearance,joint.clearance", "frees a key twice"),
+        ("joint.clearance=3:1", "the lower one first"),
+        ("joint.clearance=few", "must read LOW:HIGH"),
+    ],
+)
+def test_a_key_that_cannot_be_free_is_refused(free, words):
+    scene = archord.load_scene(STEEL, {"joint.block_size": 900.0})
+    with pytest.raises(InputError, match=words):
+        identify(scene, MeasuredCurve(np.arange(30.0), np.arange(30.0)), [free])
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "words"),
+    [
+        ("u,F\n" + "".join(f"{k},{2 * k}\n" for k in range(9)), (8, 16), None),
+        ("time;u [mm];F (N)\n" + "".join(f"0;{k},5;{k}\n" for k in range(9)), (8.5, 8), None),
+        ("".join(f"{k} {-2 * k}\n" for k in range(9)), (8, 16), "forces are negative"),
+        ("".join(f"{-k} {-2 * k}\n" for k in range(9)), (8, 16), "are turned round"),
+        ("u,F\n0,nan\n1,\n" + "".join(f"{k},{2 * k}\n" for k in range(9)), (8, 16), "2 of 11 rows"),
+    ],
+)
+def test_files_of_many_kinds_are_read(tmp_path, text, expected, words):
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    names = ("u", "F") if "time" in text else (None, None)
+    curve = read_curve(path, *names)
+    assert (curve.displacement[-1], curve.load[-1]) == expected
+    assert (words or "") in "\n".join(curve.said)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "has 0 rows with two numbers"),
+        ("u,F\n1,2\n", "has 1 rows with two numbers"),
+        ("u\n1\n2\n", "has 0 rows with two numbers"),
+        ("u,F\n1,many\n", 'not "many"'),
+        ("u,F\n" + 9 * "1,2\n", "are all the same"),
+    ],
+)
+def test_files_without_a_curve_are_refused(tmp_path, text, words):
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_curve(path)
+    with pytest.raises(InputError, match="has no column 'force'"):
+        read_curve(path, load="force")
+
+
+def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
+    curve = measured(ELASTIC, {"joint.clearance": 0.006}, 5, turns=(-0.1, 1.5), n=100, soft=0.0)
+    path = tmp_path / "curve.csv"
+    table = np.column_stack([curve.displacement, curve.load])
+    np.savetxt(path, table, delimiter=",", header="delta,P", comments="")
+    words = ["identify", str(path), "--scene", ELASTIC, "--free", "joint.clearance"]
+    words += ["--machine-stiffness", "rigid", "--no-confirm", "-o", str(tmp_path / "out")]
+    assert run(words) == 0
+    out = capsys.readouterr().out
+    assert "joint.clearance" in out
+    data = json.loads((tmp_path / "out" / "identified.json").read_text())
+    scene = archord.load_scene(tmp_path / "out" / "identified.toml")
+    assert scene.joint.dR == pytest.approx(data["estimates"][0]["value"], rel=1e-8)
+    assert scene.joint.dR == pytest.approx(0.006, rel=0.03)
+    assert data["estimates"][1]["name"] == OFFSET
+    assert data["fixed"] == {COMPLIANCE: 0.0}
+    assert (tmp_path / "out" / "identified.png").read_bytes()[1:4] == b"PNG"
+    assert run(words) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert run([*words, "--force", "--offset", "deep"]) == 2
+    assert "--offset deep: must be a number, or free" in capsys.readouterr().err
