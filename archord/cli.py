@@ -28,6 +28,7 @@ FILES = {
     "result_commands": ("show", "compare", "export", "export-deck", "picture", "report", "probe"),
     "margin_command": ("margin",),
     "sweep_commands": ("sweep",),
+    "dataset_command": ("dataset",),
     "law_commands": ("laws", "law"),
     "fit_command": ("fit",),
     "identify_command": ("identify",),

@@ -1,0 +1,141 @@
+"""A dataset of solved joints: first loading and way back, with the error of each force, as CSV
+tables with checksums.
+
+The joints are drawn once, always the same 5 000, in an order in which any first part of them holds
+all kinds. They are solved as a sweep. The tables have six digits. A machine with the same libraries
+writes the same bytes; other libraries may change a last digit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archord.postprocess.laws.general.joint import Array
+from archord.postprocess.laws.general.law_fit import EARLY, NodeRun, first_loading, solved_in
+from archord.report.files import replacing, write_rows
+from archord.studies.law_design import FRESH, Drawn, Row, joints, sweep_file
+
+JOINTS = 5000
+SEED = 2026
+_MESH_ERROR = 6e-4  # of P, relative: elements of 5 %R, beyond 0.1 dR
+_SHUFFLE = 1
+_ELASTIC = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]  # delta/dR
+_BACK = (0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.58, 0.48, 0.37, 0.25)  # parts of the deepest
+NUMBERS = ("plane strain", "p", "m", "n", "dR/R", "pin s", "block s")
+
+
+def scenes(number: int) -> list[Row]:
+    """The scenes of the first ``number`` joints."""
+    drawn = [joint for kind, share in _shares() for joint in joints(kind, share, SEED)]
+    order = np.random.default_rng(_SHUFFLE).permutation(len(drawn))
+    return [row for place in order[:number] for row in _runs(drawn[place])]
+
+
+def _shares() -> list[tuple[str, int]]:
+    """How many of all joints are of each kind, as in the check of the law."""
+    ends = np.cumsum([0, *FRESH.values()])
+    shares = np.diff(np.round(ends * JOINTS / ends[-1]))
+    return [(kind, int(share)) for kind, share in zip(FRESH, shares, strict=True)]
+
+
+def _runs(joint: Drawn) -> list[Row]:
+    """The scenes of a joint: elastic to 3 dR; what yields also back, and once more with twice as
+    many steps where it yields early."""
+    if np.isinf(joint.first):
+        return [joint.own | {"load.displacement": _ELASTIC}]
+    late = [joint.first * 0.95 * 1.2**k for k in range(30)]
+    early = [x for x in _ELASTIC if x < 0.8 * joint.first]
+    loading = [*early, *(x for x in late if x < 2.9), _ELASTIC[-1]]
+    back = [_ELASTIC[-1] * part for part in _BACK]
+    runs = [joint.own | {"load.displacement": [*loading, *back]}]
+    if min(joint.numbers[5:]) < EARLY:
+        runs.append(joint.own | {"load.displacement": loading, "load.steps": 2})
+    return runs
+
+
+def write_sweep(number: int, file: Path) -> None:
+    """Write the sweep of the first ``number`` joints."""
+    with replacing(file) as new:
+        new.write_text(sweep_file(scenes(number)), encoding="utf-8")
+
+
+def write_tables(sweep: Path, folder: Path) -> list[Path]:
+    """Write joints.csv, curves.csv and SHA256SUMS into ``folder``, from the solved joints of the
+    folder ``sweep``; returns the files. Raises `ValueError` if none is solved."""
+    solved = sorted(solved_in(sweep).items())
+    if not solved:
+        raise ValueError(f"{sweep}: no joint is solved.")
+    table = []
+    curves: list[dict[str, object]] = []
+    for number, (numbers, runs) in enumerate(solved, 1):
+        table.append({"joint": number} | _short(dict(zip(NUMBERS, numbers, strict=True))))
+        curves += [{"joint": number} | _short(row) for row in _curve(runs)]
+    files = [folder / "joints.csv", folder / "curves.csv"]
+    for file, rows in zip(files, (table, curves), strict=True):
+        write_rows(rows, file)
+    sums = folder / "SHA256SUMS"
+    with replacing(sums) as new:
+        new.write_text(checksums(files), encoding="utf-8")
+    return [*files, sums]
+
+
+def checksums(files: Iterable[Path]) -> str:
+    """A line for each of the ``files``, as ``sha256sum -c`` reads them."""
+    digests = ((hashlib.sha256(file.read_bytes()).hexdigest(), file.name) for file in files)
+    return "".join(f"{digest}  {name}\n" for digest, name in digests)
+
+
+def _curve(runs: Sequence[NodeRun]) -> Iterable[dict[str, Any]]:
+    """First loading, extrapolated to infinitely many steps where the joint was solved twice, and
+    the way back."""
+    nodes = first_loading(list(runs))
+    errors: Array = np.hypot(_MESH_ERROR, _step_error(runs, nodes))
+    x, y, p0, eps = nodes.T
+    for values in zip(x, y, errors * y, p0, eps, strict=True):
+        yield _row("loading", *values)
+    for run in runs:
+        if run.steps > 1 or len(run.back) < 2:
+            continue
+        deepest = float(run.back[0, 0])
+        largest = float(run.back[0, 1])
+        extrapolated = float(np.interp(deepest, nodes[:, 0], nodes[:, 1]))
+        error = _MESH_ERROR * largest + abs(extrapolated - largest)
+        for point in run.back[1:]:
+            yield _row(f"back from {deepest:.4g}", point[0], point[1], error)
+
+
+def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:
+    """What the extrapolated forces differ from the forces of the finer run; 0 without one."""
+    fine = [run for run in runs if run.steps == 2 and run.loading == len(nodes)]
+    if not fine:
+        return np.zeros(len(nodes))
+    return np.abs(fine[0].nodes[: len(nodes), 1] / nodes[:, 1] - 1)
+
+
+def _row(
+    way: str, x: float, y: float, error: float, p0: float = np.nan, eps: float = np.nan
+) -> dict[str, Any]:
+    return {
+        "way": way,
+        "delta/dR": x,
+        "P/(E* dR)": y,
+        "error of P/(E* dR)": error,
+        "p0 R/(E* dR)": p0,
+        "eps": eps,
+    }
+
+
+def _short(row: dict[str, Any]) -> dict[str, object]:
+    """With six digits; nothing for what is not known."""
+    return {key: _written(value) for key, value in row.items()}
+
+
+def _written(value: Any) -> object:
+    if isinstance(value, str):
+        return value
+    return "" if np.isnan(value) else f"{value:.6g}"
