@@ -15,8 +15,8 @@ from archord.measures.record import Record
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
 from archord.output.files.seal import TABLES, fault_of, read_report, require_intact
-from archord.output.finished import history_fault
-from archord.output.folder import CHECKPOINT
+from archord.output.finished import fault_of_run, history_fault
+from archord.output.folder import CHECKPOINT, report_of
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
@@ -59,7 +59,10 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
     if not extend and not (folder / CHECKPOINT).exists():
         if (folder / "scene.toml").exists():
             _same_but_for_the_load(folder, load_scene(folder / "scene.toml"), scene)
-        return Plan(scene, None, f"{folder} holds no accepted step: starting from the beginning")
+        if scene.output.checkpoint:
+            said = f"{folder} holds no accepted step: starting from the beginning"
+            return Plan(scene, None, said)
+        return _plan_without_checkpoint(folder, scene)
     start = _start(folder, scene)
     step, total = start.checkpoint.step, len(scene.targets)
     if extend and step == total:
@@ -76,6 +79,16 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
     said = f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}"
     changed = [name for name in TABLES if fault_of(folder, name, start.report.get("files", {}))]
     return Plan(scene, start, f"{said}, writing {' and '.join(changed)} again" if changed else said)
+
+
+def _plan_without_checkpoint(folder: Path, scene: AnyScene) -> Plan:
+    """A finished run stays, another one is solved from the beginning."""
+    report = report_of(folder)
+    if report.get("status") == "done" and not fault_of_run(folder, scene, report):
+        said = f"the run in {folder} is finished: nothing to do"
+        return Plan(scene, None, said, finished=True)
+    said = f"{folder} has no checkpoint, as output.checkpoint = false: starting from the beginning"
+    return Plan(scene, None, said)
 
 
 def _lost_tables(folder: Path, scene: AnyScene, report: dict[str, Any]) -> list[str]:
@@ -99,6 +112,9 @@ def _ends(path: Path, ending: str) -> bool:
 def _start(folder: Path, scene: AnyScene) -> Start:
     """Read what the run left. Raises `InputError` if that is not the first steps of ``scene``."""
     path = folder / CHECKPOINT
+    if not scene.output.checkpoint and not path.exists():
+        said = "has no checkpoint, as it was solved with output.checkpoint = false"
+        raise InputError(f"{folder}: {said}, so that the run cannot be continued.")
     checkpoint = checkpoints.read(path)
     data = tomllib.loads(checkpoint.scene)
     find_mesh(data.get("mesh"), folder)

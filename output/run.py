@@ -235,9 +235,10 @@ class _Output:
             seconds = now - self._last
             self._last = now
             m = self.account.step(self.steps, step, profiles, work.total, seconds)
-        with self.system.timer("checkpoint"):
-            checkpoint = halt(self._order, self._scene, m, step, position, work)
-            self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
+        if self.account.scene.output.checkpoint:
+            with self.system.timer("checkpoint"):
+                checkpoint = halt(self._order, self._scene, m, step, position, work)
+                self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m
 
@@ -256,7 +257,8 @@ class _Output:
             def write() -> None:
                 if account.scene.output.fields:
                     self._write_fields(m.at, fields, before)
-                self._write_contact(m.at, profiles, before)
+                if account.scene.output.contact:
+                    self._write_contact(m.at, profiles, before)
                 write_history(self.folder / "history.csv", account.columns, self.steps)
                 self._report.add(step, warnings)
 

@@ -43,7 +43,7 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
 
     run.number(None)
     tables = {folder / "history.csv": run.history}
-    if run.has_contact:
+    if run.has_profiles:
         names = ["step", run.view.path_name]
         steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
         contact = pd.concat(steps, names=names).reset_index(level=[0, 1])
@@ -65,7 +65,7 @@ def export_vtk(
     last = run.number(step)
     steps = range(1, last + 1) if step is None else [last]
     parts = {"bodies": _bodies(run, last)}
-    if run.has_contact:
+    if run.has_profiles:
         parts["contact"] = _contact(run, last)
     if run.scene.output.fields == "points":
         parts["points"] = _points(run, last)

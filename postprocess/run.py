@@ -169,6 +169,10 @@ class Run:
         step = self.number(step)
         if not self.has_contact:
             raise InputError(f"{self.folder}: has no contact: its scene has no interaction.")
+        if not self.has_profiles:
+            raise InputError(
+                f"{self.folder}: has no contact.h5: it was solved with output.contact = false."
+            )
         return read_contact(self.folder, self.scene, step)
 
     def arc(self, step: int | None = None, side: str | None = None) -> Any:
@@ -248,6 +252,11 @@ class Run:
     def has_contact(self) -> bool:
         """Whether anything may touch."""
         return self.view.has_contact
+
+    @property
+    def has_profiles(self) -> bool:
+        """Whether the run wrote the contact along the surfaces."""
+        return self.has_contact and self.scene.output.contact
 
     @property
     def sides(self) -> list[str]:

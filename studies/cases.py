@@ -45,6 +45,8 @@ from archord.scene.sections.keys import Section
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
+# what the base scene of a sweep holds where it says nothing: P differs by 1e-6 at most
+DEFAULTS = {"analysis.tolerance": 1e-5, "output.contact": False, "output.checkpoint": False}
 _MOST_SENTENCES = 20
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
 _SOLVED_ALIKE_SINCE = (
@@ -143,9 +145,9 @@ class SweepFile(Section):
 
 def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     """Read and check the sweep file ``path``; ``base`` then is the base scene's table, with
-    ``overrides`` like ``"joint.radius=2"`` on top and the targets of its load.path, and other paths
-    are absolute. It is not checked, as it may be whole only with what is varied. Raises
-    `InputError` with one sentence per fault."""
+    `DEFAULTS`, with ``overrides`` like ``"joint.radius=2"`` on top and the targets of its
+    load.path, and other paths are absolute. It is not checked, as it may be whole only with what is
+    varied. Raises `InputError` with one sentence per fault."""
     data = read_toml(path)
     if "base" not in data and not {"joint", "mesh", *PRESETS}.isdisjoint(data):
         raise InputError(
@@ -160,6 +162,8 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:
         raise InputError("\n".join(_sentence(fault, path) for fault in error.errors())) from None
+    if not _was_solved(path):
+        _add_defaults(sweep.base)
     for override in in_order(overrides, "--set "):
         override_key(sweep.base, override)
     read_targets(sweep.base, source)
@@ -168,6 +172,21 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
         if "load.path" in table:
             table["load.path"] = _absolute(table["load.path"], path.parent)
     return sweep
+
+
+def _was_solved(path: Path) -> bool:
+    """Whether ``path`` is the file of a sweep's folder: its cases may be of a version without
+    `DEFAULTS`."""
+    return path.name == "sweep.toml" and (path.parent / "cases").is_dir()
+
+
+def _add_defaults(base: dict[str, Any]) -> None:
+    """Put `DEFAULTS` into the table ``base`` of a scene, where it says nothing."""
+    for key, value in DEFAULTS.items():
+        section, _, name = key.partition(".")
+        table = base.setdefault(section, {})
+        if isinstance(table, dict):  # anything else is a fault of every case
+            table.setdefault(name, value)
 
 
 def _absolute(value: Any, folder: Path) -> Any:
@@ -340,6 +359,8 @@ def run_name(scene: AnyScene) -> str:
         "stress": fields in ("nodes", "points"),
         "points": fields == "points",
     }
+    later = {"contact": scene.output.contact, "checkpoint": scene.output.checkpoint}
+    data["output"] |= {name: written for name, written in later.items() if not written}
     for name in [name for name, default in _LATER.items() if data["analysis"].get(name) == default]:
         del data["analysis"][name]
     return hashlib.sha256(

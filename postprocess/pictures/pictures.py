@@ -128,7 +128,7 @@ def panels_of(
         draws.append(lambda axes: draw_fields(axes, run, first, of_body))
     if edges:
         draws.append(lambda axes: problems.edge_panel(axes, run, edges, field, numbers))
-    elif run.has_contact:
+    elif run.has_profiles:
         draws.append(lambda axes: draw_contact(axes, run, numbers))
     draws.append(lambda axes: draw_forces(axes, run))
     return draws

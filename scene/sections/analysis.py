@@ -156,6 +156,15 @@ class Output(Section):
         "none, true is the default",
         default="cells",
     )
+    contact: bool = key(
+        "write the contact along the surfaces at every step to contact.h5; sweeps: false",
+        default=True,
+    )
+    checkpoint: bool = key(
+        "write the state after every step to checkpoint.h5, from which a run can be continued; "
+        "sweeps: false",
+        default=True,
+    )
 
     @model_validator(mode="before")
     @classmethod

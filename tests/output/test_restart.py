@@ -374,3 +374,19 @@ def test_two_processes_do_not_write_to_one_folder(tmp_path):
     with occupied(tmp_path), pytest.raises(InputError, match="another archord is solving into it"):
         solve_scene(problem, tmp_path, MPI.COMM_SELF)
     assert solve_scene(problem, tmp_path, MPI.COMM_SELF).status == "done"
+
+
+def test_a_run_without_checkpoint_begins_again_and_says_so(tmp_path):
+    """It is complete but for what the scene left out; commands name the key."""
+    lean = scene(0.2, 2, output={"fields": False, "contact": False, "checkpoint": False})
+    run(lean, tmp_path, crash=1)
+    plan = plan_restart(tmp_path, lean)
+    assert (plan.start, plan.finished) == (None, False)
+    assert plan.said.endswith("as output.checkpoint = false: starting from the beginning")
+    run(lean, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "history.csv", "run.json"}
+    assert plan_restart(tmp_path, lean).finished
+    with pytest.raises(InputError, match=r"output\.checkpoint = false, so that the run cannot"):
+        plan_restart(tmp_path, extend=True)
+    with pytest.raises(InputError, match=r"it was solved with output\.contact = false\.\Z"):
+        Run(tmp_path).contact()

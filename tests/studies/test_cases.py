@@ -14,11 +14,14 @@ from hypothesis import strategies as st
 
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, resolved
+from archord.scene.sections.errors import toml_value
 from archord.studies.cases import (
+    DEFAULTS,
     LatinHypercube,
     SweepFile,
     combinations,
     factors,
+    load_sweep,
     read_sweep,
     run_name,
     samples,
@@ -28,6 +31,7 @@ from archord.studies.sweep import part_of
 SCENES = Path(__file__).parents[2] / "scenes"
 DOCS = SCENES.parent / "docs"
 ELASTIC = str(SCENES / "elastic_pin.toml")
+OF_SWEEPS = [f"{key}={toml_value(value)}" for key, value in DEFAULTS.items()]
 
 
 def written(folder: Path, text: str, base: str = ELASTIC) -> Path:
@@ -121,7 +125,7 @@ def test_overrides_mean_what_set_means(tmp_path):
     ]
     found = read_sweep(written(tmp_path, text)).cases
     assert [resolved(case.scene) for case in found] == [
-        resolved(load_scene(ELASTIC, some)) for some in options
+        resolved(load_scene(ELASTIC, [*some, *OF_SWEEPS])) for some in options
     ]
     text = '[grid]\nblock.yield_stress = ["none", 300.0]'
     plastic = read_sweep(written(tmp_path, text, str(SCENES / "steel_pin.toml")))
@@ -138,7 +142,9 @@ def test_identical_scenes_are_one_run(tmp_path):
     sweep = read_sweep(written(tmp_path, text))
     assert (len(sweep.cases), len(sweep.distinct)) == (6, 2)
     assert [case.number for case in sweep.distinct] == [1, 3]
-    assert sweep.cases[0].run == run_name(load_scene(ELASTIC, ["joint.clearance=0.005"]))
+    assert sweep.cases[0].run == run_name(
+        load_scene(ELASTIC, ["joint.clearance=0.005", *OF_SWEEPS])
+    )
     assert len({run_name(load_scene(ELASTIC, [f"load.steps={n}"])) for n in range(1, 20)}) == 19
 
 
@@ -263,6 +269,28 @@ def test_examples_are_sound(tmp_path):
     for file, number in files.items():
         sweep = read_sweep(file)
         assert len(sweep.cases) == len(sweep.distinct) == number
+
+
+def test_a_sweep_asks_for_less_than_a_scene_unless_it_says_so(tmp_path):
+    """No contact.h5, no checkpoint, a wider tolerance; what is solved already stays so."""
+
+    def asked(file: Path, *overrides: str) -> tuple[float, bool, bool]:
+        scene = read_sweep(file, overrides).cases[0].scene
+        return scene.analysis.tolerance, scene.output.contact, scene.output.checkpoint
+
+    file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.006]")
+    assert asked(file) == (1e-5, False, False)
+    assert asked(file, "analysis.tolerance=1e-8") == (1e-8, False, False)
+    assert asked(file, "analysis.tolerance=none", "output.contact=true")[:2] == (1e-10, True)
+    folder = tmp_path / "solved"
+    (folder / "cases").mkdir(parents=True)
+    (folder / "sweep.toml").write_text(load_sweep(file).resolved())
+    assert asked(folder / "sweep.toml") == (1e-5, False, False)
+    base = tomllib.loads(Path(ELASTIC).read_text())
+    (folder / "sweep.toml").write_text(tomli_w.dumps({"base": base}))
+    assert asked(folder / "sweep.toml") == (1e-10, True, True)
+    varied = written(tmp_path, "[grid]\noutput.checkpoint = [true]")
+    assert asked(varied) == (1e-5, False, True)
 
 
 def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
