@@ -126,13 +126,12 @@ def test_a_whole_pin_in_a_whole_hole_is_twice_its_half(quads, kinematics):
     assert np.abs(left - right).max() < 0.02 * force.max()
 
 
-@pytest.mark.parametrize("quads", [False, True])
-def test_cells_and_orders_agree(quads):
+def test_cells_and_orders_agree():
     """Triangles and quads, geometry and displacements of second and third order, also one of each:
     P and its peak."""
-    fine, expected = press(rings(MPI.COMM_SELF, 4, quads=not quads, order=3), degree=3)
+    fine, expected = press(rings(MPI.COMM_SELF, 4, quads=True, order=3), degree=3)
     peak = fine.contact.pair_of(fine.sides["hole"]).pressure.max()
-    for order, degree in ((2, 2), (2, 3), (3, 2)):
+    for quads, order, degree in ((False, 2, 2), (True, 2, 3), (False, 3, 2), (False, 3, 3)):
         system, force = press(rings(MPI.COMM_SELF, 4, quads=quads, order=order), degree=degree)
         assert force == pytest.approx(expected, rel=2e-4)
         assert system.contact.pair_of(system.sides["hole"]).pressure.max() == pytest.approx(
