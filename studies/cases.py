@@ -45,8 +45,8 @@ from archord.scene.sections.keys import Section
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
-# what the base scene of a sweep holds where it says nothing: P differs by 1e-6 at most
-DEFAULTS = {"analysis.tolerance": 1e-5, "output.contact": False, "output.checkpoint": False}
+# what the base scene of a sweep holds where it says nothing: P differs by 1e-7 at most
+DEFAULTS = {"analysis.tolerance": 1e-6, "output.contact": False, "output.checkpoint": False}
 _MOST_SENTENCES = 20
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
 _SOLVED_ALIKE_SINCE = (

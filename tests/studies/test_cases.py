@@ -279,18 +279,18 @@ def test_a_sweep_asks_for_less_than_a_scene_unless_it_says_so(tmp_path):
         return scene.analysis.tolerance, scene.output.contact, scene.output.checkpoint
 
     file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.006]")
-    assert asked(file) == (1e-5, False, False)
+    assert asked(file) == (1e-6, False, False)
     assert asked(file, "analysis.tolerance=1e-8") == (1e-8, False, False)
     assert asked(file, "analysis.tolerance=none", "output.contact=true")[:2] == (1e-10, True)
     folder = tmp_path / "solved"
     (folder / "cases").mkdir(parents=True)
     (folder / "sweep.toml").write_text(load_sweep(file).resolved())
-    assert asked(folder / "sweep.toml") == (1e-5, False, False)
+    assert asked(folder / "sweep.toml") == (1e-6, False, False)
     base = tomllib.loads(Path(ELASTIC).read_text())
     (folder / "sweep.toml").write_text(tomli_w.dumps({"base": base}))
     assert asked(folder / "sweep.toml") == (1e-10, True, True)
     varied = written(tmp_path, "[grid]\noutput.checkpoint = [true]")
-    assert asked(varied) == (1e-5, False, True)
+    assert asked(varied) == (1e-6, False, True)
 
 
 def test_set_changes_the_base_but_nothing_that_varies(tmp_path):

@@ -29,7 +29,7 @@ def test_each_case_is_what_solve_makes_of_it(solved, tmp_path):
     )
     for number, E, steps in ((1, 0.5, 2), (6, 1.82, 3)):
         keys = ["--set", f"pin.E={E}", "--set", f"load.steps={steps}"]
-        keys += ["--set", "analysis.tolerance=1e-5"]
+        keys += ["--set", "analysis.tolerance=1e-6"]
         assert (
             run(
                 [
