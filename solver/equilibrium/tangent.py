@@ -11,6 +11,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.kernels.blocks import add_blocks
 from archord.kernels.compat import ghosted_vector
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.assembly import assemble, matrix
@@ -126,7 +127,7 @@ class TangentMatrix:
         columns = columns[mine]
         self.A = self._allocated((rows, columns))
         # zeros into every other slot: what is not written before the first assembly is given back
-        self._add(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
+        add_blocks(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
         self.A.assemble()
         self.A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
         self._elastic = self.A.copy()
@@ -146,28 +147,13 @@ class TangentMatrix:
         is_free = self._prescribed[at] != dofs
         return is_free, np.where(is_free[..., None], 0.0, self._rates[at])
 
-    @staticmethod
-    def _add(A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: Array) -> None:
-        """Add blocks ``(k, d, d)`` at ``rows``, sorted, and ``columns`` to ``A``."""
-        if not len(rows):
-            return
-        start = np.flatnonzero(np.diff(rows, prepend=-1))
-        offsets = np.append(start, len(rows)).astype(PETSc.IntType)
-        A.setValuesBlockedIJV(
-            offsets,
-            columns.astype(PETSc.IntType),
-            values,
-            PETSc.InsertMode.ADD,
-            rows[start].astype(PETSc.IntType),
-        )
-
     def _add_contact(self, A: PETSc.Mat, blocks: Array) -> None:
         """Add ``blocks`` ``(k, d, d)`` in the slots of the contact to ``A``."""
         tangent = self.contact.tangent
         kept = filled(blocks)
         kept = kept[self._slots.in_matrix[kept]]
         values = blocks[kept] * self._slots.is_free[kept]
-        self._add(A, tangent.rows[kept], tangent.columns[kept], values)
+        add_blocks(A, tangent.rows[kept], tangent.columns[kept], values)
         A.assemble()
 
     def update(self, *, factorise: bool = True) -> None:

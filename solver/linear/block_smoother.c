@@ -25,21 +25,6 @@ static inline void row_times(const BlockRows *A, int d, int32_t from, int32_t to
     for (int32_t k = from; k < to; k++) add_product(d, A->block + k * (int64_t)(d * d), x + d * A->column[k], y);
 }
 
-static int32_t place_of(int32_t value, int32_t m, const int32_t *sorted)
-{
-    int32_t low = 0;
-    while (m > 0) {
-        int32_t half = m / 2;
-        if (sorted[low + half] < value) {
-            low += half + 1;
-            m -= half + 1;
-        } else {
-            m = half;
-        }
-    }
-    return low;
-}
-
 static void invert(int d, const float *B, float *inverse)
 {
     double a[9], work[9] = {0};
@@ -63,30 +48,36 @@ static void invert(int d, const float *B, float *inverse)
     for (int k = 0; k < d * d; k++) inverse[k] = (float)work[k];
 }
 
-void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values, int32_t first,
-                 int32_t m, const int32_t *ghosts)
+static int is_zero(int size, const double *block)
 {
-    const int d = A->d;
+    for (int k = 0; k < size; k++)
+        if (block[k] != 0.0) return 0;
+    return 1;
+}
+
+static void put(BlockRows *A, int32_t at, int32_t column, const double *block)
+{
+    const int size = A->d * A->d;
+    A->column[at] = column;
+    for (int k = 0; k < size; k++) A->block[(int64_t)size * at + k] = (float)block[k];
+}
+
+void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values,
+                 const int32_t *other_offsets, const int32_t *other_columns, const double *other_values)
+{
+    const int64_t size = A->d * A->d;
     int32_t at = 0;
     for (int32_t i = 0; i < A->n; i++) {
-        const int32_t *row = offsets + (int64_t)d * i;
-        const int32_t count = (row[1] - row[0]) / d;
         A->start[i] = at;
-        for (int elsewhere = 0; elsewhere < 2; elsewhere++) {
-            for (int32_t k = 0; k < count; k++) {
-                const int32_t global = columns[row[0] + d * k] / d;
-                const int32_t local = global - first;
-                if ((local < 0 || local >= A->n) != elsewhere) continue;
-                A->column[at] = elsewhere ? A->n + place_of(global, m, ghosts) : local;
-                if (local == i) A->middle[i] = at;
-                float *block = A->block + (int64_t)at * d * d;
-                for (int r = 0; r < d; r++)
-                    for (int c = 0; c < d; c++) block[d * c + r] = (float)values[row[r] + d * k + c];
-                at++;
-            }
-            if (!elsewhere) A->border[i] = at;
+        for (int32_t k = offsets[i]; k < offsets[i + 1]; k++) {
+            const int is_middle = columns[k] == i;
+            if (is_middle) A->middle[i] = at;
+            if (is_middle || !is_zero(size, values + size * k)) put(A, at++, columns[k], values + size * k);
         }
-        invert(d, A->block + (int64_t)A->middle[i] * d * d, A->inverse + (int64_t)i * d * d);
+        A->border[i] = at;
+        for (int32_t k = other_offsets[i]; k < other_offsets[i + 1]; k++)
+            if (!is_zero(size, other_values + size * k)) put(A, at++, A->n + other_columns[k], other_values + size * k);
+        invert(A->d, A->block + size * A->middle[i], A->inverse + size * i);
     }
     A->start[A->n] = at;
 }

@@ -12,10 +12,9 @@ typedef struct {
     float *inverse;  /* (n d d) of the diagonal blocks, by columns */
 } BlockRows;
 
-/* Fill A from scalar rows in double precision, whose first column on this rank is first; ghosts (m) are the block columns of
- * other ranks, sorted. */
-void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values, int32_t first,
-                 int32_t m, const int32_t *ghosts);
+/* Fill A from blocks in double precision, but those that are zero: in the rank's own columns, and in others (ghosts). */
+void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values,
+                 const int32_t *other_offsets, const int32_t *other_columns, const double *other_values);
 
 /* Smooth A x = b from x = 0 by a forward and a backward sweep; residual is what is left without the ghosts' part. work (n d). */
 void smooth_from_zero(const BlockRows *A, const double *b, float *x, float *work, double *residual);

@@ -14,6 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.kernels.blocks import Blocks
 from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_suffix(".c")
@@ -30,38 +31,26 @@ class BlockSmoother:
     def __init__(self, A: PETSc.Mat) -> None:
         self.matrix = A
         self._d = A.getBlockSize()
-        first, end = A.getOwnershipRange()
-        self._first = first // self._d
-        self._n = (end - first) // self._d
+        self._n = A.getLocalSize()[0] // self._d
         self.ghosts: np.ndarray = np.zeros(0, dtype=np.int32)
         self.x: np.ndarray = np.zeros((0, self._d), dtype=np.float32)
-        self._n_values = -1
+        self._n_blocks = -1
 
-    def update(self) -> None:
-        """Take the values of the matrix."""
-        offsets, columns, values = self.matrix.getValuesCSR()
-        offsets = offsets.astype(np.int32, copy=False)
-        columns = columns.astype(np.int32, copy=False)
-        if len(values) != self._n_values:
-            self._allocate(columns)
-            self._n_values = len(values)
-        library(_SOURCE).pack_blocks(
-            self._rows,
-            *map(pointer, (offsets, columns, values)),
-            self._first,
-            len(self.ghosts),
-            pointer(self.ghosts),
-        )
+    def update(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
+        """Take the values of the matrix, in the rank's ``own`` columns and those of ``ghosts``."""
+        n_blocks = len(own.columns) + len(others.columns)
+        if n_blocks != self._n_blocks:
+            self._allocate(n_blocks, ghosts)
+            self._n_blocks = n_blocks
+        arrays = [pointer(array) for part in (own, others) for array in part]
+        library(_SOURCE).pack_blocks(self._rows, *arrays)
 
-    def _allocate(self, columns: np.ndarray) -> None:
+    def _allocate(self, n_blocks: int, ghosts: np.ndarray) -> None:
         d = self._d
         n = self._n
-        nodes = columns[::d] // d
-        elsewhere = (nodes < self._first) | (nodes >= self._first + n)
-        self.ghosts = np.unique(nodes[elsewhere])
+        self.ghosts = ghosts
         self.x = np.zeros((n + len(self.ghosts), d), dtype=np.float32)
         self._work = np.zeros((n, d), dtype=np.float32)
-        n_blocks = len(columns) // d**2
         self._members = {
             "n": n,
             "d": d,

@@ -21,8 +21,10 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, lagrange_element
+from archord.kernels.blocks import Blocks, blocks_of
 from archord.materials.kinematics import kinematics
 from archord.solver.linear.block_smoother import BlockSmoother
+from archord.solver.linear.galerkin import Galerkin
 from archord.solver.linear.strategy import Facts, Strategy
 
 FEWEST_DOFS = 5_000  # below, a factorisation is quicker
@@ -91,7 +93,7 @@ class Multigrid(Strategy):
             V = V_linear
             fixed = fixed_linear
         self._motions = _free_rigid_motions(V, fixed)
-        self._without_blocks = PETSc.Mat()  # A, as products of matrices need it
+        self._product: Galerkin | None = None
         self._below = PETSc.PC().create(A.comm)
         self._smoother = BlockSmoother(A)
         self._right_side = 0.0
@@ -118,30 +120,28 @@ class Multigrid(Strategy):
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Make the levels of the matrix as it is now, called by PETSc."""
-        if self._is_ready:
-            self.matrix.convert("aij", self._without_blocks)
-            if self.interpolation is not None:
-                self._without_blocks.ptap(self.interpolation, self.coarse)
+        if self.interpolation is None:
+            self.matrix.convert("aij", self.coarse)
         else:
-            self._make_matrices()
+            self._update(*blocks_of(self.matrix))
+        if not self._is_ready:
+            self.coarse.setNearNullSpace(_near_null_space(self.coarse, self._motions))
+            self._right, self._found = self.coarse.createVecs()
             self._below.setOperators(self.coarse)
             _use_aggregates(self._below)
             self._is_ready = True
         self._below.setUp()
-        if self.interpolation is not None:
-            self._smoother.update()
 
-    def _make_matrices(self) -> None:
-        d = self.matrix.getBlockSize()
-        self._without_blocks = self.matrix.convert("aij", PETSc.Mat())
-        self.coarse = self._without_blocks
-        if self.interpolation is not None:
-            self.coarse = self._without_blocks.ptap(self.interpolation)
+    def _update(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
+        """Take the values of the matrix to the smoother and to the level below."""
+        assert self.interpolation is not None
+        if self._product is None:
+            self._product = Galerkin(self.interpolation, ghosts)
             self._residual = self.interpolation.createVecLeft()
             self._correction = self._residual.duplicate()
-        self.coarse.setBlockSize(d)
-        self.coarse.setNearNullSpace(_near_null_space(self.coarse, self._motions))
-        self._right, self._found = self.coarse.createVecs()
+        self._product.update(own, others)
+        self.coarse = self._product.matrix
+        self._smoother.update(own, others, ghosts)
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """One cycle, called by PETSc."""

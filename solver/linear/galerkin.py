@@ -1,0 +1,117 @@
+"""The matrix of a coarse level, the Galerkin product ``P^T A P``, from the blocks of ``A``.
+
+PETSc would first turn them into scalar rows, and keep half-made products: more memory than the
+matrix itself.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array
+from archord.kernels.blocks import Blocks, add_blocks
+from archord.kernels.compiled import library, pointer, structure
+
+_SOURCE = Path(__file__).with_suffix(".c")
+_ROOM = 40  # for blocks in a row: cells about a node have fewer nodes, but for those in contact
+
+
+class _Weights(NamedTuple):
+    """What coarse nodes give to fine ones: ``q`` pairs of both, by fine nodes."""
+
+    fine: np.ndarray  # (q,)
+    coarse: np.ndarray  # (q,)
+    weight: Array  # (q, d)
+
+
+class Galerkin:
+    """The ``matrix`` of the product with the interpolation ``P``, of a matrix whose rows refer to
+    the nodes ``ghosts`` ``(m,)`` of other ranks. Collective."""
+
+    def __init__(self, P: PETSc.Mat, ghosts: np.ndarray) -> None:
+        self._d = P.getBlockSizes()[0]
+        self._P = P
+        own = self._by_nodes(P)
+        elsewhere = self._by_nodes(self._rows_of(ghosts))
+        self._nodes = np.unique(np.concatenate([own.coarse, elsewhere.coarse]))
+        coarse = np.searchsorted(self._nodes, own.coarse)
+        order = np.argsort(coarse, kind="stable")
+        self._left = {
+            "n": len(self._nodes),
+            "d": self._d,
+            "from": _starts(coarse[order], len(self._nodes)),
+            "row": own.fine[order].astype(np.int32),
+            "row_weight": own.weight[order],
+        }
+        n = P.getLocalSize()[0] // self._d
+        self._right = self._columns(own, n), self._columns(elsewhere, len(ghosts))
+        size = P.getLocalSize()[1], None
+        self.matrix = PETSc.Mat().create(P.comm)
+        self.matrix.setSizes((size, size), bsize=self._d)
+        self.matrix.setType("aij")
+        self.matrix.setUp()
+
+    def _rows_of(self, ghosts: np.ndarray) -> PETSc.Mat:
+        """The interpolation to ``ghosts``."""
+        rows = (self._d * ghosts[:, None] + np.arange(self._d)).astype(PETSc.IntType)
+        wanted = PETSc.IS().createGeneral(rows.ravel(), comm=PETSc.COMM_SELF)
+        everything = PETSc.IS().createStride(self._P.getSize()[1], 0, 1, comm=PETSc.COMM_SELF)
+        return self._P.createSubMatrices([wanted], [everything])[0]
+
+    def _by_nodes(self, P: PETSc.Mat) -> _Weights:
+        """The rows of ``P`` by nodes, where coarse ones have their numbers on all ranks."""
+        d = self._d
+        offsets, column, value = P.getValuesCSR()
+        row = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+        fine, axis = np.divmod(row, d)
+        n_coarse = self._P.getSize()[1] // d
+        pairs, pair = np.unique(fine * n_coarse + column // d, return_inverse=True)
+        weight = np.zeros((len(pairs), d))
+        weight[pair, axis] = value
+        fine, coarse = np.divmod(pairs, n_coarse)
+        return _Weights(fine, coarse, weight)
+
+    def _columns(self, weights: _Weights, n: int) -> dict[str, np.ndarray]:
+        """The ``weights`` of ``n`` columns for the kernel."""
+        return {
+            "to": _starts(weights.fine, n),
+            "node": np.searchsorted(self._nodes, weights.coarse).astype(np.int32),
+            "weight": weights.weight,
+        }
+
+    def update(self, own: Blocks, others: Blocks) -> None:
+        """Take the values of a matrix, in the rank's ``own`` columns and in ``others``."""
+        if self.matrix.isAssembled():
+            self.matrix.zeroEntries()
+        for A, right in zip((own, others), self._right, strict=True):
+            rows, columns, blocks = self._product(A, right)
+            add_blocks(self.matrix, self._nodes[rows], self._nodes[columns], blocks)
+        self.matrix.assemble()
+
+    def _product(
+        self, A: Blocks, right: dict[str, np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, Array]:
+        """Rows and columns ``(k,)`` and blocks ``(k, d, d)`` of the product of some columns."""
+        of_A = {"offsets": A.offsets, "columns": A.columns, "values": A.values}
+        product = structure(_SOURCE, "Product", self._left | right | of_A)
+        most = 0
+        needed = _ROOM * len(self._nodes)
+        while needed > most:
+            most = needed
+            place = np.full(len(self._nodes), -1, dtype=np.int32)
+            rows = np.empty(most, dtype=np.int32)
+            columns = np.empty(most, dtype=np.int32)
+            blocks = np.empty((most, self._d, self._d))
+            needed = library(_SOURCE).galerkin(
+                product, most, *map(pointer, (place, rows, columns, blocks))
+            )
+        return rows[:needed], columns[:needed], blocks[:needed]
+
+
+def _starts(sorted_numbers: np.ndarray, n: int) -> np.ndarray:
+    """Where each of the numbers below ``n`` begins, and where the last one ends ``(n + 1,)``."""
+    return np.searchsorted(sorted_numbers, np.arange(n + 1)).astype(np.int32)
