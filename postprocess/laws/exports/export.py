@@ -478,7 +478,7 @@ def skeleton(law: JointCurve, suffix: str) -> str:
     text = export_law(law, Path(name + suffix))
     numbers = program.numbers | {"PIN_LENGTH": program.pin_length}
     for key, values in numbers.items():
-        if not isinstance(values, int):
+        if not isinstance(values, int) and key not in _ELEMENT_NUMBERS:
             text = text.replace(_table(form, name, key, values), f"@{key}@", 1)
     text = text.replace(program.header, "@header@")
     text = text.replace(form.text(program.about), "@about@")

@@ -1,5 +1,7 @@
 /** The law of one joint as a file: the texts of archord's exports, whose open places are filled here. */
 
+import { shiftOf, storedEnergy } from "./dents.mjs";
+
 /** JSON with the blanks that Python's json.dumps leaves. */
 function spaced(value) {
     if (Array.isArray(value)) return `[${value.map(spaced).join(", ")}]`;
@@ -38,17 +40,22 @@ const QUOTED = {
 };
 
 /** The tables in the joint's units, by the names of the exports. */
-function tablesOf(law, pinLength) {
+function tablesOf(law, radius, pinLength) {
     const { length, pressure, x } = law;
     const force = law.force * pinLength;
     const root = Math.sqrt(force);
     const times = (values, factor) => values.map((value) => value * factor);
+    const [shift, shiftSlope] = shiftOf(law);
     return {
         RANGE: length * x[x.length - 1],
         REACH: length * (1 + 1e-9) * x[x.length - 1],
         LENGTH: length,
         FORCE: force,
         WIDEST: law.widest,
+        RADIUS: radius,
+        SHIFT: times(shift, length),
+        SHIFT_SLOPE: shiftSlope,
+        STORED: times(storedEnergy(law), length * force),
         PIN_LENGTH: pinLength,
         NODES: times(x, length),
         LOAD: times(law.y, force),
@@ -69,22 +76,23 @@ function tablesOf(law, pinLength) {
 }
 
 /** The text of a file with the law of a joint; `about` says what it is the law of, from the title on. */
-export function exportLaw(data, law, about, suffix, name, pinLength) {
-    const { forms, texts, rules, units } = data.exports;
-    const kind = law.yields ? (law.toe.some(Boolean) ? "toe" : "yields") : "elastic";
+export function exportLaw(data, law, about, suffix, name, { radius, length }) {
+    const { forms, paragraphs, texts, rules, units } = data.exports;
+    const kind = law.yields ? "yields" : "elastic";
     const form = forms[suffix];
-    const of = pinLength === 1 ? units[0] : units[1].replaceAll("@length@", String(pinLength));
+    const of = length === 1 ? units[0] : units[1].replaceAll("@length@", String(length));
     const said = Object.entries(about).slice(1).map(([key, value]) => {
         return wrapped(`${key}: ${typeof value === "string" ? value : spaced(value)}`, "    ");
     });
     const header = [about.title, "", ...said, "", wrapped(of), "", wrapped(rules[kind])].join("\n");
     const words = { name, title: about.title, header, about: QUOTED[suffix](about) };
-    for (const [key, value] of Object.entries(tablesOf(law, pinLength))) {
+    for (const [key, value] of Object.entries(tablesOf(law, radius, length))) {
         const rows = [];
         const numbers = [value].flat().map(exact);
         for (let i = 0; i < numbers.length; i += 5) rows.push(numbers.slice(i, i + 5).join(", "));
         const place = Array.isArray(value) ? form.table : form.number;
         words[key] = filled(place, { name, key, n: numbers.length, value: rows.join(form.line_end) });
     }
-    return texts[kind][suffix].replace(/@(\w+)@/g, (mark, word) => words[word] ?? mark);
+    const text = texts[kind][suffix].map((place) => paragraphs[place]).join("\n\n");
+    return text.replace(/@(\w+)@/g, (mark, word) => words[word] ?? mark);
 }

@@ -9,7 +9,7 @@
 // --- numbers
 
 /** `count` numbers from `first` to `last` in equal ratios. */
-function geomspace(first, last, count) {
+export function geomspace(first, last, count) {
     const a = Math.log10(first);
     const step = (Math.log10(last) - a) / (count - 1);
     const inner = Array.from({ length: count - 2 }, (_, i) => 10 ** (a + (i + 1) * step));
@@ -765,9 +765,7 @@ export class JointLaw {
     curve(f, df, x) {
         if (x <= 0) return [0, 0];
         if (x >= this.x[1]) return hermite(this.x, f, df, x);
-        const [a, b, c] = this.touch;
-        const place = Math.max(x, 1e-290);
-        return lineContact(place, a + place * (b + c * place), b + 2 * c * place);
+        return firstTouch(this.touch, Math.max(x, 1e-290));
     }
 
     /** The x at which the rising curve f is y: Newton's method, bracketed. */
@@ -802,6 +800,11 @@ export class JointLaw {
         }
         return x;
     }
+}
+
+/** y and dy/dx of the logarithmic law at x > 0. */
+export function firstTouch([a, b, c], x) {
+    return lineContact(x, a + x * (b + c * x), b + 2 * c * x);
 }
 
 /** h(a) = t f(a)/f(t) of travel t and toe w, and its slope. */
@@ -854,5 +857,6 @@ function solvedJoints({ sides, step }, arrays) {
         joints.push({ side, p, m, n, clearance, pin, block, x0: arrays.x0[row], lost: arrays.lost[row], known, ...curves });
     }
     const count = arrays.back.length / 6;
-    return { joints, back: Array.from({ length: count }, (_, i) => [...arrays.back.subarray(6 * i, 6 * i + 6)]) };
+    const rowOf = (i) => Array.from({ length: 6 }, (_, column) => arrays.back[column * count + i]);
+    return { joints, back: Array.from({ length: count }, (_, i) => rowOf(i)) };
 }

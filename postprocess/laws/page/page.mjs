@@ -296,7 +296,7 @@ function save(suffix) {
     const { joint, law } = shown;
     if (suffix === ".png") savePicture();
     else if (suffix === ".csv") download(table(), "text/csv", suffix);
-    else download(exportLaw(data, law, about(), suffix, "pin_joint", joint.length), "text/plain", suffix);
+    else download(exportLaw(data, law, about(), suffix, "pin_joint", joint), "text/plain", suffix);
 }
 
 function about() {

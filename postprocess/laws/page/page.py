@@ -34,7 +34,7 @@ from archord.report.version import VERSION
 
 HERE = Path(__file__).parent
 FLOWS = {"hardens": "hardens", "perfect": "perfectly plastic", "elastic": "does not yield"}
-MODULES = ("law.mjs", "fits.mjs", "exports.mjs", "page.mjs")
+MODULES = ("law.mjs", "fits.mjs", "dents.mjs", "exports.mjs", "page.mjs")
 _LENGTH = 12345.0  # which stands for any length of a pin
 _CURVES = ("force", "peak", "angle")
 
@@ -93,11 +93,11 @@ def law_data() -> tuple[str, bytes]:
 
 
 def _known(name: str, stored: Any) -> np.ndarray:
-    """An array ``(values,)`` of yield_model.npz; of curves what is known, as rises from node to
-    node."""
+    """An array ``(values,)`` of yield_model.npz, ways back column by column, which compress better
+    so; of curves what is known, as rises from node to node."""
     values = stored[name]
     if name not in _CURVES:
-        return values.ravel()
+        return values.ravel(order="F" if name == "back" else "C")
     rises = np.diff(values, axis=1, prepend=np.int16(0))
     known = np.arange(values.shape[1]) < stored["count"][:, None]
     return rises[known]
@@ -114,17 +114,25 @@ def _range() -> dict[str, Any]:
 
 
 def _exports() -> dict[str, Any]:
-    """The texts of the exports by kind of joint and suffix, and the words around them."""
+    """The texts of the exports by kind of joint and suffix, as places of paragraphs, and the words
+    around them."""
     elastic = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
     yields = replace(elastic, pin_yield=400.0, block_yield=400.0)
-    kinds = {"elastic": _in_mm(elastic, 1.0), "toe": _in_mm(yields, 1.0)}
-    kinds["yields"] = replace(kinds["toe"], toe=0 * kinds["toe"].toe)
+    kinds = {"elastic": _in_mm(elastic, 1.0), "yields": _in_mm(yields, 1.0)}
     units = [Program.of(_in_mm(elastic, length)).units for length in (1.0, _LENGTH)]
+    texts = {
+        kind: {suffix: skeleton(law, suffix).split("\n\n") for suffix in forms()}
+        for kind, law in kinds.items()
+    }
+    # Kinds share most paragraphs, each of which is told once.
+    parts = dict.fromkeys(part for own in texts.values() for text in own.values() for part in text)
+    places = {part: place for place, part in enumerate(parts)}
     return {
         "forms": forms(),
+        "paragraphs": list(parts),
         "texts": {
-            kind: {suffix: skeleton(law, suffix) for suffix in forms()}
-            for kind, law in kinds.items()
+            kind: {suffix: [places[part] for part in text] for suffix, text in own.items()}
+            for kind, own in texts.items()
         },
         "rules": {kind: Program.of(law).rule for kind, law in kinds.items()},
         "units": [text.replace(f"{_LENGTH:g}", "@length@") for text in units],
@@ -134,7 +142,7 @@ def _exports() -> dict[str, Any]:
 def _in_mm(joint: LawJoint, length: float) -> JointCurve:
     """The law of a ``joint`` in mm and N, of a pin of this ``length``."""
     law = general_law.general_law(joint)
-    return replace(law, length_unit="mm", force_unit="N", pin_length=length, radius=None)
+    return replace(law, length_unit="mm", force_unit="N", pin_length=length)
 
 
 def _json(path: Path) -> Any:

@@ -42,7 +42,8 @@ function told({ joint, places, suffixes, about }) {
             const others = [law.residual(deepest), law.displacement(load)];
             return [load, stiffness, error, peak, angle, ...others];
         });
-        const text = (suffix) => exportLaw(data, law, about, suffix, "a_law", 7);
+        const sizes = { radius: joint.radius, length: 7 };
+        const text = (suffix) => exportLaw(data, law, about, suffix, "a_law", sizes);
         return { at, texts: suffixes.map(text) };
     } catch (error) {
         return { refused: error.message };
@@ -84,7 +85,6 @@ def case(joint: dict[str, Any], places: Any = (), suffixes: Any = ()) -> dict[st
         "places": places,
         "suffixes": suffixes,
         "about": {"title": "a joint"},
-        "radius": None,
     }
 
 
@@ -200,7 +200,6 @@ def test_files_of_the_page_are_those_of_the_exports(tmp_path):
             "length_unit": "mm",
             "force_unit": "N",
             "about": {"title": "a joint"},
-            "radius": None,
         }
         law = replace(law, force=7 * law.force, pin_length=7.0, **units)
         for suffix, text in zip(suffixes, texts["texts"], strict=True):
