@@ -1,11 +1,14 @@
 /* A joint's law as an FMU of FMI 2.0, for model exchange and co-simulation, around the law's own header.
 
    The file model.h includes that header. It defines LAW(name), which puts the law's name before a name, the CLEARANCE
-   of the joint, the GUID, and WITH_ERROR, which is 1 if the law tells residual clearance and expected error.
+   of the joint, the GUID, WITH_ERROR, which is 1 if the law tells residual clearance and expected error, and
+   WITH_ELEMENT, which is 1 if the header has a force element.
 
-   The FMU has no continuous states. Its memory is the deepest displacement of all accepted steps: fmi2DoStep and
-   fmi2CompletedIntegratorStep change the memory, and trial steps leave it as it is. The event indicator changes its
-   sign where the joint turns back, if delta_rate is given, and where it comes back to its deepest displacement. */
+   The FMU holds a joint along a line (delta to P), and a joint in a plane (ex, ey, vx, vy, omega to Fx, Fy, T). Each
+   has a memory of its own: the deepest displacement of all accepted steps, in a plane by direction. fmi2DoStep and
+   fmi2CompletedIntegratorStep change the memory, and trial steps leave it as it is. There are no continuous states.
+   The event indicator changes its sign where the joint along a line turns back, if delta_rate is given, and where it
+   comes back to its deepest displacement. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -50,14 +53,30 @@ typedef struct {
 
 /* --- the joint */
 
-/* Value references: what can be set, and what follows from it. */
-enum { DELTA, DELTA_RATE, LENGTH, DEEPEST_START, SETTABLE };
-enum { P = SETTABLE, STIFFNESS, DEEPEST, RESIDUAL, EXPECTED_ERROR };
-#define COUNT (WITH_ERROR ? EXPECTED_ERROR + 1 : DEEPEST + 1)
+/* Value references: inputs, parameters, outputs. */
+enum {
+    DELTA, DELTA_RATE,
+#if WITH_ELEMENT
+    EX, EY, VX, VY, OMEGA, DAMPING, MU_STATIC, MU_DYNAMIC, STICK_SPEED,
+#endif
+    LENGTH, DEEPEST_START, P, STIFFNESS, DEEPEST,
+#if WITH_ERROR
+    RESIDUAL, EXPECTED_ERROR,
+#endif
+#if WITH_ELEMENT
+    FX, FY, T,
+#endif
+    COUNT,
+    SETTABLE = P,
+    PARAMETERS = LENGTH - 4 * WITH_ELEMENT /* the first one */
+};
 
 typedef struct {
     double value[SETTABLE];
     LAW(state) memory;
+#if WITH_ELEMENT
+    LAW(element_state) memory_in_plane;
+#endif
     int running; /* whether initialization has ended */
 } State;
 
@@ -68,16 +87,42 @@ typedef struct {
     const fmi2CallbackFunctions *callbacks;
 } Instance;
 
-static const State NEW = {{0.0, 0.0, LAW(PIN_LENGTH), 0.0}, {0.0, 0}, 0};
+static void start(Instance *joint) {
+    State *now = &joint->now;
+    memset(now, 0, sizeof(*now));
+    now->value[LENGTH] = LAW(PIN_LENGTH);
+#if WITH_ELEMENT
+    now->value[DAMPING] = LAW(CONTACT).damping;
+    now->value[MU_STATIC] = LAW(CONTACT).mu_static;
+    now->value[MU_DYNAMIC] = LAW(CONTACT).mu_dynamic;
+    now->value[STICK_SPEED] = LAW(CONTACT).stick_speed;
+#endif
+    joint->warned = 0;
+}
 
 /* The deepest displacement of accepted steps; before the first one it is a parameter. */
 static double remembered(const State *state) {
     return state->running ? state->memory.deepest : state->value[DEEPEST_START];
 }
 
+static double share_of(const State *state) {
+    return state->value[LENGTH] / LAW(PIN_LENGTH);
+}
+
+#if WITH_ELEMENT
+/* Fx, Fy or T of a pin of LAW(PIN_LENGTH); by ex, ey, vx, vy or omega its derivative, by -1 itself. */
+static double in_plane(const State *state, int of, int by) {
+    const double *value = state->value;
+    double force[3], jacobian[15];
+    LAW(contact) contact = {value[DAMPING], value[MU_STATIC], value[MU_DYNAMIC], value[STICK_SPEED]};
+    LAW(element)(&state->memory_in_plane, &contact, value + EX, force, jacobian);
+    return by < 0 ? force[of] : jacobian[5 * of + by];
+}
+#endif
+
 static double value_of(const State *state, fmi2ValueReference reference) {
     double delta = state->value[DELTA], deepest = remembered(state), stiffness;
-    double share = state->value[LENGTH] / LAW(PIN_LENGTH);
+    double share = share_of(state);
     double force = LAW(force)(delta, deepest, &stiffness);
     switch (reference) {
     case P: return share * force;
@@ -87,16 +132,24 @@ static double value_of(const State *state, fmi2ValueReference reference) {
     case RESIDUAL: return LAW(residual)(LAW(deeper)(deepest, delta));
     case EXPECTED_ERROR: return share * LAW(expected_error)(delta, deepest);
 #endif
+#if WITH_ELEMENT
+    case FX: case FY: case T: return share * in_plane(state, reference - FX, -1);
+#endif
     default: return state->value[reference];
     }
 }
 
-/* The derivative of one variable by another: the law's own for dP/d(delta), else a central difference. */
+/* The derivative of one variable by another: the law's own for P and for forces in the plane, else a central
+   difference. */
 static double derivative_of(const State *state, fmi2ValueReference unknown, fmi2ValueReference known) {
-    double step = 1e-6 * (known == LENGTH ? state->value[LENGTH] : CLEARANCE);
-    double stiffness = value_of(state, STIFFNESS);
+    double step = 1e-6 * fmax(fabs(state->value[known]), CLEARANCE), exact = NAN;
     State less = *state, more = *state;
-    if (unknown == P && known == DELTA && isfinite(stiffness)) return stiffness;
+    if (unknown == P && known == DELTA) exact = value_of(state, STIFFNESS);
+#if WITH_ELEMENT
+    if (unknown >= FX && unknown <= T && known >= EX && known <= OMEGA)
+        exact = share_of(state) * in_plane(state, unknown - FX, known - EX);
+#endif
+    if (isfinite(exact)) return exact;
     less.value[known] -= step;
     more.value[known] += step;
     return (value_of(&more, unknown) - value_of(&less, unknown)) / (2 * step);
@@ -113,11 +166,31 @@ static fmi2Status say(const Instance *joint, fmi2Status status, const char *mess
 
 static fmi2Status accept_step(Instance *joint) {
     State *now = &joint->now;
-    if (!isfinite(now->value[DELTA])) return say(joint, fmi2Error, "delta is not a finite number");
+    int outside, i;
+    for (i = 0; i < SETTABLE; i++)
+        if (!isfinite(now->value[i])) return say(joint, fmi2Error, "an input is not a finite number");
     LAW(advance)(&now->memory, now->value[DELTA]);
-    if (!now->memory.outside || joint->warned) return fmi2OK;
+    outside = now->memory.outside;
+#if WITH_ELEMENT
+    LAW(advance_element)(&now->memory_in_plane, now->value[EX], now->value[EY]);
+    outside = outside || now->memory_in_plane.outside;
+#endif
+    if (!outside || joint->warned) return fmi2OK;
     joint->warned = 1;
-    return say(joint, fmi2Warning, "delta is beyond the range of the law: its force goes on as a guess");
+    return say(joint, fmi2Warning, "the pin is beyond the range of the law: its force goes on as a guess");
+}
+
+/* What is wrong with the parameters; NULL if nothing is. */
+static const char *fault_of(const double value[]) {
+    if (!(value[LENGTH] > 0)) return "length must be a positive number";
+    if (!(value[DEEPEST_START] >= 0)) return "deepest_start must not be negative";
+#if WITH_ELEMENT
+    if (!(value[DAMPING] >= 0)) return "damping must not be negative";
+    if (!(value[MU_STATIC] >= value[MU_DYNAMIC] && value[MU_DYNAMIC] >= 0))
+        return "mu_dynamic must not be negative, and mu_static not smaller than mu_dynamic";
+    if (!(value[STICK_SPEED] > 0)) return "stick_speed must be a positive number";
+#endif
+    return NULL;
 }
 
 static int all_known(const fmi2ValueReference references[], size_t n, fmi2ValueReference end) {
@@ -143,7 +216,7 @@ EXPORT fmi2Component FMI(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2St
     Instance *joint = calloc(1, sizeof(Instance));
     (void)type, (void)resources, (void)visible, (void)logging;
     if (!joint) return NULL;
-    joint->now = NEW;
+    start(joint);
     joint->callbacks = callbacks;
     joint->name = calloc(1, name ? strlen(name) + 1 : 1);
     if (joint->name && name) strcpy(joint->name, name);
@@ -171,27 +244,27 @@ EXPORT fmi2Status FMI(fmi2SetupExperiment)(fmi2Component component, fmi2Boolean 
     return fmi2OK;
 }
 
-EXPORT fmi2Status FMI(fmi2EnterInitializationMode)(fmi2Component component) {
-    (void)component;
-    return fmi2OK;
-}
+#define NOTHING_TO_DO(name)                               \
+    EXPORT fmi2Status FMI(name)(fmi2Component component) { \
+        (void)component;                                  \
+        return fmi2OK;                                    \
+    }
+NOTHING_TO_DO(fmi2EnterInitializationMode)
+NOTHING_TO_DO(fmi2EnterEventMode)
+NOTHING_TO_DO(fmi2EnterContinuousTimeMode)
+NOTHING_TO_DO(fmi2Terminate)
 
 EXPORT fmi2Status FMI(fmi2ExitInitializationMode)(fmi2Component component) {
     Instance *joint = component;
+    const char *fault = fault_of(joint->now.value);
+    if (fault) return say(joint, fmi2Error, fault);
     joint->now.memory.deepest = joint->now.value[DEEPEST_START];
     joint->now.running = 1;
     return accept_step(joint);
 }
 
-EXPORT fmi2Status FMI(fmi2Terminate)(fmi2Component component) {
-    (void)component;
-    return fmi2OK;
-}
-
 EXPORT fmi2Status FMI(fmi2Reset)(fmi2Component component) {
-    Instance *joint = component;
-    joint->now = NEW;
-    joint->warned = 0;
+    start(component);
     return fmi2OK;
 }
 
@@ -212,12 +285,8 @@ EXPORT fmi2Status FMI(fmi2SetReal)(fmi2Component component, const fmi2ValueRefer
     size_t i;
     if (!all_known(references, n, SETTABLE)) return say(joint, fmi2Error, "fmi2SetReal: this variable cannot be set");
     for (i = 0; i < n; i++) {
-        int fixed = references[i] == LENGTH || references[i] == DEEPEST_START;
-        if (fixed && joint->now.running) return say(joint, fmi2Error, "parameters are fixed after initialization");
-        if (references[i] == LENGTH && !(values[i] > 0 && isfinite(values[i])))
-            return say(joint, fmi2Error, "length must be a positive number");
-        if (references[i] == DEEPEST_START && !(values[i] >= 0 && isfinite(values[i])))
-            return say(joint, fmi2Error, "deepest_start must be a number that is not negative");
+        if (references[i] >= PARAMETERS && joint->now.running)
+            return say(joint, fmi2Error, "parameters are fixed after initialization");
         joint->now.value[references[i]] = values[i];
     }
     return fmi2OK;
@@ -257,12 +326,15 @@ EXPORT fmi2Status FMI(fmi2GetDirectionalDerivative)(fmi2Component component, con
 
 /* --- the state of the FMU: inputs, parameters and memory */
 
-EXPORT fmi2Status FMI(fmi2GetFMUstate)(fmi2Component component, fmi2FMUstate *copy) {
-    Instance *joint = component;
+static fmi2Status keep(fmi2Component component, const void *state, fmi2FMUstate *copy) {
     if (!*copy) *copy = malloc(sizeof(State));
-    if (!*copy) return say(joint, fmi2Error, "memory is exhausted");
-    *(State *)*copy = joint->now;
+    if (!*copy) return say(component, fmi2Error, "memory is exhausted");
+    memcpy(*copy, state, sizeof(State));
     return fmi2OK;
+}
+
+EXPORT fmi2Status FMI(fmi2GetFMUstate)(fmi2Component component, fmi2FMUstate *copy) {
+    return keep(component, &((Instance *)component)->now, copy);
 }
 
 EXPORT fmi2Status FMI(fmi2SetFMUstate)(fmi2Component component, fmi2FMUstate copy) {
@@ -293,27 +365,14 @@ EXPORT fmi2Status FMI(fmi2SerializeFMUstate)(fmi2Component component, fmi2FMUsta
 EXPORT fmi2Status FMI(fmi2DeSerializeFMUstate)(fmi2Component component, const fmi2Byte bytes[], size_t size,
                                                fmi2FMUstate *copy) {
     if (size != sizeof(State)) return say(component, fmi2Error, "fmi2DeSerializeFMUstate: this is no state of this FMU");
-    if (!*copy) *copy = malloc(sizeof(State));
-    if (!*copy) return say(component, fmi2Error, "memory is exhausted");
-    memcpy(*copy, bytes, sizeof(State));
-    return fmi2OK;
+    return keep(component, bytes, copy);
 }
 
 /* --- model exchange */
 
-EXPORT fmi2Status FMI(fmi2EnterEventMode)(fmi2Component component) {
-    (void)component;
-    return fmi2OK;
-}
-
 EXPORT fmi2Status FMI(fmi2NewDiscreteStates)(fmi2Component component, fmi2EventInfo *info) {
     memset(info, 0, sizeof(*info));
     return accept_step(component);
-}
-
-EXPORT fmi2Status FMI(fmi2EnterContinuousTimeMode)(fmi2Component component) {
-    (void)component;
-    return fmi2OK;
 }
 
 EXPORT fmi2Status FMI(fmi2CompletedIntegratorStep)(fmi2Component component, fmi2Boolean final, fmi2Boolean *event,

@@ -16,13 +16,13 @@ import tempfile
 import uuid
 import warnings
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
-from archord.postprocess.laws.exports.export import Program, export_law
+from archord.postprocess.laws.exports.export import Contact, Program, export_law
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.version import VERSION
@@ -33,6 +33,7 @@ _MODEL = """/* What fmu.c has to know of the law {name}. */
 
 #define LAW(name) {name}_##name
 #define WITH_ERROR {error:d}
+#define WITH_ELEMENT {element:d}
 #define CLEARANCE {clearance!r}
 """
 _GUID = '#define GUID "{guid}"\n'
@@ -58,78 +59,55 @@ class _Variable:
     meaning: str
     start: float | None = None
     depends: tuple[str, ...] = ()  # on which inputs
-    from_start: tuple[str, ...] = ()  # on which variables in addition while it is initialized
+    from_start: tuple[str, ...] = ()  # on which parameters
+    part: str = "line"  # of the FMU, which some laws have not: error, or element
 
 
+def _input(name: str, unit: str, meaning: str, part: str = "line") -> _Variable:
+    return _Variable(name, "input", unit, meaning, 0.0, part=part)
+
+
+def _parameter(name: str, unit: str, meaning: str, part: str = "line") -> _Variable:
+    return _Variable(name, "parameter", unit, meaning, 0.0, part=part)
+
+
+def _output(name: str, unit: str, meaning: str, part: str = "line") -> _Variable:
+    """An output, which depends on all inputs of its kind of joint."""
+    if part == "element":
+        return _Variable(name, "output", unit, meaning, None, _MOTION, _OF_PLANE, part)
+    from_start = _OF_LINE[1:] if unit == "length" else _OF_LINE
+    return _Variable(name, "output", unit, meaning, None, ("delta",), from_start, part)
+
+
+_MOTION = ("ex", "ey", "vx", "vy", "omega")
+_OF_PLANE = ("damping", "mu_static", "mu_dynamic", "stick_speed", "length")
+_OF_LINE = ("length", "deepest_start")
 _VARIABLES = (
-    _Variable(
-        "delta",
-        "input",
-        "length",
-        "displacement of the pin towards the hole, 0 at first touch",
-        0.0,
-    ),
-    _Variable(
-        "delta_rate",
-        "input",
-        "speed",
-        "rate of delta, by which a solver finds where the joint turns back; may stay 0",
-        0.0,
-    ),
-    _Variable("length", "parameter", "length", "length of the pin", 1.0),
-    _Variable(
-        "deepest_start", "parameter", "length", "deepest displacement before the simulation", 0.0
-    ),
-    _Variable(
-        "P",
-        "output",
-        "force",
-        "force, total",
-        None,
-        ("delta",),
-        ("length", "deepest_start"),
-    ),
-    _Variable(
-        "stiffness",
-        "output",
-        "stiffness",
-        "dP/d(delta); nan beyond the range of the law",
-        None,
-        ("delta",),
-        ("length", "deepest_start"),
-    ),
-    _Variable(
-        "deepest",
-        "output",
-        "length",
-        "deepest displacement so far",
-        None,
-        ("delta",),
-        ("deepest_start",),
-    ),
-    _Variable(
-        "residual",
-        "output",
-        "length",
-        "displacement at which the joint opens on its way back",
-        None,
-        ("delta",),
-        ("deepest_start",),
-    ),
-    _Variable(
-        "expected_error",
-        "output",
-        "force",
-        "error of P below which 9 of 10 joints stay",
-        None,
-        ("delta",),
-        ("length", "deepest_start"),
-    ),
+    _input("delta", "length", "joint along a line: displacement of the pin, 0 at first touch"),
+    _input("delta_rate", "speed", "rate of delta, to find where the joint turns back; may stay 0"),
+    _input("ex", "length", "joint in a plane: pin's centre less hole's, along x", "element"),
+    _input("ey", "length", "the same along y", "element"),
+    _input("vx", "speed", "rate of ex", "element"),
+    _input("vy", "speed", "rate of ey", "element"),
+    _input("omega", "turning", "angular velocity of the pin less the hole's", "element"),
+    _parameter("damping", "damping", "c of the factor 1 + c d(delta)/dt", "element"),
+    _parameter("mu_static", "one", "coefficient of static friction", "element"),
+    _parameter("mu_dynamic", "one", "coefficient of dynamic friction", "element"),
+    _parameter("stick_speed", "speed", "slip speed up to which friction rises", "element"),
+    _parameter("length", "length", "length of the pin"),
+    _parameter("deepest_start", "length", "largest delta before the simulation"),
+    _output("P", "force", "joint along a line: force, total"),
+    _output("stiffness", "stiffness", "dP/d(delta); nan beyond the range of the law"),
+    _output("deepest", "length", "largest delta so far"),
+    _output("residual", "length", "delta at which the joint opens on its way back", "error"),
+    _output("expected_error", "force", "error of P below which 9 of 10 joints stay", "error"),
+    _output("Fx", "force", "joint in a plane: force on the pin along x, total", "element"),
+    _output("Fy", "force", "the same along y", "element"),
+    _output("T", "torque", "torque on the pin about its own centre", "element"),
 )
-_OF_ERROR = ("residual", "expected_error")  # which only some laws tell
 
 
-def export_fmu(law: JointCurve | FittedLaw, target: Path) -> bytes:
+def export_fmu(law: JointCurve | FittedLaw, target: Path, contact: Contact | None = None) -> bytes:
     """The content of a file with the law of one joint as an FMU.
 
     It warns if there is no C compiler for a library: the FMU then holds sources alone.
@@ -140,6 +118,8 @@ def export_fmu(law: JointCurve | FittedLaw, target: Path) -> bytes:
         The law.
     target : Path
         The file, which is not written. Its stem becomes the name of the model.
+    contact : Contact
+        Damping and friction at first, which are parameters of the model; None is neither.
 
     Returns
     -------
@@ -163,11 +143,18 @@ def export_fmu(law: JointCurve | FittedLaw, target: Path) -> bytes:
     """
     name = target.stem
     program = Program.of(law)
-    header = export_law(law, target.with_suffix(".h"))
-    has_error = "expected_error" in program.functions
-    unknown = () if has_error else _OF_ERROR
-    variables = tuple(one for one in _VARIABLES if one.name not in unknown)
-    model = _MODEL.format(name=name, error=has_error, clearance=program.numbers["LENGTH"])
+    contact = contact or Contact()
+    header = export_law(law, target.with_suffix(".h"), contact)
+    parts = {
+        "line": True,
+        "error": "expected_error" in program.functions,
+        "element": "forces" in program.functions,
+    }
+    starts = vars(contact) | {"length": program.pin_length}
+    variables = tuple(
+        replace(one, start=starts.get(one.name, one.start)) for one in _VARIABLES if parts[one.part]
+    )
+    model = _MODEL.format(name=name, clearance=program.numbers["LENGTH"], **parts)
     source = _SOURCE.read_text(encoding="utf-8")
     unsigned = "\0".join([header, model, source, _description(program, name, variables, "")])
     digest = hashlib.sha256(unsigned.encode()).hexdigest()
@@ -252,7 +239,6 @@ def _description(program: Program, name: str, variables: tuple[_Variable, ...], 
     categories = ElementTree.SubElement(root, "LogCategories")
     for category in ("logStatusWarning", "logStatusError"):
         ElementTree.SubElement(categories, "Category", name=category)
-    starts = {"length": program.pin_length}
     listed = ElementTree.SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
         element = ElementTree.SubElement(
@@ -265,10 +251,10 @@ def _description(program: Program, name: str, variables: tuple[_Variable, ...], 
             description=variable.meaning,
         )
         real = ElementTree.SubElement(element, "Real")
-        if units:
+        if variable.unit in units:
             real.set("unit", units[variable.unit][0])
         if variable.start is not None:
-            real.set("start", repr(starts.get(variable.name, variable.start)))
+            real.set("start", repr(float(variable.start)))
     _structure(ElementTree.SubElement(root, "ModelStructure"), variables)
     ElementTree.indent(root)
     head = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -302,9 +288,15 @@ def _units(program: Program) -> dict[str, tuple[str, dict[str, str]]]:
     return {
         "length": (length, {"m": "1", "factor": repr(metre)}),
         "speed": (f"{length}/s", {"m": "1", "s": "-1", "factor": repr(metre)}),
+        "turning": ("rad/s", {"rad": "1", "s": "-1"}),
+        "damping": (f"s/{length}", {"m": "-1", "s": "1", "factor": repr(1 / metre)}),
         "force": (force, {"kg": "1", "m": "1", "s": "-2", "factor": repr(newton)}),
         "stiffness": (
             f"{force}/{length}",
             {"kg": "1", "s": "-2", "factor": repr(newton / metre)},
+        ),
+        "torque": (
+            f"{force}.{length}",
+            {"kg": "1", "m": "2", "s": "-2", "factor": repr(newton * metre)},
         ),
     }

@@ -3,6 +3,7 @@ fault in the C code."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import zipfile
@@ -15,9 +16,11 @@ import numpy as np
 import pytest
 
 from archord.cli import run
+from archord.postprocess.laws.exports.export import Contact
 from archord.postprocess.laws.exports.fmu import export_fmu
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from tests.postprocess.laws.test_element import CONTACT, elastic, motions, python, values, yielding
 from tests.postprocess.laws.test_exports import curves, load, write
 
 STEEL_PIN = str(Path(__file__).parents[3] / "scenes" / "steel_pin.toml")
@@ -42,9 +45,9 @@ def sources_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler is here")
 
 
-def unpacked(law: JointCurve | FittedLaw, folder: Path) -> Path:
+def unpacked(law: JointCurve | FittedLaw, folder: Path, contact: Contact | None = None) -> Path:
     """The folder of the FMU ``lug_pin``."""
-    (folder / "lug_pin.fmu").write_bytes(export_fmu(law, folder / "lug_pin.fmu"))
+    (folder / "lug_pin.fmu").write_bytes(export_fmu(law, folder / "lug_pin.fmu", contact))
     zipfile.ZipFile(folder / "lug_pin.fmu").extractall(folder / "lug_pin")
     return folder / "lug_pin"
 
@@ -55,20 +58,45 @@ def drive(curve: JointCurve) -> np.ndarray:
     return 0.9 * curve.limit * np.sin(time) * np.sqrt(time / time[-1])
 
 
-@needs_compiler
-def test_the_code_has_no_fault_and_says_what_the_table_says(curve, tmp_path: Path) -> None:
-    """Strict C99 with sanitizers; steps that are taken back leave no trace; the pin is three times
-    as long, and so is its force."""
-    sources = unpacked(curve, tmp_path) / "sources"
+def client(law: JointCurve, folder: Path, given: np.ndarray, *words: str) -> np.ndarray:
+    """What a strict C99 program with sanitizers, ``fmu_client.c``, answers to the numbers."""
+    sources = unpacked(law, folder, CONTACT) / "sources"
     shutil.copy(Path(__file__).with_name("fmu_client.c"), sources / "client.c")
     own_names = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"
     command = ["cc", *STRICT, *CAREFUL, own_names, "client.c", "-o", "client", "-lm"]
     subprocess.run(command, cwd=sources, check=True)
-    delta = drive(curve)
     done = subprocess.run(
-        [sources / "client"], input=delta.tobytes(), capture_output=True, check=True
+        [sources / "client", *words], input=given.tobytes(), capture_output=True, check=True
     )
-    values = np.frombuffer(done.stdout).reshape(-1, 5)
+    return np.frombuffer(done.stdout)
+
+
+@needs_compiler
+@pytest.mark.usefixtures("sources_alone")
+@pytest.mark.filterwarnings("ignore:.*sources alone")
+@pytest.mark.parametrize("law", [yielding(), elastic()], ids=["yielding", "elastic"])
+def test_the_joint_in_a_plane_is_the_python_exports(law: JointCurve, tmp_path: Path) -> None:
+    """Force, torque and all their derivatives along a path with memory, to 1e-12 of the largest."""
+    given = motions(law, 60, 1.5)
+    found = client(law, tmp_path, given, "plane").reshape(-1, 18)
+    export = python(law)
+    memory = export.new_element()
+    wanted = []
+    for motion in given:
+        wanted.append(values(export, memory, motion[None])[0])
+        memory = export.advance_element(memory, *motion[:2])
+    largest = np.abs(wanted).max(axis=0)
+    assert np.all(np.abs(found - wanted) <= 1e-12 * largest)
+
+
+@needs_compiler
+@pytest.mark.usefixtures("sources_alone")
+@pytest.mark.filterwarnings("ignore:.*sources alone")
+def test_the_code_has_no_fault_and_says_what_the_table_says(curve, tmp_path: Path) -> None:
+    """Strict C99 with sanitizers; steps that are taken back leave no trace; the pin is three times
+    as long, and so is its force."""
+    delta = drive(curve)
+    found = client(curve, tmp_path, delta).reshape(-1, 5)
     deepest = np.maximum.accumulate(np.maximum(delta, 0))
     state = curve.at(delta, deepest)
     wanted = (
@@ -78,7 +106,7 @@ def test_the_code_has_no_fault_and_says_what_the_table_says(curve, tmp_path: Pat
         curve.residual(deepest),
         3 * state.error,
     )
-    for name, ours, theirs in zip(OUTPUTS, values.T, wanted, strict=True):
+    for name, ours, theirs in zip(OUTPUTS, found.T, wanted, strict=True):
         np.testing.assert_allclose(
             ours, theirs, rtol=1e-9, atol=1e-12 * np.max(theirs) + 1e-16, err_msg=name
         )
@@ -87,7 +115,7 @@ def test_the_code_has_no_fault_and_says_what_the_table_says(curve, tmp_path: Pat
 def test_the_file_depends_on_the_law_alone(tmp_path: Path) -> None:
     """The same bytes twice; another law has another GUID; every variable has the place that the C
     code knows."""
-    law = curves()["yielding"]
+    law = yielding()
     target = tmp_path / "lug_pin.fmu"
     content = export_fmu(law, target)
     assert content == export_fmu(law, target)
@@ -100,11 +128,9 @@ def test_the_file_depends_on_the_law_alone(tmp_path: Path) -> None:
     assert guid not in (other / "modelDescription.xml").read_text()
     names = [variable.get("name") for variable in root.find("ModelVariables")]
     code = (folder / "sources" / "fmu.c").read_text()
-    enums = [
-        line[7:-3].replace(" = SETTABLE", "") for line in code.splitlines() if "enum {" in line
-    ]
-    listed = [name.strip() for line in enums[-2:] for name in line.split(",")]
-    assert [name.lower() for name in listed if name != "SETTABLE"] == [n.lower() for n in names]
+    [block] = re.findall(r"enum {\n    DELTA.*?COUNT", code, re.S)
+    listed = re.findall(r"[A-Z]\w*", re.sub("#.*", "", block))
+    assert listed[:-1] == [name.upper() for name in names]
 
 
 @pytest.mark.usefixtures("sources_alone")
@@ -112,7 +138,7 @@ def test_the_file_depends_on_the_law_alone(tmp_path: Path) -> None:
 def test_the_force_is_total_and_the_units_are_known(tmp_path: Path) -> None:
     """In N, whether the scene has a thickness or not; inches and kips, too; a law without names of
     units has none."""
-    law = replace(curves()["elastic"], length_unit="mm", force_unit="N/mm")
+    law = replace(elastic(), length_unit="mm", force_unit="N/mm")
     for one in (law, replace(law, force_unit="N", pin_length=25.0)):
         root = ElementTree.parse(unpacked(one, tmp_path) / "modelDescription.xml").getroot()
         reals = {variable.get("name"): variable[0] for variable in root.find("ModelVariables")}
@@ -220,12 +246,13 @@ def test_an_impact_is_the_python_exports(curve, kind: str, tmp_path: Path) -> No
     joint.setupExperiment()
     joint.enterInitializationMode()
     joint.exitInitializationMode()
+    [P] = [one.valueReference for one in description.modelVariables if one.name == "P"]
     step = impact(curve).step
     taken = iter(range(10**6))
 
     def force(delta: float, v: float) -> float:
         joint.setReal([0, 1], [delta, v])
-        return joint.getReal([4])[0]
+        return joint.getReal([P])[0]
 
     def accept(delta: float, v: float) -> None:
         joint.setReal([0, 1], [delta, v])
