@@ -45,7 +45,7 @@ def exports_of(
     texts: list[Text] = []
     for target in targets:
         if target.suffix == ".fmu":
-            texts.append((target, partial(export_fmu, law, target)))
+            texts.append((target, partial(export_fmu, law, target, contact)))
         else:
             texts.append((target, partial(export_law, law, target, contact)))
     return texts
