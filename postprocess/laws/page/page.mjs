@@ -183,7 +183,7 @@ function show(from = "") {
         ["Stiffness dP/d(delta)", `${plain(state.stiffness * length)} N/mm`, ""],
         ["Peak pressure p0", `${plain(first.peak)} MPa`, delta < deepest ? "on first loading" : ""],
         ["Contact semi-angle eps", `${plain(degrees(first.angle))}°`, delta < deepest ? "on first loading" : ""],
-        ["delta/dR", plain(delta / joint.clearance), ""],
+        ["Read at delta", `${plain(delta)} mm`, `${plain(delta / joint.clearance)} dR`],
         ["First yield about at", yields ? `${plain(law.firstYield)} mm` : "none to 3 dR", yields ? `P ${plain(law.at(law.firstYield).load * length)} N` : ""],
         ["Residual clearance", `${plain(residual)} mm`, `back from ${plain(Math.max(deepest, delta))} mm`],
     ];
