@@ -24,6 +24,7 @@ JOINTS = 5000
 SEED = 2026
 _MESH_ERROR = 6e-4  # of P, relative: elements of 5 %R, beyond 0.1 dR
 _SHUFFLE = 1
+_TOLERANCE = 1e-10  # of the solver
 _ELASTIC = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]  # delta/dR
 _BACK = (0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.58, 0.48, 0.37, 0.25)  # parts of the deepest
 NUMBERS = ("plane strain", "p", "m", "n", "dR/R", "pin s", "block s")
@@ -61,7 +62,10 @@ def _runs(joint: Drawn) -> list[Row]:
 def write_sweep(number: int, file: Path) -> None:
     """Write the sweep of the first ``number`` joints."""
     with replacing(file) as new:
-        new.write_text(sweep_file(scenes(number)), encoding="utf-8")
+        text = sweep_file(scenes(number))
+        given = "[base.analysis]\n"
+        text = text.replace(given, f"{given}tolerance = {_TOLERANCE}\n", 1)
+        new.write_text(text, encoding="utf-8")
 
 
 def write_tables(sweep: Path, folder: Path) -> list[Path]:
