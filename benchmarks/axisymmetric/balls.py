@@ -46,13 +46,14 @@ def half_space_mesh(near: str, fine: float) -> TaggedMesh:
     """A quarter of a disc below y = 0, with elements of the size ``near`` the ball up to the radius
     ``fine``, growing beyond."""
     sketch = Sketch(["body"], ["surface", "axis", "far"])
-    _draw_half_space(sketch, fine)
+    _draw_half_space(sketch, fine, fine)
     sketch.sizes["body"] = f"{near} + 0.3 * Max(Sqrt(x*x + y*y) - {fine!r}, 0)"
     return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
 
 
-def balls_mesh() -> TaggedMesh:
-    """A half ball on a quarter of a disc, which touch in the origin."""
+def balls_sketch(near: str, *on_axis: float) -> Sketch:
+    """A half ball on a quarter of a disc, which touch in the origin, with elements of the size
+    ``near`` the contact, and nodes ``on_axis`` this far from it."""
     names = ["ball surface", "ball top", "ball axis", "surface", "axis", "far"]
     sketch = Sketch(["ball", "body"], names)
     angle = _FINE / BALL
@@ -61,20 +62,25 @@ def balls_mesh() -> TaggedMesh:
     sides = {
         "ball surface": sketch.path("ball", (0.0, 0.0), edge, (BALL, BALL), on=on_ball),
         "ball top": sketch.path("ball", (BALL, BALL), (0.0, BALL)),
-        "ball axis": sketch.path("ball", (0.0, BALL), (0.0, _FINE), (0.0, 0.0)),
+        "ball axis": sketch.path("ball", (0.0, BALL), *((0.0, y) for y in on_axis), (0.0, 0.0)),
     }
     sketch.face("ball", **sides)
-    _draw_half_space(sketch, _FINE)
-    near = "Min(0.03 + 0.15 * Sqrt((x - 1)^2 + y*y), 0.15)"
+    _draw_half_space(sketch, _FINE, *on_axis)
     size = f"{near} + 0.45 * Max(Sqrt(x*x + y*y) - {_FINE}, 0)"
     sketch.sizes |= {"ball": size, "body": size}
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return sketch
 
 
-def _draw_half_space(sketch: Sketch, fine: float) -> None:
+def balls_mesh() -> TaggedMesh:
+    """The mesh of `balls_sketch`, with smaller elements at the edge of the contact."""
+    finer_at_the_edge = "Min(0.03 + 0.15 * Sqrt((x - 1)^2 + y*y), 0.15)"
+    return mesh_joint(MPI.COMM_SELF, balls_sketch(finer_at_the_edge, _FINE), radius=1.0)
+
+
+def _draw_half_space(sketch: Sketch, fine: float, *on_axis: float) -> None:
     surface = sketch.path("body", (0.0, 0.0), (fine, 0.0), (FAR, 0.0))
     far = sketch.path("body", (FAR, 0.0), (0.0, -FAR), on=Circle("far", (0.0, 0.0), FAR))
-    axis = sketch.path("body", (0.0, -FAR), (0.0, -fine), (0.0, 0.0))
+    axis = sketch.path("body", (0.0, -FAR), *((0.0, -y) for y in on_axis), (0.0, 0.0))
     sketch.face("body", surface=surface, far=far, axis=axis)
 
 
@@ -119,14 +125,15 @@ def _deep(size: float = 0.28, yield_stress: float = YIELD_STRESS, strain: str = 
     return _pressed(mesh, material, SMALL_BALL, DEPTH, steps=10, strain=strain)
 
 
-def _hertz(run: Run, modulus: float) -> Iterator[Compared]:
-    """P from the depth, a and p0 from the force, by the contact ``modulus`` E*."""
+def hertz(run: Run, modulus: float, symmetry: int = 1) -> Iterator[Compared]:
+    """P from the depth, a and p0 from the force, by the contact ``modulus`` E*, of a run whose mesh
+    has the whole over its ``symmetry``."""
     force = abs(run.columns["ball force"][-1])
     depth = abs(run.columns["ball displacement"][-1])
     radius = (3 * force * BALL / (4 * modulus)) ** (1 / 3)
     pressure = 3 * force / (2 * math.pi * radius**2)
     exact = 4 / 3 * modulus * math.sqrt(BALL) * depth**1.5
-    area = run.columns["contact contact area"][-1]
+    area = symmetry * run.columns["contact contact area"][-1]
     yield Compared("P", exact, "Hertz", force)
     yield Compared("a", radius, "Hertz", math.sqrt(area / math.pi))
     yield Compared("p0", pressure, "Hertz", run.columns["contact largest pressure"][-1])
@@ -138,8 +145,8 @@ def _johnson(run: Run, yield_stress: float = YIELD_STRESS) -> Iterator[Compared]
 
 
 CASES = (
-    Case("rigid ball on a half-space", _rigid, lambda run: _hertz(run, MODULUS)),
-    Case("elastic ball on a half-space", _elastic, lambda run: _hertz(run, MODULUS / 2)),
+    Case("rigid ball on a half-space", _rigid, lambda run: hertz(run, MODULUS)),
+    Case("elastic ball on a half-space", _elastic, lambda run: hertz(run, MODULUS / 2)),
     Case("rigid ball deep in a half-space", _deep, _johnson),
 )
 STIFF = E / 20_000

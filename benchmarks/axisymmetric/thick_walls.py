@@ -39,7 +39,7 @@ _HEIGHT = 0.4  # of the cylinder
 _CLOSE = 1e-6
 
 
-def sphere_mesh(size: float = 0.08) -> TaggedMesh:
+def sphere_sketch(size: float) -> Sketch:
     """The half above the equator: a quarter of a ring, with elements of this ``size``."""
     sketch = Sketch(["body"], ["bore", "outside", "equator", "axis"])
     arcs = {}
@@ -50,7 +50,12 @@ def sphere_mesh(size: float = 0.08) -> TaggedMesh:
     axis = sketch.path("body", (0.0, INNER), (0.0, OUTER))
     sketch.face("body", **arcs, equator=equator, axis=axis)
     sketch.sizes["body"] = f"{size!r}"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return sketch
+
+
+def sphere_mesh(size: float = 0.08) -> TaggedMesh:
+    """The mesh of `sphere_sketch`."""
+    return mesh_joint(MPI.COMM_SELF, sphere_sketch(size), radius=1.0)
 
 
 def cylinder_mesh(size: float = 0.05) -> TaggedMesh:
@@ -108,7 +113,8 @@ def _radial(run: Run, radius: float) -> float:
     return float(radial.mean())
 
 
-def _lame_sphere(run: Run) -> Iterator[Compared]:
+def lame_sphere(run: Run) -> Iterator[Compared]:
+    """The displacement inside under `PRESSURE`."""
     a3 = INNER**3
     b3 = OUTER**3
     hoop = PRESSURE * (a3 + b3 / 2) / (b3 - a3)
@@ -116,7 +122,8 @@ def _lame_sphere(run: Run) -> Iterator[Compared]:
     yield Compared("u(a)", exact, "Lame", _radial(run, INNER))
 
 
-def _hill_sphere(run: Run) -> Iterator[Compared]:
+def hill_sphere(run: Run) -> Iterator[Compared]:
+    """The displacement outside under `plastic_pressure`."""
     exact = (1 - NU) * SIGY * PLASTIC_RADIUS**3 / (E * OUTER**2)
     yield Compared("u(b)", exact, "Hill", _radial(run, OUTER))
 
@@ -139,8 +146,8 @@ def _hill_cylinder(run: Run) -> Iterator[Compared]:
 
 
 CASES = (
-    Case("thick sphere, elastic", _elastic_sphere, _lame_sphere),
-    Case("thick sphere, plastic", _plastic_sphere, _hill_sphere),
+    Case("thick sphere, elastic", _elastic_sphere, lame_sphere),
+    Case("thick sphere, plastic", _plastic_sphere, hill_sphere),
     Case("thick cylinder, elastic", _elastic_cylinder, _lame_cylinder),
     Case("thick cylinder, plastic", _plastic_cylinder, _hill_cylinder),
 )

@@ -23,17 +23,18 @@ from archord.scene.file import parse_any
 THICKNESSES = (0.2, 0.5, 1.0, 2.0, 4.0)  # over R
 _RADIUS = 10.0
 _STEPS = (1, 2, 4)  # of the four whose loads stand in the table
-_STEEL = {"E": 210000.0, "nu": 0.3}
+STEEL = {"E": 210000.0, "nu": 0.3}
+JOINT: dict[str, Any] = {
+    "radius": _RADIUS,
+    "clearance": 0.05,
+    "block_size": 40.0,
+    "relative_element_size": 0.15,
+    "growth": 0.35,
+}
 _SCENE: dict[str, Any] = {
-    "joint": {
-        "radius": _RADIUS,
-        "clearance": 0.05,
-        "block_size": 40.0,
-        "relative_element_size": 0.15,
-        "growth": 0.35,
-    },
-    "pin": _STEEL,
-    "block": _STEEL | {"yield_stress": 300.0},
+    "joint": JOINT,
+    "pin": STEEL,
+    "block": STEEL | {"yield_stress": 300.0},
     "load": {"displacement": 3.2, "steps": 4},  # in clearances
     "output": {"fields": False},
 }
@@ -49,7 +50,7 @@ def solved(changes: dict[str, Any]) -> Sequence[Record]:
 def table_of(thicknesses: Sequence[float]) -> Table:
     """Forces and peak pressures in space over those of plane stress and of plane strain."""
     planes = []
-    fine = _SCENE["joint"] | {"relative_element_size": 0.05, "growth": 0.2}
+    fine = JOINT | {"relative_element_size": 0.05, "growth": 0.2}
     for plane in ("stress", "strain"):
         planes.append(solved({"joint": fine, "analysis": {"plane": plane}}))
     over = [f"{what}/{plane}" for what in ("P", "p0") for plane in ("stress", "strain")]

@@ -70,6 +70,18 @@ class Sketch:
             self.lines[name] += [line for line in paths[name] if line not in self.lines[name]]
         return len(self.loops)
 
+    def around_face(self, face: int) -> list[int]:
+        """The lines around a ``face`` as they follow each other."""
+        left = {line: self.curves[line - 1][:2] for line in self.loops[face - 1]}
+        line, (_, end) = left.popitem()
+        ordered = [line]
+        while left:
+            line = next(other for other, ends in left.items() if end in ends)
+            start, stop = left.pop(line)
+            end = stop if end == start else start
+            ordered.append(line)
+        return ordered
+
     def pin(self, x: float, up: int, part: PinPart, before: str = "", bore: float = 0.0) -> None:
         """The quarters, above or below the axis, of a pin of radius 1 about (x, 0), which may have
         a ``bore`` of a radius; the names of its body and its sets have ``before`` in front."""

@@ -171,7 +171,7 @@ class _Drawing:
         surfaces = []
         for face in self.sketch.faces[slab.profile]:
             curves = []
-            for line in self._in_turn(self.sketch.loops[face - 1]):
+            for line in self.sketch.around_face(face):
                 start, stop, *centre = (point[k] for k in self.sketch.curves[line - 1])
                 add = self.occ.addCircleArc if centre else self.occ.addLine
                 curves.append(add(start, *centre, stop))
@@ -179,18 +179,6 @@ class _Drawing:
         made = self.occ.extrude(surfaces, 0, 0, slab.top - slab.bottom)
         self.occ.synchronize()
         return [tag for dim, tag in made if dim == 3]
-
-    def _in_turn(self, loop: Sequence[int]) -> list[int]:
-        """The lines of a ``loop`` as they follow each other."""
-        left = {line: self.sketch.curves[line - 1][:2] for line in loop}
-        line, (_, end) = left.popitem()
-        ordered = [line]
-        while left:
-            line = next(other for other, ends in left.items() if end in ends)
-            start, stop = left.pop(line)
-            end = stop if end == start else start
-            ordered.append(line)
-        return ordered
 
     def blunted(self, volume: int, slab: Slab) -> int:
         """The ``volume`` with a chamfer or a fillet where its bore ends."""

@@ -1,0 +1,142 @@
+"""Error of the force over seconds, archord beside CalculiX on the same meshes in space:
+``ARCHORD_TARGET=peers docker/run python3 -m archord.benchmarks.space.equal_error``.
+
+Both solve what a mesh file and a scene or a deck hold: whole processes, one thread each, by turns.
+Seconds are of the processor, because other work on the machine counts less there. The last row of a
+case has the quickest mesh of each code whose error is within the goal's. Names of cases and sizes
+of elements change what is solved: ``... elastic 3 2``.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from archord.benchmarks.peers.calculix import process
+from archord.benchmarks.space.case import PRESS, Case
+from archord.benchmarks.space.joints import CASES
+from archord.benchmarks.timing import Process, solving, time_all
+from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.stored import store_mesh
+from archord.postprocess.run import Run
+from archord.presets.words import words_of
+from archord.report.table import Table
+from archord.scene.file import resolved
+
+CODES = ("archord", "CalculiX")
+LIMIT = 600.0  # seconds of a process, on the clock
+SIZES = (3.0, 2.2, 1.6, 1.2)
+_MESH = "joint.npz"
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The error at which seconds are compared, and how many times fewer archord's shall be."""
+
+    error: float
+    times: float
+
+
+GOALS: Mapping[str, Goal] = {"elastic": Goal(5e-4, 10.0), "A": Goal(4e-3, 8.0)}
+
+
+@dataclass(frozen=True)
+class Point:
+    """Seconds and relative ``error`` of the last force on one mesh; none and infinite of a process
+    that did not end."""
+
+    size: float
+    n_dofs: int
+    seconds: float = 0.0
+    error: float = math.inf
+
+
+def processes(case: Case, size: float, folder: Path) -> tuple[int, list[Process]]:
+    """The degrees of freedom on a mesh of this ``size``, and the process of each code, whose result
+    is the last force of the whole joint."""
+    problem = replace(case.problem(size), steps=case.steps)
+    mesh = gathered(problem.mesh)
+    folder.mkdir()
+    with (folder / _MESH).open("wb") as file:
+        store_mesh(mesh, file)
+    scene = words_of(problem, _MESH, fields=False)
+    (folder / "joint.toml").write_text(resolved(scene), encoding="utf-8")
+    run = folder / "run"
+    ours = Process(
+        "archord",
+        solving("joint.toml", run.name),
+        folder,
+        lambda: Run(run).columns[f"{PRESS} force"][-1],
+        LIMIT,
+        kind="archord",
+    )
+    deck = process(scene, folder / "calculix", problem)
+    theirs = replace(deck, limit=LIMIT, read=lambda: deck.read().P)
+    return mesh.x.size, [ours, theirs]
+
+
+def points(case: Case, sizes: Sequence[float]) -> dict[str, list[Point]]:
+    """The points of each code on meshes of these ``sizes``. Needs one rank."""
+    found: dict[str, list[Point]] = {code: [] for code in CODES}
+    exact = case.references[-1].value
+    said = partial(print, file=sys.stderr)
+    with tempfile.TemporaryDirectory() as name:
+        for size in sizes:
+            n_dofs, both = processes(case, size, Path(name) / f"{size:g}")
+            for code, timing in zip(CODES, time_all(both, 1, said), strict=True):
+                point = Point(size, n_dofs)
+                if not timing.failure:
+                    run = timing.middle
+                    point = Point(size, n_dofs, run.cpu, abs(run.result) / exact - 1)
+                found[code].append(point)
+    return found
+
+
+def quickest(error: float, points: Sequence[Point]) -> tuple[str, float]:
+    """Seconds of the quickest point within an ``error``, behind "". Without such a point, the most
+    that any took, behind ">": it takes more."""
+    within = [point.seconds for point in points if abs(point.error) <= error]
+    if within:
+        return "", min(within)
+    return ">", max(point.seconds for point in points)
+
+
+def rows(name: str, found: Mapping[str, Sequence[Point]]) -> Iterator[tuple[str, ...]]:
+    """The rows of a case: its meshes, and last the seconds within the error of its goal."""
+    for ours, theirs in zip(*found.values(), strict=True):
+        cells = (name, f"{ours.size:g}", str(ours.n_dofs))
+        ended = ours.seconds and theirs.seconds
+        times = f"{theirs.seconds / ours.seconds:.1f}" if ended else ""
+        yield (*cells, *_told(ours), *_told(theirs), times)
+    goal = GOALS[name]
+    (far, ours), (more, theirs) = (quickest(goal.error, of_code) for of_code in found.values())
+    within = f"within {100 * goal.error:g}"
+    times = "" if far else f"{more}{theirs / ours:.1f} (goal {goal.times:g})"
+    yield (name, "", "", within, f"{far}{ours:.1f}", within, f"{more}{theirs:.1f}", times)
+
+
+def _told(point: Point) -> tuple[str, str]:
+    if math.isinf(point.error):
+        return "stopped", ""
+    return f"{100 * point.error:+.3f}", f"{point.seconds:.1f}"
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the table of the cases and sizes that the ``arguments`` name."""
+    chosen = [name for name in arguments if name in GOALS] or list(GOALS)
+    sizes = [float(word) for word in arguments if word not in GOALS] or SIZES
+    headings = [f"{code}: {what}" for code in CODES for what in ("error [%]", "s")]
+    table = Table("case", "size", "dofs", *headings, "times", left=1)
+    for name in chosen:
+        for row in rows(name, points(CASES[name], sizes)):
+            table.add(*row)
+    print(table.markdown())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,28 @@
+"""Closed forms in space on coarse meshes, and error over seconds."""
+
+import pytest
+
+from archord.benchmarks.space.closed_forms import FORMS
+from archord.benchmarks.space.equal_error import Point, quickest
+
+# element sizes, and what they leave
+COARSE = {"elastic sphere": (0.4, 5e-3), "balls": (0.35, 0.02)}
+
+
+@pytest.mark.parametrize("name", COARSE)
+def test_solids_come_near_closed_forms(name):
+    size, within = COARSE[name]
+    for found in FORMS[name].compare(size):
+        assert found.ours == pytest.approx(found.reference, rel=within)
+
+
+def test_the_quickest_mesh_within_an_error_counts():
+    """Errors may have either sign; where none is within, more than the most is needed."""
+    points = [
+        Point(3.0, 100, seconds=1.0, error=0.02),
+        Point(2.0, 200, seconds=3.0, error=-0.004),
+        Point(1.0, 800, seconds=9.0, error=0.001),
+        Point(0.5, 6400),
+    ]
+    assert quickest(5e-3, points) == ("", 3.0)
+    assert quickest(1e-4, points) == (">", 9.0)
