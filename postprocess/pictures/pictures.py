@@ -150,9 +150,10 @@ def draw_probe(probe: Probe, target: Path) -> Path:
 def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     """Draw ``runs`` with their ``names`` over each other as ``target``; returns the file.
 
-    The first three of `curves_of` over the load, but of joints the pressure on the arc at the last
-    common displacement for p0. The colour runs with the order, which more than ten have in place of
-    a legend. Raises `InputError` if the file cannot be written or a run's contact cannot be read.
+    The first three of `curves_of` over the load, but of joints that wrote contact.h5 the pressure
+    on the arc at the last common displacement for p0. The colour runs with the order, which more
+    than ten have in place of a legend. Raises `InputError` if the file cannot be written or a run's
+    contact cannot be read.
     """
     from matplotlib import colormaps
 
@@ -162,19 +163,21 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     panels = np.atleast_1d(figure.subplots(1, len(quantities)))
     rising = [table["load"][first_loading(table["load"])] for table in tables]
     last = min(float(load[-1]) for load in rising)
+    have_profiles = all(run.has_profiles for run in runs)
     colours = colormaps["viridis"](np.linspace(0, 0.9, len(runs)))
     for axes, quantity in zip(panels, quantities, strict=True):
+        on_arc = quantity == "p0" and have_profiles
         axes.set(xlabel=labels["load"], ylabel=labels[quantity])
         axes.grid(alpha=0.3)
         for k, (run, table, name) in enumerate(zip(runs, tables, names, strict=True)):
             x = table["load"]
             y = table[quantity]
-            if quantity == "p0":
+            if on_arc:
                 angle, pressure = _pressure_at(run, rising[k], last)
                 x = np.degrees(angle)
                 y = pressure / scales[k]
             axes.plot(x, y, lw=1.3, ls="--" if k else "-", color=colours[k], label=name)
-        if quantity == "p0":
+        if on_arc:
             pressure_label = labels["p0"].replace("p0", "p")
             axes.set(xlabel="angle from the contact axis [°]", ylabel=pressure_label)
             title = f"contact pressure at {labels['load']} = {last:.4g}"

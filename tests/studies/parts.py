@@ -13,6 +13,7 @@ joint = { radius = 1.0, clearance = 0.005, relative_element_size = 0.3, growth =
 pin = { E = 1.82, nu = 0.3 }
 block = { E = 1.82, nu = 0.3 }
 load = { displacement = 1.0, steps = 2 }
+analysis = { tolerance = 1e-10 }
 output = { fields = false, contact = true }
 """
 SOFT = "[grid]\npin.E = [0.5, 1.0, 1.82]\nload.steps = [2, 3]\n"  # six cases on one mesh

@@ -15,7 +15,7 @@ from tests.test_cli import ENVIRONMENT, archord
 
 # twelve cases, some two seconds
 TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [5, 6, 7]\n"
-TEXT += "output.checkpoint = [true]\nanalysis.tolerance = [1e-10]\n"
+TEXT += "output.checkpoint = [true]\n"
 
 
 @pytest.fixture(scope="module")
