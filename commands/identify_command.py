@@ -13,6 +13,7 @@ from archord.report.errors import InputError
 
 if TYPE_CHECKING:
     from archord.postprocess.laws.identification.identification import Identification
+    from archord.scene.presets.joint import Scene
 
 _FREE = "free"
 _RIGID = "rigid"
@@ -84,7 +85,7 @@ def identify(
     warn(*identify_report.doubts(found))
     target = folder / "identified.toml"
     texts: list[Text] = [
-        (target, lambda: _identified(found, scene, overrides)),
+        (target, lambda: _identified(found, begun)),
         (folder / "identified.json", lambda: identify_report.as_json(found)),
     ]
     files = write(texts, [curve, scene], force)
@@ -116,14 +117,17 @@ def _stiffness(text: str) -> float:
     return found
 
 
-def _identified(found: Identification, scene: Path, overrides: tuple[str, ...]) -> str:
-    """The scene with the identified values, pressed and released as the joint was."""
+def _identified(found: Identification, scene: Scene) -> str:
+    """The ``scene`` with the identified values, pressed and released as the joint was."""
     from archord.postprocess.laws.identification.confirmation import path_of
-    from archord.scene.file import load_scene, resolved
+    from archord.scene.file import parse_scene, put, resolved
 
+    data = scene.resolved_data()
     values = {key: one.value for one in found.estimates for key in one.unknown.keys}
-    changes = [f"{key}={value:.9g}" for key, value in values.items()]
-    return resolved(load_scene(scene, [*overrides, *changes, *path_of(found)]))
+    for key, value in (values | path_of(found)).items():
+        section, _, name = key.partition(".")
+        put(data, section, name, value, key)
+    return resolved(parse_scene(data))
 
 
 def _confirmed(found: Identification, scene: Path, folder: Path, force: bool) -> Any:

@@ -250,11 +250,7 @@ def test_an_installation_has_all_data_and_tells_type_checkers_that_archord_is_ty
     subprocess.run([*command, *build], cwd=ROOT, check=True, capture_output=True)
     for room in ROOMS:
         folder = ROOT / room.replace(".", "/")
-        wanted = {
-            path
-            for path in folder.iterdir()
-            if path.suffix in DATA
-        }
+        wanted = {path for path in folder.iterdir() if path.suffix in DATA}
         place = tmp_path / "lib" / "archord" / ("" if room == "archord" else room.replace(".", "/"))
         assert not {path.name for path in wanted if not (place / path.name).is_file()}
     assert (tmp_path / "lib" / "archord" / "py.typed").is_file()

@@ -164,5 +164,18 @@ def test_a_loaded_pin_is_that_of_calculix(tmp_path):
     assert run.columns["clamp x"][-1] == pytest.approx(-20000, rel=1e-6)
 
 
+def test_tolerances_of_a_fit_scatter_the_force_most_by_the_clearance(tmp_path, monkeypatch):
+    """Rank correlations by hand of what the table holds; every joint has a force."""
+    monkeypatch.setattr("sys.argv", ["tolerances.py", str(tmp_path / "scatter.png"), "60"])
+    joints = runpy.run_path(str(FOLDER / "tolerances.py"))["joints"]
+    ranks = joints.rank()
+    correlation = np.corrcoef(ranks.clearance, ranks.P)[0, 1]
+    assert np.isfinite(joints.P).all()
+    assert correlation < -0.7
+    assert np.corrcoef(ranks.block_yield, ranks.P)[0, 1] > 0
+    assert (tmp_path / "scatter.png").is_file()
+
+
 def test_every_example_is_tested():
-    assert {path.stem for path in FOLDER.glob("*.py")} == {*SHORT, "slider_crank"}
+    others = {"slider_crank", "tolerances"}
+    assert {path.stem for path in FOLDER.glob("*.py")} == {*SHORT, *others}

@@ -4,6 +4,7 @@ differs."""
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -12,19 +13,20 @@ from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.identification.identification import Identification
 
 _STEPS = 30  # of loading, and about as many of the way back
+_REACHED = 0.995  # of the deepest displacement: a second loading may come as far
 _RETURNED = 0.05  # of the deepest displacement, from which on a way back is solved
 
 
-def path_of(found: Identification) -> list[str]:
-    """The load of the scene, as ``key=value``: to the deepest displacement and back."""
+def path_of(found: Identification) -> dict[str, Any]:
+    """The keys of the load: to the deepest displacement and back."""
     delta = found.predicted.delta
-    last = int(np.argmax(delta))
-    deepest = float(delta[last])
+    deepest = float(delta.max())
+    last = int(np.argmax(delta > _REACHED * deepest))
     least = max(float(delta[last:].min()), 0.0)
     turns = [deepest]
     if least < (1 - _RETURNED) * deepest:
         turns.append(least)
-    return [f"load.displacement_absolute={turns}", f"load.steps={_STEPS}"]
+    return {"load.displacement_absolute": turns, "load.steps": _STEPS}
 
 
 def compared(found: Identification, delta: Array, load: Array) -> list[str]:
