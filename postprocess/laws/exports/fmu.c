@@ -1,6 +1,6 @@
 /* A joint's law as an FMU of FMI 2.0, for model exchange and co-simulation, around the law's own header.
 
-   The file model.h includes that header. It defines LAW(name), which puts the law's name before a name, the CLEARANCE
+   The file fmu-model.h includes that header. It defines LAW(name), which puts the law's name before a name, the CLEARANCE
    of the joint, the GUID, WITH_ERROR, which is 1 if the law tells residual clearance and expected error, and
    WITH_ELEMENT, which is 1 if the header has a force element.
 
@@ -13,18 +13,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model.h"
+#include "fmu-model.h"
 
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT
 #endif
-/* Functions of a library have their plain names; linked with others they begin with the law's name. */
-#ifdef FMI2_OVERRIDE_FUNCTION_PREFIX
-#define FMI(name) name
-#else
+/* Functions of a library have their plain names. To link several FMUs into one program define FMI2_FUNCTION_PREFIX:
+   names then begin with the law's name. */
+#ifdef FMI2_FUNCTION_PREFIX
 #define FMI(name) LAW(name)
+#else
+#define FMI(name) name
 #endif
 
 /* --- the types of FMI 2.0 that this file needs, written for it */

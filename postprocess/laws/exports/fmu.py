@@ -161,7 +161,7 @@ def export_fmu(law: JointCurve | FittedLaw, target: Path, contact: Contact | Non
     guid = f"{{{uuid.UUID(digest[:32])}}}"
     sources = {
         f"{name}.h": header,
-        "model.h": model + _GUID.format(guid=guid),
+        "fmu-model.h": model + _GUID.format(guid=guid),
         "fmu.c": source,
     }
     description = _description(program, name, variables, guid)
@@ -195,7 +195,7 @@ def _library(sources: dict[str, str], target: Path) -> bytes | None:
             for name, text in sources.items():
                 Path(folder, name).write_text(text, encoding="utf-8")
             command = shlex.split(os.environ.get("CC", "cc"))
-            command += [*_FLAGS, "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "fmu.c", "-o", "law.so", "-lm"]
+            command += [*_FLAGS, "fmu.c", "-o", "law.so", "-lm"]
             try:
                 subprocess.run(command, cwd=folder, check=True, capture_output=True)
                 return Path(folder, "law.so").read_bytes()
