@@ -35,7 +35,9 @@ _LOOSEST = 2e-3  # residual of a linear system over its right-hand side
 _SUPERLINEAR = 2.0  # power of the last reduction of the residual of Newton's method
 ACCURATE = 1e-10  # the same, where a solve stands for a factorisation
 _MARGIN = 0.01  # of the goal: what the last linear system may leave, as reactions fall meanwhile
-_SMOOTHING = 3  # degree of the polynomials
+_SMOOTHING = 5  # degree of the polynomials
+_GROWN = 2.0  # entry of the diagonal over what it was, above which polynomials may diverge
+_SOFTENED = 0.05  # part of the diagonal that may have shrunk as much
 _FEWEST_COARSE = 100  # equations that are factorised on the last level
 _WEAK = 0.05  # of the diagonal: couplings that aggregates do not follow
 _ROUND_OFF = 1e-12
@@ -94,6 +96,7 @@ class Multigrid(Strategy):
             fixed = fixed_linear
         self._motions = _free_rigid_motions(V, fixed)
         self._product: Galerkin | None = None
+        self._diagonal: Array = np.zeros(1)  # of the coarse matrix at the last set-up below it
         self._below = PETSc.PC().create(A.comm)
         self._smoother = BlockSmoother(A)
         self._right_side = 0.0
@@ -130,6 +133,20 @@ class Multigrid(Strategy):
             self._below.setOperators(self.coarse)
             _use_aggregates(self._below)
             self._is_ready = True
+        self._set_up_below()
+
+    def _set_up_below(self) -> None:
+        """Set up the levels below the linear displacements, unless those that are there will do:
+        that takes more time than the iterations which it saves."""
+        diagonal = self.coarse.getDiagonal().array
+        grown = (diagonal > _GROWN * self._diagonal).sum()
+        softened = (_GROWN * diagonal < self._diagonal).sum()
+        comm = self.matrix.comm.tompi4py()
+        n_grown, n_softened = comm.allreduce(np.array([grown, softened]))
+        will_do = n_grown == 0 and n_softened <= _SOFTENED * self.coarse.getSize()[0]
+        if not will_do:
+            self._diagonal = diagonal
+        self._below.setReusePreconditioner(bool(will_do))
         self._below.setUp()
 
     def _update(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
