@@ -134,7 +134,7 @@ def mindlin(size: float) -> Iterator[Compared]:
     force = 2 / 3 * E / balls.BALL  # by Hertz, at a = 1
     aside = _PUSHED * share * force
     push = Load("push", on="ball top", direction="x", displacement=[0.0, aside])
-    how = {"material": Elastic(E, 0.0), "friction": FRICTION, "steps": [2, 4]}
+    how: dict[str, Any] = {"material": Elastic(E, 0.0), "friction": FRICTION, "steps": [2, 4]}
     with _run_of(_balls(size, 2, push, **how)) as run:
         pressing = abs(run.columns["ball force"][-1])
         pushing = abs(run.columns["push force"][-1])

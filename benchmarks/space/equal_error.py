@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from archord.benchmarks.peers.calculix import process
 from archord.benchmarks.space.case import PRESS, Case
@@ -60,7 +61,7 @@ def processes(case: Case, size: float, folder: Path) -> tuple[int, list[Process]
     """The degrees of freedom on a mesh of this ``size``, and the process of each code, whose result
     is the last force of the whole joint."""
     problem = replace(case.problem(size), steps=case.steps)
-    mesh = gathered(problem.mesh)
+    mesh: Any = gathered(problem.mesh)  # on the one rank
     folder.mkdir()
     with (folder / _MESH).open("wb") as file:
         store_mesh(mesh, file)

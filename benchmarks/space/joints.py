@@ -33,7 +33,9 @@ DEEP = 0.1
 _ASIDE = 1.5  # how far from the lowest line pressures are taken
 _MIDDLE = 1.0  # and from z = 0
 _BAND = 1.3  # and from a depth below the face, as a ratio
-_AT_EDGE = 0.25  # size of elements at the edge over the size elsewhere
+# size of elements at the edge over the size elsewhere
+_AT_EDGE = 0.25
+_AT_SINGULAR_EDGE = 0.1
 _Y = 1
 _ELASTIC = Elastic(E, NU)
 _YIELDING = J2Material(E, NU, hardening=LinearHardening(300.0))
@@ -111,8 +113,8 @@ def pressure_over_middle(depth: float, system: System) -> float:
     return float(np.exp(at_depth) / middle)
 
 
-def _with_edge(size: float) -> Size:
-    return Size(size, at_edge=_AT_EDGE * size, edge=THICKNESS)
+def _with_edge(size: float, ratio: float = _AT_EDGE) -> Size:
+    return Size(size, at_edge=ratio * size, edge=THICKNESS)
 
 
 def _over_middle(depth: float, value: float, uncertainty: float) -> Reference:
@@ -131,7 +133,7 @@ CASES: Mapping[str, Case] = {
     ),
     "longer": Case(
         "elastic, longer pin",
-        lambda size: joint(_with_edge(size), pin_length=1.5 * THICKNESS),
+        lambda size: joint(_with_edge(size, _AT_SINGULAR_EDGE), pin_length=1.5 * THICKNESS),
         [
             Reference("P", DEEP, 229_010.0, 60.0),
             _over_middle(1.0, 1.18, 0.01),
