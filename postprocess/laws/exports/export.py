@@ -302,7 +302,7 @@ def export_law(law: JointCurve | FittedLaw, target: Path, contact: Contact | Non
         return replace(law, about=law.about | {"forces": program.units}).to_json()
     name = target.stem
     form = _FORMS[target.suffix]
-    _check_name(target, form.template)
+    check_name(target, form.template)
     functions, used = select(program.functions, program.flags)
     used |= {"RANGE", "REACH"}
     if "forces" in program.functions:
@@ -340,7 +340,7 @@ def _element_parts(language: str, name: str, program: Program, contact: Contact)
     return {key: Template(text.rstrip()).substitute(given) for key, text in texts.items()}
 
 
-def _check_name(target: Path, language: str) -> None:
+def check_name(target: Path, language: str) -> None:
     """Raise ValueError if the stem of ``target`` cannot name a law in the ``language``."""
     name = target.stem
     fault = None

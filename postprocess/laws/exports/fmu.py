@@ -22,7 +22,7 @@ from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
-from archord.postprocess.laws.exports.export import Contact, Program, export_law
+from archord.postprocess.laws.exports.export import Contact, Program, check_name, export_law
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.version import VERSION
@@ -142,6 +142,7 @@ def export_fmu(law: JointCurve | FittedLaw, target: Path, contact: Contact | Non
     b'PK'
     """
     name = target.stem
+    check_name(target, "c")
     program = Program.of(law)
     contact = contact or Contact()
     header = export_law(law, target.with_suffix(".h"), contact)
