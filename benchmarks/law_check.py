@@ -5,7 +5,8 @@ and its own word.
     mpirun -n 2 archord sweep fresh.sweep.toml -o runs/fresh
     python3 -m archord.benchmarks.law_check runs/fresh
 
-A joint solved with one and with two steps between its nodes counts with what both extrapolate to.
+Joints that harden (`archord.studies.hardening_design`) are checked in the same way. A joint solved
+with one and with two steps between its nodes counts with what both extrapolate to.
 """
 
 from __future__ import annotations
@@ -24,13 +25,15 @@ from scipy.optimize import minimize_scalar
 
 from archord.postprocess.laws.calibration import fit
 from archord.postprocess.laws.chord_laws import plastic_winkler
-from archord.postprocess.laws.general.general_law import law_of_numbers
+from archord.postprocess.laws.general.general_law import joint_numbers, law_of_numbers
+from archord.postprocess.laws.general.hardening_model import flows
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.law_fit import (
     SOFT,
     NodeRun,
     Numbers,
+    by_joint,
     first_loading,
     rms_largest,
     solved_in,
@@ -62,9 +65,11 @@ class Off:
     inside: Array
 
 
-def off(numbers: Numbers, runs: list[NodeRun]) -> Off:
-    """The errors of the law on the joint with these ``numbers``, solved in ``runs``."""
-    law = law_of_numbers(numbers)
+def off(joint: LawJoint, runs: list[NodeRun]) -> Off:
+    """The errors of the law on ``joint``, solved in ``runs``."""
+    numbers = joint_numbers(joint)
+    law = law_of_numbers(numbers, flows(joint))
+    kind = f"{kind_of(numbers)}{', hardens' if joint.hardens else ''}"
     nodes = first_loading(runs)
     x, y, peak, angle = nodes[nodes[:, 0] <= _END].T
     told = law.at(x)
@@ -81,7 +86,7 @@ def off(numbers: Numbers, runs: list[NodeRun]) -> Off:
         if run.steps == 1 and len(run.back) > 3 and run.back[0, 0] <= _END:
             for name, value in _back(law, run).items():
                 errors[name] = np.append(errors.get(name, []), value)
-    return Off(kind_of(numbers), errors, np.abs(told.load - y)[usual] <= told.error[usual])
+    return Off(kind, errors, np.abs(told.load - y)[usual] <= told.error[usual])
 
 
 def _within(x: Array, ends: tuple[float, float]) -> npt.NDArray[np.bool_]:
@@ -143,7 +148,10 @@ def table_of(found: list[Off]) -> Table:
     for one in found:
         plane = one.kind.split()[0]
         soft = ", soft pin" if "soft" in one.kind else ""
-        together = one.kind if "elastic" in one.kind else f"{plane} yielding{soft}, all"
+        hardens = ", hardens" if "hardens" in one.kind else ""
+        together = f"{plane} yielding{soft}{hardens}, all"
+        if "elastic" in one.kind:
+            together = one.kind
         for kind in {one.kind, together, "all"}:
             kinds[kind].append(one)
     for kind, members in sorted(kinds.items()):
@@ -215,9 +223,11 @@ def _paper_fitted(numbers: Numbers, x: Array, y: Array) -> Array:
 
 def main(folder: Path) -> None:
     """Print the tables of the sweep in ``folder``."""
-    solved = solved_in(folder)
-    print(table_of([off(numbers, runs) for numbers, runs in solved.items()]).markdown())
-    print(other_laws(solved).markdown())
+    joints = by_joint(folder)
+    print(table_of([off(joint, runs) for joint, runs in joints.items()]).markdown())
+    perfect = solved_in(folder)
+    if perfect:
+        print(other_laws(perfect).markdown())
 
 
 if __name__ == "__main__":

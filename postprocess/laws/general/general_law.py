@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model
-from archord.postprocess.laws.general.hardening_model import Flows, flows, hardened_loss
+from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent
 from archord.postprocess.laws.general.yield_model import (
@@ -32,7 +32,8 @@ CLEARANCES = (1e-3, 0.02)
 RATIOS = (1 / 3, 10.0)
 SMALLEST_S = {"strain": 0.15, "stress": 0.2}
 _LAST_DIGITS = 1e-3  # of the bounds, and of moduli that a scene has rounded
-_ELASTIC_ERROR = 1e-3  # of P, relative: 9 in 10 elastic joints have less
+ELASTIC_ERROR = 1e-3  # of P, relative: 9 in 10 elastic joints have less
+_LARGEST_GAIN = 3.0  # of s_eff/s at 3 dR among solved joints
 # secant of the way back over the elastic joint's steepest slope: then it is a straight line
 _STEEPEST = 0.999
 
@@ -180,6 +181,10 @@ def outside(joint: LawJoint) -> str:
         if not low * (1 - _LAST_DIGITS) <= value <= high * (1 + _LAST_DIGITS):
             to = f"to {high:g}" if high < math.inf else "and more"
             return f"{name} = {value:.4g} is outside {low:g} {to}"
+    gain = float(gains(joint_numbers(joint), flows(joint), NODES[-1]).max())
+    if gain > _LARGEST_GAIN:
+        said = f"{gain:.3g} times the yield stress, at most {_LARGEST_GAIN:g} times is covered"
+        return f"a body hardens by 3 dR to {said}"
     return ""
 
 
@@ -218,7 +223,7 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None) -> JointCurve:
     dy = base.slope
     peak = base.peak
     angle = base.angle
-    error = np.full_like(y, _ELASTIC_ERROR)
+    error = np.full_like(y, ELASTIC_ERROR)
     ratio = np.ones_like(y)
     toe = np.zeros_like(y)
     back_error: Array = np.zeros(len(NODES))

@@ -5,8 +5,8 @@ perfectly plastic one does whose yield stress is the flow stress at a strain ``e
 
 P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x and ln s_eff, and of
 what the two bodies are; it hardly depends on the curve s(PEEQ). hardening_model.json has its
-coefficients by plane and body, and the part of a body's flow stress by which the law is wrong:
-hardening_fit.py makes it. p0, eps and the way back follow the same s_eff.
+coefficients by plane and body, and factors of the expected error: hardening_fit.py makes it. p0,
+eps and the way back follow the same s_eff.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ _ITERATIONS = 60  # at most, of the fixed point
 _CLOSE = 1e-13
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
+_LEAST = 0.05  # ln of the rise that counts where a curve is flat
 WIDE = 3.0  # factor on eps_rep, up and down, between which the curve tells the error
 
 Flow = Callable[[Array], Array]  # s of a body by PEEQ
@@ -98,6 +99,13 @@ def representative(
     return Strains(s, strain)
 
 
+def gains(numbers: Sequence[float], given: Flows, x: float) -> Array:
+    """``s_eff/s`` of the bodies that harden at ``x``; one of none."""
+    found = representative(hardening_model()["strain"], numbers, given, np.array([x]))
+    hardens = [i for i, flow in enumerate(given) if flow is not None]
+    return np.append(1.0, found.s[hardens, 0] / np.array(numbers[5:])[hardens])
+
+
 def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     """What yielding does at ``x`` ``(k,)`` to the joint with these ``numbers``, whose bodies harden
     as ``given``."""
@@ -105,29 +113,37 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     found = representative(table["strain"], numbers, given, x)
     lost = loss(numbers, Yielding(*found.s), x)
     slope: Array = CubicSpline(np.log(x), lost.force)(np.log(x), 1) / x
-    wrong = stress_error(table, numbers, given, found)
+    wrong = table["error"][kind(numbers)] * unsure(given, found, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
     return lost._replace(slope=slope, deviation=error)
 
 
-def stress_error(
-    table: Mapping[str, Any], numbers: Sequence[float], given: Flows, found: Strains
-) -> Array:
-    """The expected error ``(k,)`` of P that the representative strain leaves, over P."""
-    plane = "strain" if numbers[0] else "stress"
-    squares: Array = np.zeros(found.s.shape[1])
-    for i, (body, flow) in enumerate(zip(BODIES, given, strict=True)):
-        strain = found.strain[i]
+def kind(numbers: Sequence[float]) -> str:
+    """Plane, and which body yields, "pin", "block" or "both"."""
+    strain, *_, pin, block = numbers
+    body = "both"
+    if np.isinf(pin) or np.isinf(block):
+        body = "pin" if np.isinf(block) else "block"
+    return f"{'strain' if strain else 'stress'} {body}"
+
+
+def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
+    """By how much P ``(k,)`` would change, roughly and relatively, if eps_rep were `WIDE` times as
+    large: ln of the rise of the curves, at least `_LEAST`, times the part of P that is ``lost`` to
+    yielding."""
+    squares: Array = np.full(len(lost.force), _LEAST**2)
+    for i, flow in enumerate(given):
         if flow is not None:
+            strain = found.strain[i]
             rise = np.log(flow(WIDE * strain) / flow(strain / WIDE))
-            squares += (table["error"][f"{plane} {body}"] * rise) ** 2
-    return np.sqrt(squares)
+            squares += rise**2
+    return np.sqrt(squares) * (1 - np.exp(lost.force))
 
 
 @cache
 def hardening_model() -> dict[str, dict[str, Any]]:
-    """The model that comes with archord: ``strain``, the coefficients of `ln_strain`, and
-    ``error``, both by plane and body."""
+    """The model that comes with archord: ``strain``, the coefficients of `ln_strain` by plane and
+    body, and ``error``, the factor on `unsure` that 9 in 10 errors keep, by `kind`."""
     table = json.loads(TABLE.read_text(encoding="utf-8"))
     strain = {name: np.array(values) for name, values in table["strain"].items()}
     return {"strain": strain, "error": table["error"]}

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -146,22 +146,32 @@ class NodeRun:
         return rest[: int(rises[0]) + 1] if len(rises) else rest
 
 
-def solved_joints(curves: Iterable[RunCurve]) -> dict[Numbers, list[NodeRun]]:
-    """The runs that are complete by the numbers of their joints, as `joint_numbers` has them."""
+def solved_joints(curves: Iterable[RunCurve]) -> dict[LawJoint, list[NodeRun]]:
+    """The runs that are complete by their joints."""
     found = defaultdict(list)
     for curve in curves:
         if len(curve.delta) < sum(curve.scene.load.stage_steps):
             continue
-        numbers = joint_numbers(LawJoint.from_scene(curve.scene))
-        found[tuple(float(f"{value:.6g}") for value in numbers)].append(NodeRun.of(curve))
+        found[LawJoint.from_scene(curve.scene)].append(NodeRun.of(curve))
     return dict(found)
 
 
-def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
+def by_joint(folder: Path) -> dict[LawJoint, list[NodeRun]]:
     """The joints that are solved as far as the law needs them, of the sweep in ``folder``."""
     runs = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
     solved = solved_joints(Run(run).curve for run in runs)
-    return {numbers: nodes for numbers, nodes in solved.items() if complete(numbers, nodes)}
+    return {
+        joint: nodes for joint, nodes in solved.items() if complete(joint_numbers(joint), nodes)
+    }
+
+
+def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
+    """`by_joint` of joints that do not harden, by their numbers, as `joint_numbers` has them."""
+    found: dict[Numbers, list[NodeRun]] = defaultdict(list)
+    for joint, runs in by_joint(folder).items():
+        if not joint.hardens:
+            found[tuple(float(f"{value:.6g}") for value in joint_numbers(joint))] += runs
+    return dict(found)
 
 
 def fit_law(
@@ -353,7 +363,7 @@ def main(folder: Path | None) -> None:
     print(error_table(stored_joints(), json.loads(KERNELS.read_text(encoding="utf-8"))).markdown())
 
 
-def complete(numbers: Numbers, runs: list[NodeRun]) -> bool:
+def complete(numbers: Sequence[float], runs: list[NodeRun]) -> bool:
     """Whether the runs of a joint reach 3 dR, in two step sizes where yielding begins early."""
     reached = {run.steps for run in runs if run.nodes[:, 0].max() >= _LAST - 0.05}
     return 1 in reached and (2 in reached or min(numbers[5:]) >= EARLY)

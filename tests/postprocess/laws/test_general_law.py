@@ -11,6 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from archord.materials.elasticity import contact_modulus
+from archord.materials.hardening import LinearHardening, TabularHardening
+from archord.materials.named import metals
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import (
     CLEARANCES,
@@ -193,6 +196,7 @@ def test_both_planes_are_one_elastic_law() -> None:
         ({"clearance": 0.03}, "dR/R = 0.03 is outside 0.001 to 0.02"),
         ({"pin_share": 0.9}, "E(pin)/E(block) = 0.1111 is outside 0.333333 to 10"),
         ({"block_yield": 0.1 * 0.005}, "sigY R/(E* dR) = 0.1 is outside 0.15 and more"),
+        ({"block_hardening": LinearHardening(0.002, 4.0)}, "a body hardens by 3 dR to"),
         ({"kinematic": True}, "a body has back stresses, and the law is of isotropic hardening"),
         ({}, ""),
     ],
@@ -203,6 +207,34 @@ def test_what_is_outside_is_said(change: dict, said: str) -> None:
     found = outside(replace(inside, **change))
     assert said in found
     assert bool(found) == bool(said)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_a_flat_curve_is_perfect_plasticity(plane: str) -> None:
+    """At the nodes to the digit."""
+    numbers = joint_numbers(joint(plane, 2.0, (0.2, 0.4), 0.004, 0.4, "both"))
+    flat = law_of_numbers(numbers, (lambda _: np.array(0.4), lambda _: np.array(0.4)))
+    perfect = law_of_numbers(numbers)
+    np.testing.assert_allclose(flat.y, perfect.y, rtol=1e-7)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("name", sorted(metals()))
+def test_every_named_metal_has_a_law(name: str, plane: str) -> None:
+    """P rises, is above the law of perfect plasticity at first yield, and comes back below."""
+    metal = metals()[name]
+    curve = TabularHardening(tuple(map(tuple, metal["hardening"])))
+    first = curve.points[0][1]
+    bodies = {"E_star": contact_modulus(metal["E"], metal["nu"], plane) / 2, "nu": metal["nu"]}
+    pin = LawJoint(10.0, 0.05, **bodies, pin_yield=first, block_yield=first, plane=plane)
+    hard = replace(pin, pin_hardening=curve, block_hardening=curve)
+    assert outside(hard) == ""
+    x = X[1:] * 0.05
+    found = general_law(hard)
+    load, _, error, *_ = found.at(x)
+    assert (np.diff(load) >= 0).all()
+    assert (load + error >= 0.99 * general_law(pin).at(x).load).all()
+    assert (found.at(x, x[-1]).load <= load).all()
 
 
 @pytest.mark.parametrize("name", ["plane", "nu"])

@@ -1,0 +1,182 @@
+"""The representative strain from solved joints that harden, by least squares of ln P.
+
+    python3 -m archord.studies.hardening_design > hardening.sweep.toml
+    mpirun -n 2 archord sweep hardening.sweep.toml
+    python3 -m archord.postprocess.laws.general.hardening_fit runs/hardening
+
+Every fifth joint is predicted by the other joints: these errors make the expected error, and are
+printed.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
+from archord.postprocess.laws.general.hardening_model import (
+    BODIES,
+    TABLE,
+    TERMS,
+    Flows,
+    Strains,
+    flows,
+    kind,
+    ln_strain,
+    representative,
+    unsure,
+)
+from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.law_fit import NodeRun, by_joint, first_loading, rms_largest
+from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss
+from archord.report.table import Table
+
+Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
+_RANGE = (0.05, 3.05)  # x of the data
+_USUAL = (0.099, 2.001)
+_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(8)])
+_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7)])  # how far from it coefficients are likely
+_SCATTER = 0.01  # of ln P of a joint, against which that counts
+_PARTS = 5  # of the joints, each of which the other parts predict
+_ITERATIONS = 5
+_SMALL = 1e-2
+_LITTLE = 1e-3  # change of P below which yielding does not matter
+_WITHIN = 0.93  # share of errors that the expected error is to contain
+
+
+@dataclass(frozen=True)
+class Hardened:
+    """A joint that was solved: its ``numbers``, how its bodies harden, and ``ln(P/P_el)`` ``(k,)``
+    at ``x`` ``(k,)``."""
+
+    numbers: Sequence[float]
+    given: Flows
+    x: Array
+    force: Array
+
+    @classmethod
+    def of(cls, joint: LawJoint, runs: list[NodeRun]) -> Hardened:
+        """The joint that was solved in ``runs``."""
+        numbers = joint_numbers(joint)
+        x, y, *_ = first_loading(runs).T
+        inside = (x >= _RANGE[0]) & (x <= _RANGE[1])
+        x = x[inside]
+        elastic = elastic_model().at(Elastic(*numbers[1:5]), x)
+        return cls(numbers, flows(joint), x, np.log(y[inside] / elastic.y))
+
+    @property
+    def plane(self) -> str:
+        """The plane."""
+        return "strain" if self.numbers[0] else "stress"
+
+    def state(self, model: Model) -> tuple[Strains, Loss]:
+        """What the law says at x."""
+        found = representative(model, self.numbers, self.given, self.x)
+        return found, loss(self.numbers, Yielding(*found.s), self.x)
+
+    def off(self, model: Model) -> Array:
+        """The errors of ln P."""
+        return self.state(model)[1].force - self.force
+
+    def derivatives(self, model: Model, found: Strains, lost: Loss) -> Array:
+        """d(ln P)/d(coefficients) ``(k, 2 terms)`` of pin and block, as if the s of the other body
+        were constant."""
+        columns = np.zeros((2, len(TERMS), len(self.x)))
+        for i, (body, flow) in enumerate(zip(BODIES, self.given, strict=True)):
+            if flow is None:
+                continue
+            higher: Array = found.s.copy()
+            higher[i] *= 1 + _SMALL
+            of_s = (loss(self.numbers, Yielding(*higher), self.x).force - lost.force) / _SMALL
+            own = found.s[i]
+            other = found.s[1 - i]
+            rise = np.log(flow(found.strain[i] * (1 + _SMALL)) / flow(found.strain[i])) / _SMALL
+            of = model[f"{self.plane} {body}"]
+            lower_end = ln_strain(of, self.numbers, body, self.x, own, other)
+            upper_end = ln_strain(of, self.numbers, body, self.x, higher[i], other)
+            feedback = rise * (upper_end - lower_end) / _SMALL
+            units: Array = np.eye(len(TERMS))
+            for term in range(len(TERMS)):
+                unit = units[term]
+                shape = ln_strain(unit, self.numbers, body, self.x, own, other)
+                columns[i, term] = of_s * rise * shape / (1 - feedback)
+        return columns.reshape(-1, len(self.x)).T
+
+
+def fit_strain(joints: list[Hardened]) -> dict[str, Array]:
+    """The coefficients by plane and body, by Gauss and Newton's method: each joint counts like five
+    points."""
+    model: dict[str, Array] = {}
+    for plane in ("strain", "stress"):
+        own = [joint for joint in joints if joint.plane == plane]
+        names = [f"{plane} {body}" for body in BODIES]
+        values = np.tile(_GUESS, 2)
+        free = np.tile(_FREE, 2)
+        for _ in range(_ITERATIONS):
+            model |= dict(zip(names, np.split(values, 2), strict=True))
+            rows = [np.diag(1 / free)]
+            misses = [(values - np.tile(_GUESS, 2)) / free]
+            for joint in own:
+                found, lost = joint.state(model)
+                weight = 1 / (_SCATTER * np.sqrt(len(joint.x) / 5))
+                rows.append(weight * joint.derivatives(model, found, lost))
+                misses.append(weight * (lost.force - joint.force))
+            step, *_ = np.linalg.lstsq(np.concatenate(rows), np.concatenate(misses))
+            values = values - np.clip(step, -1.0, 1.0)
+        model |= dict(zip(names, np.split(values, 2), strict=True))
+    return model
+
+
+def predicted(joints: list[Hardened]) -> list[Model]:
+    """For each joint the coefficients that the other parts of the joints give."""
+    part_of = np.arange(len(joints)) % _PARTS
+    parts = [
+        fit_strain([joints[i] for i in np.flatnonzero(part_of != part)]) for part in range(_PARTS)
+    ]
+    return [parts[part] for part in part_of]
+
+
+def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, float], Table]:
+    """The factors of the expected error by kind; and rms and largest errors of P from 0.1 to 2 dR,
+    in per cent, of joints that the others predict, with the share within the expected error."""
+    by_kind: dict[str, list[Array]] = {}
+    for joint, model in zip(joints, models, strict=True):
+        found, lost = joint.state(model)
+        usual = (joint.x >= _USUAL[0]) & (joint.x <= _USUAL[1])
+        told = [lost.force - joint.force, lost.deviation, unsure(joint.given, found, lost)]
+        by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])
+    factors = {}
+    table = Table("yields", "joints", "P 0.1 to 2 dR", "inside", left=1)
+    for name, parts in sorted(by_kind.items()):
+        off, deviation, rise = np.concatenate(parts, axis=1)
+        deviation = np.hypot(deviation, ELASTIC_ERROR)
+        left = np.sqrt(np.maximum(off**2 - deviation**2, 0.0)) / np.maximum(rise, _LITTLE)
+        factors[name] = float(f"{np.quantile(left, _WITHIN):.3g}")
+        inside = np.abs(off) <= np.hypot(deviation, factors[name] * rise)
+        table.add(name, len(parts), rms_largest(100 * off), f"{inside.mean():.0%}")
+    return factors, table
+
+
+def main(folder: Path) -> None:
+    """Fit to the sweep in ``folder``, write the table beside this file, and print how good it
+    is."""
+    solved = {joint: runs for joint, runs in by_joint(folder).items() if joint.hardens}
+    joints = [Hardened.of(joint, runs) for joint, runs in solved.items()]
+    factors, table = errors_of(joints, predicted(joints))
+    strain = {
+        name: [float(f"{value:.5g}") for value in values]
+        for name, values in fit_strain(joints).items()
+    }
+    text = json.dumps({"strain": strain, "error": factors}, indent=1)
+    TABLE.write_text(f"{text}\n", encoding="utf-8")
+    print(table.markdown())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
