@@ -4,7 +4,8 @@ The first level below the displacements are the linear displacements on the same
 Its matrix is the Galerkin product ``P^T A P`` with the interpolation ``P``. Aggregates of its nodes
 make the levels below, with the rigid motions as near null space (smoothed aggregation; Vanek,
 Mandel and Brezina 1996). Sweeps of Gauss-Seidel smooth the displacements, Chebyshev polynomials the
-levels below, so that the number of iterations grows neither with the mesh nor with the ranks.
+levels below, so that the number of iterations grows slowly with the mesh, and hardly with the
+ranks.
 
 Prescribed displacements are rows and columns of the unit matrix. The interpolation leaves them out,
 but for the linear displacement at the same node. So the product has unit rows there, too.
