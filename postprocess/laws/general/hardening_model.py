@@ -34,7 +34,8 @@ _ITERATIONS = 60  # at most, of the fixed point
 _CLOSE = 1e-13
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
-_LEAST = 0.05  # ln of the rise that counts where a curve is flat
+_YIELDED = 0.02
+_LEAST = 0.5  # ln of the rise that counts where a curve is flat
 WIDE = 3.0  # factor on eps_rep, up and down, between which the curve tells the error
 
 Flow = Callable[[Array], Array]  # s of a body by PEEQ
@@ -129,15 +130,15 @@ def kind(numbers: Sequence[float]) -> str:
 
 def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
     """By how much P ``(k,)`` would change, roughly and relatively, if eps_rep were `WIDE` times as
-    large: ln of the rise of the curves, at least `_LEAST`, times the part of P that is ``lost`` to
-    yielding."""
+    large: ln of the rise of the curves, at least `_LEAST`, where `_YIELDED` of P and more is
+    ``lost`` to yielding, and less before."""
     squares: Array = np.full(len(lost.force), _LEAST**2)
     for i, flow in enumerate(given):
         if flow is not None:
             strain = found.strain[i]
             rise = np.log(flow(WIDE * strain) / flow(strain / WIDE))
             squares += rise**2
-    return np.sqrt(squares) * (1 - np.exp(lost.force))
+    return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)
 
 
 @cache
