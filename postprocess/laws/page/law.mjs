@@ -485,13 +485,16 @@ function hardenedLoss(data, strain, elastic, begin, flows, x) {
     const lost = lossOf(data, strain, elastic, found, x);
     const logs = x.map(Math.log);
     const slopes = splineSlopes(logs, lost.map((state) => state.force), false);
+    const alone = ["pin", "block"].filter((body) => Number.isFinite(begin[body]));
+    const kind = `${strain ? "strain" : "stress"} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
-        const errors = ["pin", "block"].filter((body) => flows[body]).map((body) => {
+        const rises = ["pin", "block"].filter((body) => flows[body]).map((body) => {
             const eps = found[i].strain[body];
-            const rise = Math.log(flows[body](3 * eps) / flows[body](eps / 3));
-            return data.hardening.error[`${strain ? "strain" : "stress"} ${body}`] * rise;
+            return Math.log(flows[body](3 * eps) / flows[body](eps / 3));
         });
-        return { ...state, slope: slopes[i] / x[i], deviation: Math.hypot(state.deviation, ...errors) };
+        const yielded = Math.min(Math.max((1 - Math.exp(state.force)) / 0.02, 0), 1);
+        const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded;
+        return { ...state, slope: slopes[i] / x[i], deviation: Math.hypot(state.deviation, wrong) };
     });
 }
 
