@@ -28,7 +28,8 @@ _STYLES = {
 }
 _OTHER = ("0.4", "x")
 _TEXT = 14  # points, to be read on a telephone
-_PANEL = (4.2, 4.6)  # inches
+_PANEL = (4.2, 3.8)  # inches
+_COLUMNS = 2
 
 
 def cases(folder: Path) -> dict[str, pd.DataFrame]:
@@ -79,8 +80,13 @@ def draw(tables: dict[str, pd.DataFrame], file: Path) -> None:
     """Draw the cases of ``tables`` side by side: the front of each code, its points faint behind,
     and grey what the reference does not know."""
     wide, high = _PANEL
-    figure = new_figure(wide * len(tables), high)
-    panels: Sequence[Axes] = figure.subplots(1, len(tables), squeeze=False)[0]
+    columns = min(len(tables), _COLUMNS)
+    rows = -(-len(tables) // columns)
+    figure = new_figure(wide * columns, high * rows)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    panels: Sequence[Axes] = grid.ravel()[: len(tables)]
+    for unused in grid.ravel()[len(tables) :]:
+        unused.set_axis_off()
     for ax, (case, table) in zip(panels, tables.items(), strict=True):
         for code, points in table.groupby("code", sort=False):
             _draw_code(ax, str(code), points)
@@ -89,12 +95,12 @@ def draw(tables: dict[str, pd.DataFrame], file: Path) -> None:
         ax.axhspan(bottom, unknown, color="0.88", zorder=0)
         ax.set_ylim(bottom=bottom)
         ax.set_title(case, fontsize=_TEXT + 2)
-        ax.set_xlabel("seconds, whole process", fontsize=_TEXT)
         ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.tick_params(labelsize=_TEXT - 2)
         ax.grid(True, linewidth=0.4)
-    panels[0].set_ylabel("relative error of P", fontsize=_TEXT)
+    figure.supxlabel("seconds, whole process", fontsize=_TEXT)
+    figure.supylabel("relative error of P", fontsize=_TEXT)
     shown = dict[str, Artist]()
     for ax in panels:
         lines, names = ax.get_legend_handles_labels()

@@ -4,11 +4,13 @@
 Both solve what a mesh file and a scene or a deck hold: whole processes, one thread each, by turns.
 Seconds are of the processor, because other work on the machine counts less there. The last row of a
 case has the quickest mesh of each code whose error is within the goal's. Names of cases and sizes
-of elements change what is solved: ``... elastic 3 2``.
+of elements change what is solved: ``... elastic 3 2``. ``--into FOLDER`` draws the points, by their
+wall time, into the picture of ``archord benchmark work-precision`` in this folder.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 import tempfile
@@ -18,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from archord.benchmarks.cost.work_precision_picture import STEM, cases, draw
 from archord.benchmarks.peers.calculix import process
 from archord.benchmarks.space.case import PRESS, Case
 from archord.benchmarks.space.joints import CASES
@@ -26,6 +29,7 @@ from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.stored import store_mesh
 from archord.postprocess.run import Run
 from archord.presets.words import words_of
+from archord.report.files import write_rows
 from archord.report.table import Table
 from archord.scene.file import resolved
 
@@ -48,13 +52,17 @@ GOALS: Mapping[str, Goal] = {"elastic": Goal(5e-4, 10.0), "A": Goal(4e-3, 8.0)}
 
 @dataclass(frozen=True)
 class Point:
-    """Seconds and relative ``error`` of the last force on one mesh; none and infinite of a process
-    that did not end."""
+    """Seconds of the processor and relative ``error`` of the last force on one mesh, none and
+    infinite of a process that did not end, as its ``failure`` says; and its ``wall`` time and
+    largest ``memory`` in bytes."""
 
     size: float
     n_dofs: int
     seconds: float = 0.0
     error: float = math.inf
+    wall: float = math.nan
+    memory: float = math.nan
+    failure: str = ""
 
 
 def processes(case: Case, size: float, folder: Path) -> tuple[int, list[Process]]:
@@ -90,10 +98,11 @@ def points(case: Case, sizes: Sequence[float]) -> dict[str, list[Point]]:
         for size in sizes:
             n_dofs, both = processes(case, size, Path(name) / f"{size:g}")
             for code, timing in zip(CODES, time_all(both, 1, said), strict=True):
-                point = Point(size, n_dofs)
+                point = Point(size, n_dofs, failure=timing.failure)
                 if not timing.failure:
                     run = timing.middle
-                    point = Point(size, n_dofs, run.cpu, abs(run.result) / exact - 1)
+                    error = abs(run.result) / exact - 1
+                    point = Point(size, n_dofs, run.cpu, error, run.seconds, run.memory)
                 found[code].append(point)
     return found
 
@@ -127,17 +136,48 @@ def _told(point: Point) -> tuple[str, str]:
     return f"{100 * point.error:+.3f}", f"{point.seconds:.1f}"
 
 
-def main(arguments: Sequence[str]) -> None:
-    """Print the table of the cases and sizes that the ``arguments`` name."""
-    chosen = [name for name in arguments if name in GOALS] or list(GOALS)
-    sizes = [float(word) for word in arguments if word not in GOALS] or SIZES
+def add_panel(name: str, found: Mapping[str, Sequence[Point]], folder: Path) -> None:
+    """Write the points of a case as a table of the work-precision benchmark in ``folder``, and draw
+    the picture of all its tables."""
+    exact = CASES[name].references[-1]
+    lines = [
+        {
+            "code": code,
+            "series": "C3D10",
+            "mesh": f"{point.size:g}",
+            "dofs": point.n_dofs,
+            "seconds": "" if point.failure else f"{point.wall:.4g}",
+            "MB": "" if point.failure else f"{point.memory / 1e6:.0f}",
+            "error of P": "" if point.failure else f"{abs(point.error):.2e}",
+            "error of the reference": f"{exact.uncertainty / exact.value:.2e}",
+            "failure": point.failure,
+        }
+        for code, of_code in found.items()
+        for point in of_code
+    ]
+    folder.mkdir(parents=True, exist_ok=True)
+    write_rows(lines, folder / f"{STEM}space, {name}.csv")
+    draw(cases(folder), folder / f"{STEM.rstrip('_')}.png")
+
+
+def main() -> None:
+    """Print the table of the cases and sizes that are named."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="cases, and sizes of elements")
+    parser.add_argument("--into", type=Path, help="folder of the work-precision benchmark")
+    given = parser.parse_args()
+    chosen = [name for name in given.names if name in GOALS] or list(GOALS)
+    sizes = [float(word) for word in given.names if word not in GOALS] or SIZES
     headings = [f"{code}: {what}" for code in CODES for what in ("error [%]", "s")]
     table = Table("case", "size", "dofs", *headings, "times", left=1)
     for name in chosen:
-        for row in rows(name, points(CASES[name], sizes)):
+        found = points(CASES[name], sizes)
+        for row in rows(name, found):
             table.add(*row)
+        if given.into:
+            add_panel(name, found, given.into)
     print(table.markdown())
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,9 +1,11 @@
 """Closed forms in space on coarse meshes, and error over seconds."""
 
+import csv
+
 import pytest
 
 from archord.benchmarks.space.closed_forms import FORMS
-from archord.benchmarks.space.equal_error import Point, quickest
+from archord.benchmarks.space.equal_error import Point, add_panel, quickest
 
 # element sizes, and what they leave
 COARSE = {"elastic sphere": (0.4, 5e-3), "balls": (0.35, 0.02)}
@@ -26,3 +28,14 @@ def test_the_quickest_mesh_within_an_error_counts():
     ]
     assert quickest(5e-3, points) == ("", 3.0)
     assert quickest(1e-4, points) == (">", 9.0)
+
+
+def test_points_become_a_panel_of_the_work_precision_picture(tmp_path):
+    ours = [Point(3.0, 100, 0.9, 2e-3, wall=1.0, memory=2e8)]
+    theirs = [Point(3.0, 100, failure="more than the 600 s allowed")]
+    add_panel("elastic", {"archord": ours, "CalculiX": theirs}, tmp_path)
+    assert (tmp_path / "work_precision.png").stat().st_size > 1000
+    with (tmp_path / "work_precision_space, elastic.csv").open() as file:
+        first, second = csv.DictReader(file)
+    assert (first["seconds"], first["MB"], first["error of P"]) == ("1", "200", "2.00e-03")
+    assert (second["seconds"], second["failure"]) == ("", "more than the 600 s allowed")
