@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, Point, points
-from archord.benchmarks.cost.work_precision_picture import STEM, cases, draw, short_table
 from archord.benchmarks.timing import Said, Timing, time_all
+from archord.benchmarks.work_precision_picture import STEM, cases, draw, short_table
 from archord.geometry.basis import Array
 from archord.report.files import replacing, write_rows
 

@@ -20,11 +20,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from archord.benchmarks.cost.work_precision_picture import STEM, cases, draw
 from archord.benchmarks.peers.calculix import process
 from archord.benchmarks.space.case import PRESS, Case
 from archord.benchmarks.space.joints import CASES
 from archord.benchmarks.timing import Process, solving, time_all
+from archord.benchmarks.work_precision_picture import STEM, cases, draw
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.stored import store_mesh
 from archord.postprocess.run import Run
@@ -41,13 +41,18 @@ _MESH = "joint.npz"
 
 @dataclass(frozen=True)
 class Goal:
-    """The error at which seconds are compared, and how many times fewer archord's shall be."""
+    """The error at which seconds are compared, how many times fewer archord's shall be, and what
+    the case is called in pictures."""
 
     error: float
     times: float
+    panel: str
 
 
-GOALS: Mapping[str, Goal] = {"elastic": Goal(5e-4, 10.0), "A": Goal(4e-3, 8.0)}
+GOALS: Mapping[str, Goal] = {
+    "elastic": Goal(5e-4, 10.0, "space_elastic"),
+    "A": Goal(4e-3, 8.0, "space_plastic"),
+}
 
 
 @dataclass(frozen=True)
@@ -156,7 +161,7 @@ def add_panel(name: str, found: Mapping[str, Sequence[Point]], folder: Path) -> 
         for point in of_code
     ]
     folder.mkdir(parents=True, exist_ok=True)
-    write_rows(lines, folder / f"{STEM}space, {name}.csv")
+    write_rows(lines, folder / f"{STEM}{GOALS[name].panel}.csv")
     draw(cases(folder), folder / f"{STEM.rstrip('_')}.png")
 
 

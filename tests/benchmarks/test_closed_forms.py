@@ -35,7 +35,7 @@ def test_points_become_a_panel_of_the_work_precision_picture(tmp_path):
     theirs = [Point(3.0, 100, failure="more than the 600 s allowed")]
     add_panel("elastic", {"archord": ours, "CalculiX": theirs}, tmp_path)
     assert (tmp_path / "work_precision.png").stat().st_size > 1000
-    with (tmp_path / "work_precision_space, elastic.csv").open() as file:
+    with (tmp_path / "work_precision_space_elastic.csv").open() as file:
         first, second = csv.DictReader(file)
     assert (first["seconds"], first["MB"], first["error of P"]) == ("1", "200", "2.00e-03")
     assert (second["seconds"], second["failure"]) == ("", "more than the 600 s allowed")

@@ -20,8 +20,8 @@ from archord.benchmarks.cost.work_precision import (
     write,
 )
 from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, DATA, Point, points, profile
-from archord.benchmarks.cost.work_precision_picture import cases, front, short_table
 from archord.benchmarks.timing import Process, Run, Timing, time_all
+from archord.benchmarks.work_precision_picture import cases, front, short_table
 from archord.cli import run
 
 

@@ -1,8 +1,14 @@
 """Error of P over the wall time of a whole process, one line a code: a picture and a short table,
-made from the CSV tables of ``archord benchmark work-precision``."""
+made from the CSV tables of ``archord benchmark work-precision``.
+
+    python3 -m archord.benchmarks.work_precision_picture docs/data
+
+draws the picture of the tables of a folder there, and prints the short tables.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,7 +35,7 @@ _STYLES = {
 _OTHER = ("0.4", "x")
 _TEXT = 14  # points, to be read on a telephone
 _PANEL = (4.2, 3.8)  # inches
-_COLUMNS = 2
+_COLUMNS = 2  # of panels
 
 
 def cases(folder: Path) -> dict[str, pd.DataFrame]:
@@ -43,7 +49,7 @@ def cases(folder: Path) -> dict[str, pd.DataFrame]:
         table = pd.read_csv(file)
         errors = table.groupby(["code", "series"])["error of P"]
         table["kept"] = errors.transform(lambda errors: errors[::-1].cummax()[::-1])
-        found[file.stem.removeprefix(STEM)] = table
+        found[file.stem.removeprefix(STEM).replace("_", " ")] = table
     return found
 
 
@@ -128,3 +134,15 @@ def _draw_code(ax: Axes, code: str, points: pd.DataFrame) -> None:
     ax.loglog(
         best["seconds"], best["kept"], f"{marker}-", color=colour, label=code, linewidth=width
     )
+
+
+def main(folder: Path) -> None:
+    """Draw the picture of the tables of ``folder`` there, and print the short tables."""
+    tables = cases(folder)
+    for case, table in tables.items():
+        print(f"**{case}**\n\n{short_table(table)}")
+    draw(tables, folder / f"{STEM.rstrip('_')}.png")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
