@@ -7,6 +7,7 @@ import sys
 import click
 
 from archord.commands.options import output, quiet
+from archord.report.errors import InputError
 
 
 @click.command()
@@ -35,8 +36,12 @@ def dataset(context: click.Context, output, joints: int, quiet: bool) -> int:
     file = output / "dataset.sweep.toml"
 
     def designed() -> None:
-        output.mkdir(parents=True, exist_ok=True)
-        tables.write_sweep(joints, file)
+        try:
+            output.mkdir(parents=True, exist_ok=True)
+            tables.write_sweep(joints, file)
+        except OSError as error:
+            said = f"{output}: cannot hold a dataset: {error.strerror}."
+            raise InputError(said) from None
 
     agreed(comm, designed)
     runs = output / "runs"
@@ -44,7 +49,7 @@ def dataset(context: click.Context, output, joints: int, quiet: bool) -> int:
     if comm.rank == 0 and code < 128:
         try:
             files = tables.write_tables(runs, output)
-        except ValueError as error:
+        except (OSError, ValueError) as error:
             print(f"archord: {error}", file=sys.stderr)
             return 3
         if not quiet:

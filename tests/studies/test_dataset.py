@@ -47,3 +47,9 @@ def test_tables_have_error_bars_and_checksums(tmp_path, monkeypatch):
     monkeypatch.setattr(dataset, "solved_in", lambda folder: {})
     with pytest.raises(ValueError, match="no joint is solved"):
         write_tables(tmp_path, tmp_path)
+
+
+def test_a_folder_that_cannot_be_is_refused(tmp_path, refused):
+    (tmp_path / "file").touch()
+    said = refused(["dataset", "--joints", "1", "-o", str(tmp_path / "file")])
+    assert "cannot hold a dataset: File exists" in said
