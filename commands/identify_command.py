@@ -78,7 +78,10 @@ def identify(
     stiff = None if stiffness == _FREE else _stiffness(stiffness)
     found = fit(begun, measured, frees, at, stiff)
     folder = output or Path("runs") / f"{curve.stem}_identified"
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot hold results: {error.strerror}.") from None
     print(identify_report.estimates_table(found))
     print("", identify_report.correlation_table(found), sep="\n")
     print("", *identify_report.notes(found), sep="\n")
