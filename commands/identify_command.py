@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,16 +103,18 @@ def _number(option: str, text: str) -> float | None:
     """The number of an option; None if it is free."""
     if text == _FREE:
         return None
+    said = f"{option} {text}: must be a number, or {_FREE}."
     try:
-        return float(text)
+        found = float(text)
     except ValueError:
-        raise InputError(f"{option} {text}: must be a number, or {_FREE}.") from None
+        raise InputError(said) from None
+    if not math.isfinite(found):
+        raise InputError(said)
+    return found
 
 
 def _stiffness(text: str) -> float:
     """The stiffness of the machine."""
-    import math
-
     if text == _RIGID:
         return math.inf
     found = _number("--machine-stiffness", text)

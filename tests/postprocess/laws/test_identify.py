@@ -182,3 +182,20 @@ def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
     assert "is there already" in capsys.readouterr().err
     assert run([*words, "--force", "--offset", "deep"]) == 2
     assert "--offset deep: must be a number, or free" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--offset", "nan"], "--offset nan: must be a number, or free"),
+        (["--machine-stiffness", "inf"], "must be a number, or free"),
+        (["--machine-stiffness", "0"], "must be positive, or rigid"),
+        (["-o", "/dev/null/x"], "/dev/null/x: cannot hold results"),
+    ],
+)
+def test_odd_options_are_refused(tmp_path, refused, option, words):
+    path = tmp_path / "curve.csv"
+    path.write_text("u,F\n" + "".join(f"{k / 200},{50 * k}\n" for k in range(20)))
+    given = ["identify", str(path), "--scene", str(STEEL), "--free", "joint.clearance"]
+    folder = ["-o", str(tmp_path / "found"), "--no-confirm"]
+    assert words in refused([*given, *folder, *option])
