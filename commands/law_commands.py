@@ -19,7 +19,7 @@ from archord.commands.options import argument, file, flag, overrides
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
-    from archord.postprocess.laws.exports.export import Contact
+    from archord.postprocess.laws.exports.contact import Contact
     from archord.postprocess.laws.general.joint import LawJoint
     from archord.postprocess.laws.law import Law, LawState
 
@@ -179,7 +179,7 @@ def _sampled(
 
 def _contact(options: dict[str, float | None]) -> Contact:
     """The contact of the ``options`` that are given."""
-    from archord.postprocess.laws.exports.export import Contact
+    from archord.postprocess.laws.exports.contact import Contact
 
     given = {name: value for name, value in options.items() if value is not None}
     if "mu_static" in given:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
-    from archord.postprocess.laws.exports.export import Contact
+    from archord.postprocess.laws.exports.contact import Contact
     from archord.postprocess.laws.fitted_law import FittedLaw
     from archord.postprocess.laws.general.joint_curve import JointCurve
 

@@ -24,7 +24,8 @@ from matplotlib.patches import Circle
 from scipy.integrate import cumulative_trapezoid
 
 import archord
-from archord.postprocess.laws.exports.export import Contact, export_law
+from archord.postprocess.laws.exports.contact import Contact
+from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve

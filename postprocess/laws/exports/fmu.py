@@ -22,7 +22,10 @@ from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
-from archord.postprocess.laws.exports.export import Contact, Program, check_name, export_law
+from archord.postprocess.laws.exports.contact import Contact
+from archord.postprocess.laws.exports.export import export_law
+from archord.postprocess.laws.exports.names import check_name
+from archord.postprocess.laws.exports.program import Program
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.version import VERSION

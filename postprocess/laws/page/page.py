@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from archord.materials.named import metals
-from archord.postprocess.laws.exports.export import Program, forms, skeleton
+from archord.postprocess.laws.exports.file_forms import FILE_FORMS
+from archord.postprocess.laws.exports.program import Program
 from archord.postprocess.laws.general import (
     elastic_model,
     general_law,
@@ -30,6 +31,7 @@ from archord.postprocess.laws.general import (
 )
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.postprocess.laws.page.skeleton import skeleton
 from archord.report.version import VERSION
 
 HERE = Path(__file__).parent
@@ -121,14 +123,18 @@ def _exports() -> dict[str, Any]:
     kinds = {"elastic": _in_mm(elastic, 1.0), "yields": _in_mm(yields, 1.0)}
     units = [Program.of(_in_mm(elastic, length)).units for length in (1.0, _LENGTH)]
     texts = {
-        kind: {suffix: skeleton(law, suffix).split("\n\n") for suffix in forms()}
+        kind: {suffix: skeleton(law, suffix).split("\n\n") for suffix in FILE_FORMS}
         for kind, law in kinds.items()
     }
     # Kinds share most paragraphs, each of which is told once.
     parts = dict.fromkeys(part for own in texts.values() for text in own.values() for part in text)
     places = {part: place for place, part in enumerate(parts)}
+    written = ("number", "table", "line_end")
     return {
-        "forms": forms(),
+        "forms": {
+            suffix: {key: getattr(form, key) for key in written}
+            for suffix, form in FILE_FORMS.items()
+        },
         "paragraphs": list(parts),
         "texts": {
             kind: {suffix: [places[part] for part in text] for suffix, text in own.items()}

@@ -14,7 +14,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from archord.cli import run
-from archord.postprocess.laws.exports.export import Contact, export_law
+from archord.postprocess.laws.exports.contact import Contact
+from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.laws.exports.export import Contact
+from archord.postprocess.laws.exports.contact import Contact
 from archord.postprocess.laws.exports.fmu import export_fmu
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
