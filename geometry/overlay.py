@@ -61,12 +61,14 @@ def _overlying(own: Patches, opposite: Patches) -> tuple[Index, Index]:
 
     middle, normal, radius = own.spheres()
     centre, other_normal, other_radius = opposite.spheres()
-    closest = opposite.closest_point(middle, normal, np.zeros_like(opposite.X)).point
+    undeformed = np.zeros_like(opposite.X)
+    closest = opposite.closest_point(middle, normal, undeformed).point
     gap = ((closest - middle) * normal).sum(axis=1)
     over = middle + gap[:, None] * normal
     farthest = _REACH * (radius + other_radius.max())
     near = cKDTree(centre).query_ball_point(over, farthest, return_sorted=True)
-    facet = np.repeat(np.arange(own.n_facets), [len(found) for found in near])
+    n_near = [len(found) for found in near]
+    facet = np.repeat(np.arange(own.n_facets), n_near)
     other = np.concatenate([np.asarray(found, dtype=np.int64) for found in near])
     apart = np.linalg.norm(centre[other] - over[facet], axis=1)
     is_near = apart < _REACH * (radius[facet] + other_radius[other])
@@ -87,10 +89,11 @@ def piece_rule(pieces: Array, degree: int) -> tuple[Array, Array]:
     s, t = X.T[..., None]
     one, opposite, two = (pieces[:, k, None] - start for k in (1, 2, 3))
     twist = opposite - one - two
+    points = start + s * one + t * two + s * t * twist
     by_s = one + t * twist
     by_t = two + s * twist
     area = by_s[..., 0] * by_t[..., 1] - by_s[..., 1] * by_t[..., 0]
-    return start + s * one + t * two + s * t * twist, area * w
+    return points, area * w
 
 
 def quartered(triangles: Array) -> Array:
@@ -107,6 +110,8 @@ def quartered(triangles: Array) -> Array:
 def coincide(own: Patches, opposite: Patches) -> bool:
     """Whether the undeformed surfaces are the same where they face each other."""
     middle, normal, radius = own.spheres()
-    over = opposite.closest_point(middle, normal, np.zeros_like(opposite.X))
-    apart = np.linalg.norm(over.point - middle, axis=1)[over.found]
-    return bool((apart < _TOUCH * radius[over.found]).all())
+    undeformed = np.zeros_like(opposite.X)
+    over = opposite.closest_point(middle, normal, undeformed)
+    apart = np.linalg.norm(over.point - middle, axis=1)
+    is_same = apart < _TOUCH * radius
+    return bool(is_same[over.found].all())

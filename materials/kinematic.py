@@ -169,9 +169,12 @@ class KinematicMaterial(J2Material):
         s = strain.shape[1]
         trace = TRACE[:s]
         deviator = _DEVIATOR[:s, :s]
-        trial = 2 * mu * (strain - old.plastic_strain * _TWICE[:s]) @ deviator
-        stress = trial + (bulk * strain @ trace)[:, None] * trace
-        tangent = np.tile(bulk * np.outer(trace, trace) + 2 * mu * deviator, (len(strain), 1, 1))
+        elastic_strain = strain - old.plastic_strain * _TWICE[:s]
+        trial = 2 * mu * elastic_strain @ deviator
+        pressure = bulk * strain @ trace
+        stress = trial + pressure[:, None] * trace
+        elastic_tangent = bulk * np.outer(trace, trace) + 2 * mu * deviator
+        tangent = np.tile(elastic_tangent, (len(strain), 1, 1))
         from_centre = trial - old.back_stress.sum(axis=1)
         p = beyond(np.sqrt(1.5) * _norm(from_centre), self.hardening, old.peeq)
         if not len(p):
@@ -183,11 +186,13 @@ class KinematicMaterial(J2Material):
         flow = np.sqrt(1.5) * grown.d_peeq[:, None] * n
         stress[p] -= 2 * mu * flow
 
-        shrunk = np.sqrt(6) * mu * grown.d_peeq / length
-        aside = grown.rate - _dot(grown.rate, n)[:, None] * n
-        drift = np.sqrt(6) * mu * n + shrunk[:, None] * aside
+        # the flow turns with the trial stress, and grows with the increment
+        steep = np.sqrt(6) * mu
+        shrunk = steep * grown.d_peeq / length
         turned = deviator - n[:, :, None] * n[:, None, :]
-        stretch = (np.sqrt(6) * mu / grown.fall)[:, None] * drift
+        aside = grown.rate - _dot(grown.rate, n)[:, None] * n
+        drift = steep * n + shrunk[:, None] * aside
+        stretch = (steep / grown.fall)[:, None] * drift
         tangent[p] -= shrunk[:, None, None] * 2 * mu * turned
         tangent[p] -= stretch[:, :, None] * n[:, None, :]
         return stress, tangent, self._grown(old, p, grown, flow, hardening)
@@ -208,8 +213,8 @@ class KinematicMaterial(J2Material):
         moved = before + 2 / 3 * C[:, None] * flow[:, None, :]
         back = grown.theta[:, :, None] * moved
 
-        # stress . d eps_p = yield stress d_peeq + sum of d(a . a) 3 / (4 C) + gamma a . a 3 / (2 C)
-        # d_peeq
+        # stress . d eps_p = (yield stress + sum of 3 gamma a . a / (2 C)) d_peeq
+        #     + sum of 3 d(a . a) / (4 C)
         now = _dot(back, back) / C
         between = _dot(back, before) / C
         then = _dot(before, before) / C

@@ -66,10 +66,8 @@ def return_map(
     the ``old`` state, with the elasticity of ``m``."""
     n_stress = m.kinematics.n_stress
     parts, Q, deviator = _eigensystem(m.kinematics)
-    lam, mu = m.lame
-    moduli = 2 * mu / np.maximum(deviator, 1.0)
-    moduli[0] = m.E / (1 - m.nu) if m.kinematics.is_thin else 3 * lam + 2 * mu
-    compliance = moduli * deviator
+    moduli = _eigenmoduli(m, deviator)
+    compliance = moduli * deviator  # C_k P_k
     C = Q.T * moduli @ Q
     P = Q.T * deviator @ Q
     engineering = ENGINEERING[:n_stress]
@@ -91,22 +89,41 @@ def return_map(
     flow = sigma @ P
     xx = flow[:, 0]
     yy = flow[:, 1]
-    grown = np.stack([xx, yy, -xx - yy, *flow.T[3 - n_stress :]], axis=1) / engineering
+    shears = flow.T[3 - n_stress :]
+    direction = np.stack([xx, yy, -xx - yy, *shears], axis=1) / engineering
     plastic_strain = old.plastic_strain.copy()
-    plastic_strain[p] += zeta[:, None] * grown
+    plastic_strain[p] += zeta[:, None] * direction
     peeq = old.peeq.copy()
     peeq[p] += 2 / 3 * zeta * q
 
     softened = np.einsum("ki,nk,kj->nij", Q, moduli / shrink, Q)  # (C^-1 + zeta P)^-1
-    direction = np.einsum("nij,nj->ni", softened, flow)
     slope = np.minimum(hardening.slope(peeq[p]), _STEEPEST * m.E)
-    left = 1 - 2 / 3 * slope * zeta
-    work = np.einsum("ni,ni->n", flow, direction)
-    factor = left / (left * work + 4 / 9 * slope * q**2)
-    consistent = softened - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
+    consistent = _consistent_tangent(softened, flow, zeta, q, slope)
     kept = np.searchsorted(parts, m.working)
     tangent[p] = consistent[:, kept[:, None], kept]
     return stress, tangent, PlasticState(plastic_strain, peeq)
+
+
+def _eigenmoduli(m: Elastic, deviator: Array) -> Array:
+    """The eigenvalues ``(k,)`` of C, beside the eigenvalues ``deviator`` of P."""
+    lam, mu = m.lame
+    moduli = 2 * mu / np.maximum(deviator, 1.0)
+    moduli[0] = m.E / (1 - m.nu) if m.kinematics.is_thin else 3 * lam + 2 * mu
+    return moduli
+
+
+def _consistent_tangent(softened: Array, flow: Array, zeta: Array, q: Array, slope: Array) -> Array:
+    """The derivative ``(n, k, k)`` of the stress by the strain (Simo and Hughes, Box 3.2).
+
+    - ``softened`` ``(n, k, k)``: ``(C^-1 + zeta P)^-1``
+    - ``flow`` ``(n, k)``: ``P sigma``
+    - ``q``, ``slope`` ``(n,)``: the von Mises stress, and the slope of the hardening law
+    """
+    along = np.einsum("nij,nj->ni", softened, flow)
+    work = np.einsum("ni,ni->n", flow, along)
+    left = 1 - 2 / 3 * slope * zeta
+    factor = left / (left * work + 4 / 9 * slope * q**2)
+    return softened - factor[:, None, None] * along[:, :, None] * along[:, None, :]
 
 
 def beyond(stress: Array, hardening: Hardening, peeq: Array) -> npt.NDArray[np.integer]:
@@ -133,7 +150,7 @@ def plastic_multiplier(
     def off(zeta: Array) -> tuple[Array, Array, Array]:
         shrink = 1 + zeta[:, None] * compliance
         q = np.sqrt((a / shrink) ** 2 @ weights)
-        fall = ((a**2 / shrink**3) @ (weights * compliance)) / q  # - dq / dzeta
+        fall = (a**2 / shrink**3) @ (weights * compliance) / q  # - dq / dzeta
         now = peeq + 2 / 3 * zeta * q
         strength = hardening.stress(now)
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
@@ -167,12 +184,14 @@ def bracketed_newton(
         high = np.where(off > 0, x, high)
         step = off / slope
         trusted = slope < steep
+        is_short = np.abs(step) <= close
         is_narrow = high - low <= _NARROW * close
-        moving = ~np.where(trusted, np.abs(step) <= close, is_narrow)
+        moving = ~np.where(trusted, is_short, is_narrow)
         if not moving.any():
             return x, found
         x = np.where(moving, x - step, x)
-        astray = moving & ~((x > low) & (x < high) & trusted)
+        within = (x > low) & (x < high)
+        astray = moving & ~(within & trusted)
         halved = np.where(high == np.inf, 2 * low + close, (low + high) / 2)
         x = np.where(astray, halved, x)
     x = np.where(moving, np.nan, x)
@@ -190,9 +209,10 @@ def radial_return(
     stress = np.empty((n, n_stress))
     tangent = np.empty((n, k, k))
     new = PlasticState(np.empty((n, n_stress)), np.empty(n))
-    given = places, np.ascontiguousarray(strain, dtype=float), old.plastic_strain, old.peeq
-    found = stress, tangent, new.plastic_strain, new.peeq
-    kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
+    strain = np.ascontiguousarray(strain, dtype=float)
+    given = map(pointer, (places, strain, old.plastic_strain, old.peeq))
     constants = *m.lame, yield_stress, modulus, pointer(m.elastic_tangent)
-    yielding = kernel(n, n_stress, k, *map(pointer, given), *constants, *map(pointer, found))
+    found = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
+    kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
+    yielding = kernel(n, n_stress, k, *given, *constants, *found)
     return stress, tangent, new if yielding else old

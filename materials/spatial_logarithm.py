@@ -67,21 +67,25 @@ class SpatialLogarithm:
         ``P = T : dE/dF`` is linear in the stress along the principal axes, and its derivative has
         three parts: the material, the second derivative of the logarithm, and of C.
         """
-        metric = self._metric()
+        metric = self._metric()  # (n, 6, 9)
         to_axes = self._to_axes()
         T_axes = np.einsum("nij,nj->ni", to_axes, T)
         first = self._first[:, _ROWS, _COLUMNS]
         half = first * T_axes  # of the second Piola-Kirchhoff stress along the principal axes
-        slope = first[:, :, None] * to_axes
-        by_metric = slope @ moduli @ np.swapaxes(slope, 1, 2) + self._bent(T_axes)
         stress = np.einsum("nki,nk->ni", metric, half)
+        slope = first[:, :, None] * to_axes
+        of_material = slope @ moduli @ np.swapaxes(slope, 1, 2)
+        by_metric = of_material + self._bent(T_axes)
         tangent = np.swapaxes(metric, 1, 2) @ by_metric @ metric
+        return stress, tangent + self._turning(half)
+
+    def _turning(self, half: Array) -> Array:
+        """The part ``(n, 9, 9)`` of the tangent from the second derivative of C, with the halved
+        second Piola-Kirchhoff stress ``(n, 6)`` along the principal axes: terms of the same
+        component of the displacement are coupled by the stress along their derivatives."""
         S = 2 * self._axes @ _tensors(half) @ np.swapaxes(self._axes, 1, 2)
-        for component in range(3):
-            (same,) = np.nonzero(component == _COMPONENT)
-            along = _DERIVATIVE[same]
-            tangent[:, same[:, None], same] += S[:, along[:, None], along]
-        return stress, tangent
+        coupled = S[:, _DERIVATIVE[:, None], _DERIVATIVE]
+        return np.where(_COMPONENT[:, None] == _COMPONENT, coupled, 0.0)
 
     def kirchhoff(self, stress: Array, T: Array) -> Array:
         """Kirchhoff's stress ``(n, 6)`` of nominal ones ``(n, 9)``; ``T`` tells nothing more."""
@@ -91,18 +95,15 @@ class SpatialLogarithm:
 
     def _metric(self) -> Array:
         """``dC/dF`` ``(n, 6, 9)`` along the principal axes, with engineering shear."""
-        of_axes = self._F @ self._axes
-        left = of_axes[:, _COMPONENT]  # (n, 9, 3)
-        right = self._axes[:, _DERIVATIVE]
-        products = left[..., _ROWS] * right[..., _COLUMNS] + left[..., _COLUMNS] * right[..., _ROWS]
-        return np.swapaxes(products * ENGINEERING, 1, 2)
+        deformed = (self._F @ self._axes)[:, _COMPONENT]  # (n, 9, 3)
+        along = self._axes[:, _DERIVATIVE]
+        return np.swapaxes(_symmetric_products(deformed, along) * ENGINEERING, 1, 2)
 
     def _to_axes(self) -> Array:
         """Takes a stress ``(n, 6)`` to the principal axes, ``(n, 6, 6)``."""
         along = self._axes[:, _ROWS]  # (n, 6, 3): the first axis of each component
         across = self._axes[:, _COLUMNS]
-        products = along[..., _ROWS] * across[..., _COLUMNS]
-        products += across[..., _ROWS] * along[..., _COLUMNS]
+        products = _symmetric_products(along, across)
         return np.swapaxes(products * (ENGINEERING / 2)[:, None], 1, 2)
 
     def _bent(self, T: Array) -> Array:
@@ -110,6 +111,11 @@ class SpatialLogarithm:
         second = _second_differences(self._values, self._first)
         bent = 2 * _tensors(T)[:, :, None] * second
         return (bent.reshape(-1, 27) @ _SYMMETRIC).reshape(-1, 6, 6)
+
+
+def _symmetric_products(a: Array, b: Array) -> Array:
+    """Components ``(n, k, 6)`` of ``a b^T + b a^T`` of vectors ``(n, k, 3)``."""
+    return a[..., _ROWS] * b[..., _COLUMNS] + a[..., _COLUMNS] * b[..., _ROWS]
 
 
 def _components(tensors: Array) -> Array:

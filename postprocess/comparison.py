@@ -69,10 +69,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
     between: np.ndarray = np.zeros((len(runs), len(load)), dtype=bool)
     if not step_by_step:
         tables = [_on_first_loading(table) for table in tables]
-        low = max(table["load"][0] for table in tables) - margin
-        high = min(table["load"][-1] for table in tables) + margin
-        load = tables[0]["load"]
-        load = load[(load >= low) & (load <= high)]
+        load = _shared_loads([table["load"] for table in tables], margin)
         if not len(load):
             raise InputError(f"{runs[0].folder}: shares no range of loads with the others.")
         distances = [np.abs(load[:, None] - table["load"]).min(axis=1) for table in tables]
@@ -85,6 +82,14 @@ def compare_runs(runs: list[Run]) -> Comparison:
 
 def _same_loads(one: Array, other: Array, margin: float) -> bool:
     return len(one) == len(other) and np.allclose(one, other, rtol=0, atol=margin)
+
+
+def _shared_loads(loads: list[Array], margin: float) -> Array:
+    """The first of the rising ``loads`` where all others reach them."""
+    low = max(load[0] for load in loads) - margin
+    high = min(load[-1] for load in loads) + margin
+    first = loads[0]
+    return first[(first >= low) & (first <= high)]
 
 
 def _on_first_loading(table: dict[str, Array]) -> dict[str, Array]:

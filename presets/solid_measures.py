@@ -181,16 +181,10 @@ def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     inner, outer = (
         bearing.contact for bearing in _bearings(shape, [p.name for p in scene.interaction])
     )
-    R = shape.radius
-    bore = shape.space.bore
-    span = bottom + top  # between the middles of the outer plates
-    loaded = 2 * inside
+    middle_strip = _middle(shape)
+    outer_strip = _middle(shape, (bottom + top) / 2)
     arm = inside / 2 + shape.space.gap + (top - bottom) / 2
-    inertia = math.pi * (R**4 - bore**4) / 4
-    area = math.pi * (R**2 - bore**2)
-    shear_modulus = pin.E / (2 * (1 + pin.nu))
-    bent = (8 * span**3 - 4 * span * loaded**2 + loaded**3) / (384 * pin.E * inertia)
-    sheared = arm / (2 * _SHEAR_FACTOR * shear_modulus * area)
+    compliance = _beam_compliance(shape, pin, arm)
 
     def force(state: Accepted) -> float:
         return abs(float(state.contact_force(inner)[0]))
@@ -201,15 +195,31 @@ def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
         return abs(float(of_both_halves)) / 2
 
     def deflection(state: Accepted) -> float:
-        middle = _moved(state, inner, _middle(shape))
-        return abs(middle - _moved(state, outer, _middle(shape, (bottom + top) / 2)))
+        at_middle = _moved(state, inner, middle_strip)
+        return abs(at_middle - _moved(state, outer, outer_strip))
 
     of_moment = scene.units.energy_of(1.0)
     length = scene.units.length
     yield Measure("pin bending moment", of_moment, moment)
     yield Measure("pin bending moment by hand", of_moment, lambda state: force(state) / 2 * arm)
     yield Measure("pin deflection", length, deflection)
-    yield Measure("pin deflection by hand", length, lambda s: force(s) * (bent + sheared))
+    yield Measure("pin deflection by hand", length, lambda state: force(state) * compliance)
+
+
+def _beam_compliance(shape: Any, pin: Any, arm: float) -> float:
+    """The deflection per force of a beam that rests on the middles of the outer plates and is
+    loaded evenly by the inner one; ``arm`` is the moment over half the force."""
+    inside, bottom, top = _heights(shape)
+    R = shape.radius
+    bore = shape.space.bore
+    span = bottom + top  # between the supports
+    loaded = 2 * inside
+    inertia = math.pi * (R**4 - bore**4) / 4
+    area = math.pi * (R**2 - bore**2)
+    shear_modulus = pin.E / (2 * (1 + pin.nu))
+    bent = (8 * span**3 - 4 * span * loaded**2 + loaded**3) / (384 * pin.E * inertia)
+    sheared = arm / (2 * _SHEAR_FACTOR * shear_modulus * area)
+    return bent + sheared
 
 
 def _moved(state: Accepted, contact: str, strip: Strip) -> float:

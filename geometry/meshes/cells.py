@@ -46,6 +46,11 @@ def n_corners(kind: basix.CellType) -> int:
     return len(basix.topology(kind)[0])
 
 
+def is_simplex(kind: basix.CellType) -> bool:
+    """Whether a cell is a triangle or a tetrahedron."""
+    return n_corners(kind) == dimension_of(kind) + 1
+
+
 def side_kind(kind: basix.CellType) -> basix.CellType:
     """The kind of the sides of a cell: interval, triangle or quadrilateral."""
     return basix.cell.subentity_types(kind)[-2][0]
@@ -129,12 +134,12 @@ def inner_weights(kind: basix.CellType, order: int) -> Array:
     element = lagrange_element(kind, order)
     d = dimension_of(kind)
     powers = np.indices((order + 1,) * d).reshape(d, -1)
-    simplex = n_corners(kind) == d + 1
-    determined = powers.sum(axis=0) < order if simplex else powers.min(axis=0) <= 1
+    determined = powers.sum(axis=0) < order if is_simplex(kind) else powers.min(axis=0) <= 1
     x = element.points.T[:, :, None]
-    values = np.prod(x ** powers[:, None, determined], axis=0)
-    on_sides = len(values) - len(element.entity_dofs[-1][0])
-    return values[on_sides:] @ np.linalg.pinv(values[:on_sides])
+    values = np.prod(x ** powers[:, None, determined], axis=0)  # (nodes, polynomials)
+    n_on_sides = len(values) - len(element.entity_dofs[-1][0])
+    on_sides, inside = np.split(values, [n_on_sides])
+    return inside @ np.linalg.pinv(on_sides)
 
 
 def with_middle_nodes(
@@ -148,13 +153,15 @@ def with_middle_nodes(
     """
     element = lagrange_element(kind, 2)
     for dim in range(2, dimension_of(kind) + 1):
-        weights = inner_weights(basix.cell.subentity_types(kind)[dim][0], 2)[0]
+        face = basix.cell.subentity_types(kind)[dim][0]
+        (weights,) = inner_weights(face, 2)
         around = np.array(element.entity_closure_dofs[dim])[:, :-1]
         faces = cells[:, around].reshape(-1, around.shape[1])
         first, which = distinct(faces[:, : 2**dim])
-        middle = np.einsum("b,cbk->ck", weights, x[faces[first]])
-        cells = np.hstack([cells, (len(x) + which).reshape(len(cells), -1)])
-        x = np.concatenate([x, middle])
+        middles = np.einsum("b,cbk->ck", weights, x[faces[first]])
+        numbers = (len(x) + which).reshape(len(cells), -1)
+        cells = np.hstack([cells, numbers])
+        x = np.concatenate([x, middles])
     return x, cells
 
 
@@ -185,7 +192,8 @@ def _parts(kind: basix.CellType) -> tuple[Array, Array]:
     if kind not in _WITHIN:
         return corner / 2, np.broadcast_to(np.eye(d) / 2, (n, d, d))
     at_corners = [[(k, other) for other in range(n)] for k in range(n)]
-    x = corner[np.array([*at_corners, *_WITHIN[kind]])].mean(axis=2)
+    ends = np.array([*at_corners, *_WITHIN[kind]])  # (p, corners of a part, 2)
+    x = corner[ends].mean(axis=2)
     return x[:, 0], x[:, 1:] - x[:, :1]
 
 

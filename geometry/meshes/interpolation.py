@@ -38,8 +38,9 @@ class Interpolation:
         triangle, within = _located(x, cells[:, halves].reshape(-1, 3), to)
         cell, half = np.divmod(triangle, len(halves))
         self._nodes = cells[cell]
-        barycentric = np.column_stack([1 - within.sum(axis=1), within])
-        X = np.einsum("ki,kij->kj", barycentric, basix.geometry(kind)[halves[half]])
+        barycentric = np.column_stack([1 - within.sum(axis=1), within])  # (k, 3)
+        corners = basix.geometry(kind)[halves[half]]  # (k, 3, 2), in the reference cell
+        X = np.einsum("ki,kij->kj", barycentric, corners)
         if kind == QUADRILATERAL or order > 1:
             self._improve(kind, order, X, x, to)
         self._weights = tabulate(kind, order, X)[0]
@@ -64,6 +65,21 @@ class Interpolation:
 def _located(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, Array]:
     """The number of a straight triangle ``(m, 3)`` with vertices ``x`` ``(n, 2)`` around each point
     of ``to`` ``(k, 2)``, or next to it, and the point's reference coordinates ``(k, 2)`` there."""
+    point, cell = _candidates(x, triangles, to)
+    corners = x[triangles[cell]]
+    edges = corners[:, 1:] - corners[:, :1]
+    ray = to[point] - corners[:, 0]
+    X = np.linalg.solve(np.swapaxes(edges, 1, 2), ray[..., None])[..., 0]
+    smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
+    order = np.lexsort((-smallest, point))  # by point, the best triangle first
+    _, first = np.unique(point[order], return_index=True)
+    best = order[first]
+    return cell[best], X[best]
+
+
+def _candidates(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs ``(p,)`` of a point of ``to`` and a triangle whose bounding box it is in, or the
+    nearest triangle."""
     straight = basix.ufl.element("P", "triangle", 1, shape=(2,))
     cells = triangles.astype(np.int64, order="C")
     mesh = create_mesh(MPI.COMM_SELF, cells=cells, x=np.ascontiguousarray(x), e=straight)
@@ -72,19 +88,11 @@ def _located(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, Ar
     found = compute_collisions_points(tree, places)
     point = np.repeat(np.arange(len(to)), np.diff(found.offsets))
     cell = found.array
-    lost = np.setdiff1d(np.arange(len(to)), point)  # in no triangle's bounding box
+    lost = np.setdiff1d(np.arange(len(to)), point)
     if len(lost):
         every = np.arange(len(triangles), dtype=np.int32)
         middles = create_midpoint_tree(mesh, mesh.topology.dim, every)
         nearest = compute_closest_entity(tree, middles, mesh, places[lost])
         point = np.append(point, lost)
         cell = np.append(cell, nearest)
-    cell = np.asarray(mesh.topology.original_cell_index)[cell]
-    corners = x[triangles[cell]]
-    edges = corners[:, 1:] - corners[:, :1]
-    ray = to[point] - corners[:, 0]
-    X = np.linalg.solve(np.swapaxes(edges, 1, 2), ray[..., None])[..., 0]
-    smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
-    order = np.lexsort((-smallest, point))
-    best = order[np.unique(point[order], return_index=True)[1]]
-    return cell[best], X[best]
+    return point, np.asarray(mesh.topology.original_cell_index)[cell]

@@ -15,7 +15,7 @@ import basix
 import numpy as np
 
 from archord.geometry.basis import Array, dimension_of, lagrange_element, tabulate
-from archord.geometry.meshes.cells import n_corners, parts_of
+from archord.geometry.meshes.cells import is_simplex, parts_of
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 
 _DEEPEST = 6  # cuts; a part that is open then is 1/64 of its cell long
@@ -33,17 +33,12 @@ def smallest_determinants(mesh: MeshArrays) -> tuple[Array, Array]:
     true minimum. In space this holds where it is small.
     """
     d = mesh.dimension
-    degree = d * (mesh.order - 1) if _is_simplex(mesh.kind) else d * mesh.order - 1
-    n_points = len(_points(mesh.kind, degree))
-    pieces = np.array_split(mesh.cells, 1 + len(mesh.cells) * n_points // _AT_ONCE)
+    degree = d * (mesh.order - 1) if is_simplex(mesh.kind) else d * mesh.order - 1
+    n_values = len(mesh.cells) * len(_points(mesh.kind, degree))
+    pieces = np.array_split(mesh.cells, 1 + n_values // _AT_ONCE)
     found = [_extremes(mesh.kind, _determinants(mesh, cells, degree), degree) for cells in pieces]
     smallest, largest = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return smallest, largest
-
-
-def _is_simplex(kind: basix.CellType) -> bool:
-    """Whether a cell is a triangle or a tetrahedron."""
-    return n_corners(kind) == dimension_of(kind) + 1
 
 
 def _extremes(kind: basix.CellType, value: Array, degree: int) -> tuple[Array, Array]:
@@ -66,7 +61,8 @@ def _extremes(kind: basix.CellType, value: Array, degree: int) -> tuple[Array, A
             still_open &= bound < _SOUND * largest[cell]
         if not still_open.any():
             break
-        value = np.einsum("pqr,nr->npq", parts, value[still_open]).reshape(-1, value.shape[1])
+        on_parts = np.einsum("pqr,nr->npq", parts, value[still_open])
+        value = on_parts.reshape(-1, value.shape[1])
         cell = cell[still_open].repeat(len(parts))
         np.minimum.at(smallest, cell, value.min(axis=1))
     return smallest, largest
@@ -92,14 +88,15 @@ def _points(kind: basix.CellType, degree: int) -> Array:
 @cache
 def _bernstein_of_values(kind: basix.CellType, degree: int) -> Array:
     """The matrix ``(q, q)`` from values at the nodes to Bernstein coefficients."""
-    X = _points(kind, degree).T[:, :, None]
+    X = _points(kind, degree).T[:, :, None]  # (d, q, 1)
     d = len(X)
     powers: np.ndarray = np.indices((degree + 1,) * d).reshape(d, -1)
-    if _is_simplex(kind):
+    if is_simplex(kind):
         powers = powers[:, powers.sum(axis=0) <= degree]
         rest = degree - powers.sum(axis=0)
+        first = np.prod(X ** powers[:, None], axis=0)
         last = (1 - X.sum(axis=0)) ** rest
-        values = _choose(degree, *powers, rest) * np.prod(X ** powers[:, None], axis=0) * last
+        values = _choose(degree, *powers, rest) * first * last
     else:
         along = [_choose(degree, i, degree - i) * x**i for x, i in zip(X, powers, strict=True)]
         back = np.prod((1 - X) ** (degree - powers[:, None]), axis=0)

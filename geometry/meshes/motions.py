@@ -28,26 +28,34 @@ def free_motions(
     along motions themselves. Two bodies hold each other likewise by ``links``: contact without
     friction along its normals, ties in all directions.
     """
-    bodies = list(held)
-    everything = [(a, a, x, n) for a, holds in held.items() for x, n in holds]
-    everything += links
-    size = max((np.ptp(x, axis=0).max() for _, _, x, _ in everything), default=0.0) or 1.0
-    centre = {name: x[0] for a, b, x, _ in reversed(everything) for name in (a, b)}
-    rows = [np.zeros((1, len(bodies), len(motions)))]
-    for a, b, x, n in everything:
-        row = np.zeros((len(x), len(bodies), len(motions)))
-        for body, sign in {b: -1, a: 1}.items():
-            row[:, bodies.index(body)] = sign * _along(n, (x - centre[body]) / size, motions)
-        rows.append(row)
-    matrix = np.concatenate(rows)
-    free = np.zeros((len(bodies), len(motions)), dtype=bool)
+    own = [(body, body, x, n) for body, holds in held.items() for x, n in holds]
+    matrix = _prevented(list(held), [*own, *links], motions)
+    free = np.zeros(matrix.shape[1:], dtype=bool)
     # rotations first, which translations can be a part of, then translations alone
-    translations = np.array([not motion.startswith("rotation") for motion in motions])
-    for kept in (np.ones_like(translations), translations):
-        reduced = np.linalg.qr(matrix[:, :, kept].reshape(len(matrix), -1), mode="r")
+    is_translation = np.array([not motion.startswith("rotation") for motion in motions])
+    for kept in (np.ones_like(is_translation), is_translation):
+        of_kept = matrix[:, :, kept]
+        reduced = np.linalg.qr(of_kept.reshape(len(matrix), -1), mode="r")
         modes = null_space(reduced, rcond=_FREE)
-        free[:, kept] = (np.abs(modes) > _FREE).any(axis=1).reshape(len(bodies), -1)
-    return {name: list(compress(motions, moves)) for name, moves in zip(bodies, free, strict=True)}
+        moves = (np.abs(modes) > _FREE).any(axis=1)
+        free[:, kept] = moves.reshape(of_kept.shape[1:])
+    return {body: list(compress(motions, moves)) for body, moves in zip(held, free, strict=True)}
+
+
+def _prevented(bodies: Sequence[str], links: Links, motions: Sequence[str]) -> Array:
+    """How much every unit motion of every body violates each condition of the ``links``: a matrix
+    ``(conditions, bodies, motions)``. A body that is held links to itself. Rotations are about a
+    body's first point, and lengths are in sizes of the largest link."""
+    size = max((np.ptp(x, axis=0).max() for _, _, x, _ in links), default=0.0) or 1.0
+    centre = {body: x[0] for a, b, x, _ in reversed(links) for body in (a, b)}
+    blocks = [np.zeros((1, len(bodies), len(motions)))]
+    for a, b, x, n in links:
+        block = np.zeros((len(x), len(bodies), len(motions)))
+        for body, sign in {b: -1, a: 1}.items():
+            ray = (x - centre[body]) / size
+            block[:, bodies.index(body)] = sign * _along(n, ray, motions)
+        blocks.append(block)
+    return np.concatenate(blocks)
 
 
 def _along(n: Array, x: Array, motions: Sequence[str]) -> Array:

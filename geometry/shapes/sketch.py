@@ -53,13 +53,15 @@ class Sketch:
         """The lines of ``body`` from each place to the next, or arcs ``on`` the circle of a set."""
         if on:
             self.circles[on.facets] = on
+        centre = [on.centre] if on else []
+        numbers = []
         for a, b in pairwise(places):
             if (body, a, b) not in self._curve:
-                self.curves.append(
-                    [self.point(body, place) for place in (a, b, *([on.centre] if on else []))]
-                )
-                self._curve[body, a, b] = self._curve[body, b, a] = len(self.curves)
-        return [self._curve[body, a, b] for a, b in pairwise(places)]
+                self.curves.append([self.point(body, place) for place in (a, b, *centre)])
+                self._curve[body, a, b] = len(self.curves)
+                self._curve[body, b, a] = len(self.curves)
+            numbers.append(self._curve[body, a, b])
+        return numbers
 
     def face(self, body: str, **paths: list[int]) -> int:
         """A face of ``body`` within ``paths`` that together are closed, in whatever direction each
@@ -67,7 +69,8 @@ class Sketch:
         self.loops.append([line for path in paths.values() for line in path])
         self.faces[body].append(len(self.loops))
         for name in paths.keys() & self.lines:
-            self.lines[name] += [line for line in paths[name] if line not in self.lines[name]]
+            of_set = self.lines[name]
+            of_set += [line for line in paths[name] if line not in of_set]
         return len(self.loops)
 
     def around_face(self, face: int) -> list[int]:

@@ -81,20 +81,17 @@ def deck_mesh(system: System) -> DeckMesh:
             if not isinstance(given, Rigid):
                 surfaces[given] = cells.surface(problem.mesh.facets_in(given))
     for interaction in problem.interactions:
-        disc = interaction.surfaces[0]
+        disc, opposite = interaction.surfaces
         if isinstance(disc, Rigid):
-            ends = x[surfaces[interaction.surfaces[1]].nodes[:, :2]]
-            length = np.linalg.norm(np.diff(ends, axis=1), axis=2).mean()
-            n = int(np.ceil(2 * np.pi * disc.circle.radius / length))
-            rim, ring = _ring(disc.circle, n)
+            rim, ring = _ring(disc.circle, _mean_length(x, surfaces[opposite].nodes))
             ring += len(x)
             x = np.concatenate([x, rim])
-            first = sum(map(len, elements.values()))
+            number = sum(map(len, elements.values())) + np.arange(len(ring))
             name = surface_name(interaction, 0)
             elements[name] = ring
             node_sets[name] = np.unique(ring)
-            sides = np.ones(n, dtype=np.int64)
-            surfaces[name] = DeckSurface(first + np.arange(n), sides, ring[:, [1, 2, 5]])
+            edge = np.ones(len(ring), dtype=np.int64)
+            surfaces[name] = DeckSurface(number, edge, ring[:, [1, 2, 5]])
     used = np.unique(np.concatenate([own.ravel() for own in elements.values()]))
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))
@@ -141,8 +138,10 @@ class _Cells:
     def _numbered(self, part: str, cells: Ints, sides: Ints | None = None) -> Ints:
         """The nodes of ``cells`` ``(n,)`` that a ``part`` of their `Numbering` says, of these
         ``sides`` of them."""
-        of_kind = [getattr(numbering(self._kind, mirrored=m), part) for m in (False, True)]
-        tables = np.stack(of_kind)[self._mirrored[cells].astype(int)]
+        straight, mirrored = (
+            getattr(numbering(self._kind, mirrored=m), part) for m in (False, True)
+        )
+        tables = np.stack([straight, mirrored])[self._mirrored[cells].astype(int)]
         if sides is not None:
             tables = tables[np.arange(len(cells)), sides]
         return np.take_along_axis(self._cells[cells], tables, axis=1)
@@ -156,8 +155,16 @@ class _Cells:
         return DeckSurface(self._number[cell], sides, self._numbered("on_sides", cell, sides))
 
 
-def _ring(circle: RigidCircle, n: int) -> tuple[Array, Ints]:
-    """Nodes and ``n`` quadrilaterals of a ring below a circle, whose edges 1 lie on it."""
+def _mean_length(x: Array, edges: Ints) -> float:
+    """The mean length of ``edges`` ``(n, 3)`` between their ends."""
+    ends = x[edges[:, :2]]
+    return np.linalg.norm(np.diff(ends, axis=1), axis=2).mean()
+
+
+def _ring(circle: RigidCircle, length: float) -> tuple[Array, Ints]:
+    """Nodes ``(6 n, 2)`` and quadrilaterals ``(n, 8)`` of a ring below a circle, whose edges 1 lie
+    on it and are not longer than ``length``."""
+    n = int(np.ceil(2 * np.pi * circle.radius / length))
     angle = np.pi * np.arange(2 * n) / n
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     radii = [circle.radius * part for part in (_RIM, (1 + _RIM) / 2, 1.0)]

@@ -24,20 +24,24 @@ from scipy.special import lambertw
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.law import NOTHING, ROUND_OFF, LawState, rising_root
 
+_AT_LIMIT = 1 - 1e-15  # of the limit: beyond it round-off would give a complex W, or none
+
 
 def hertz(joint: LawJoint, P: Array) -> LawState:
     """Line contact of half-width ``a = 2 sqrt(P R*/(pi E*))``: peak pressure ``p0 = sqrt(P E*/(pi
     R*))`` and semi-angle ``a/R1`` (Johnson 1985, eqs 4.43 and 4.45)."""
-    root = np.sqrt(P / (math.pi * joint.E_star * joint.relative_radius))
+    R_star = joint.relative_radius
+    root = np.sqrt(P / (math.pi * joint.E_star * R_star))
+    half_width = 2 * R_star * root
     p0 = joint.E_star * root
-    angle = 2 * joint.relative_radius * root / joint.radius
-    return LawState(NOTHING, P, NOTHING, p0, angle)
+    return LawState(NOTHING, P, NOTHING, p0, half_width / joint.radius)
 
 
 def hertz_load_limit(joint: LawJoint) -> float:
     """Load at which the half-width is R1/2; there the parabola for the circle is off by 7 % of the
     depth."""
-    return math.pi * joint.E_star * (joint.radius / 4) ** 2 / joint.relative_radius
+    quarter = joint.radius / 4
+    return math.pi * joint.E_star * quarter**2 / joint.relative_radius
 
 
 def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
@@ -48,8 +52,10 @@ def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
     root = np.sqrt(delta)
     size = math.sqrt(joint.relative_radius)
     spring = 4 / 3 * joint.E_star * size / joint.length
+    P = spring * delta * root
+    stiffness = 1.5 * spring * root
     p0 = 2 / math.pi * joint.E_star * root / size
-    return LawState(delta, spring * delta * root, 1.5 * spring * root, p0)
+    return LawState(delta, P, stiffness, p0)
 
 
 def logarithm(joint: LawJoint, delta: Array, A: float, q: float) -> LawState:
@@ -59,9 +65,11 @@ def logarithm(joint: LawJoint, delta: Array, A: float, q: float) -> LawState:
     spring = math.pi * joint.E_star
     limit = turning_point(joint, A, q)
     argument = -delta / (math.e * limit)
-    turning = argument <= -(1 - 1e-15) / math.e  # where round-off would give a complex W, or none
-    y = np.maximum(-lambertw(np.where(turning, -0.1, argument), -1).real, 1.0)
-    y = np.where(turning, 1.0, np.where(delta > 0, y, np.inf))
+    at_limit = argument <= -_AT_LIMIT / math.e
+    below = np.where(at_limit, -0.1, argument)
+    y = np.maximum(-lambertw(below, -1).real, 1.0)
+    y = np.where(delta > 0, y, np.inf)
+    y = np.where(at_limit, 1.0, y)
     y = np.where(delta > limit * (1 + ROUND_OFF), np.nan, y)
     with np.errstate(divide="ignore"):
         return LawState(delta, spring * delta / y, spring / (y - 1))
@@ -100,10 +108,10 @@ def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array
     y = np.tan(phi / 2)
     c = np.sqrt(1 + b**2)
     s = np.sqrt(np.maximum(b**2 - y**2, 0.0))
-    root = 2 / (np.pi * c) * s / (1 + y**2)
-    logarithm_term = np.arctanh(s / c) / (np.pi * b**2 * (1 + b**2))
-    shape = root + logarithm_term
-    return np.where(np.abs(phi) < eps, shape * P / joint.radius, 0.0)
+    of_root = 2 / (np.pi * c) * s / (1 + y**2)
+    of_logarithm = np.arctanh(s / c) / (np.pi * b**2 * (1 + b**2))
+    pressure = (of_root + of_logarithm) * P / joint.radius
+    return np.where(np.abs(phi) < eps, pressure, 0.0)
 
 
 def persson_load(joint: LawJoint, eps: Array) -> Array:
@@ -112,10 +120,10 @@ def persson_load(joint: LawJoint, eps: Array) -> Array:
     b^4) ] / [ 2 pi b^2 (1 + b^2) ]``, with alpha positive for the stiffer pin (Ciavarella and
     Decuzzi 2001)."""
     b2 = np.tan(eps / 2) ** 2
-    left = 2 - (1 + joint.dundurs_alpha) * (np.log1p(b2) + 2 * b2**2)
-    closing = np.where(left > 0, left, 0.0)
+    closing = (1 + joint.dundurs_alpha) * (np.log1p(b2) + 2 * b2**2)
+    left = np.where(closing < 2, 2 - closing, 0.0)
     with np.errstate(divide="ignore"):
-        return joint.unit * 2 * np.pi * b2 * (1 + b2) / closing
+        return joint.unit * 2 * np.pi * b2 * (1 + b2) / left
 
 
 def persson(joint: LawJoint, P: Array) -> LawState:

@@ -151,31 +151,17 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
         x, f, df = (values[-len(k) - 1 :] for values in loading)
         ratio: Array = np.ones(len(loading.x))
         return _WayBack(_Cubic(x - start, f, df), ratio, k[:0], "along first loading: elastic")
-    folder = steps.run.folder
-    ways = [way for way in _unloadings(steps, k) if steps.dissipated[way[0]] > least]
-    if not ways:
-        remedy = "a last target of 0 for the load, as load.displacement = [2.0, 0.0], gives it"
-        raise InputError(
-            f"{folder}: yields and never unloads after, so its way back is unknown; {remedy}."
-        )
-    way = ways[-1]
-    on = way[steps.closed[way]][::-1]
+    way = _last_unloading(steps, k, least)
+    on = way[steps.closed[way]][::-1]  # by rising displacement
     off = way[~steps.closed[way]]
-    if len(on) < _FEWEST_BACK:
-        raise InputError(
-            f"{folder}: unloads in {len(on)} steps with contact, and a table needs {_FEWEST_BACK}."
-        )
-    steps.require_rising(on)
     x = steps.x[on]
     y = steps.y[on]
     z = _opening(x, y, steps.x[off])
     curve = _cubic(np.append(0.0, x - z), np.append(0.0, y), touching=True)
     secant = loading.f[-len(k)] / (loading.x[-len(k)] - start)
     curve.df[0] = min(curve.df[0], _SOFTER * secant)
-    lost = np.append(np.zeros(len(loading.x) - len(k)), steps.dissipated[k])
-    between = (loading.f[1:] + loading.f[:-1]) / 2
-    shift = np.append(0.0, np.cumsum(np.diff(lost) / between.clip(_SAME * y[-1])))
     deepest = loading.x == x[-1]
+    shift = _shift(loading, steps.dissipated[k], _SAME * y[-1])
     travel = loading.x - start - (z - start) * shift / shift[deepest]
     ratio = _meeting(curve, travel, loading.f)
     ratio[loading.x <= start] = ratio[loading.x > start][0]
@@ -184,6 +170,34 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
     if not len(off):
         said += f", extended from {steps.load(y[0])} to none"
     return _WayBack(curve, ratio, way, said)
+
+
+def _last_unloading(steps: RunSteps, k: np.ndarray, least: float) -> np.ndarray:
+    """Indices of the steps of the last unloading from one of the steps ``k`` that has dissipated
+    more than ``least``. Raises `InputError` without one of enough steps."""
+    folder = steps.run.folder
+    ways = [way for way in _unloadings(steps, k) if steps.dissipated[way[0]] > least]
+    if not ways:
+        remedy = "a last target of 0 for the load, as load.displacement = [2.0, 0.0], gives it"
+        raise InputError(
+            f"{folder}: yields and never unloads after, so its way back is unknown; {remedy}."
+        )
+    way = ways[-1]
+    on = way[steps.closed[way]]
+    if len(on) < _FEWEST_BACK:
+        raise InputError(
+            f"{folder}: unloads in {len(on)} steps with contact, and a table needs {_FEWEST_BACK}."
+        )
+    steps.require_rising(on[::-1])
+    return way
+
+
+def _shift(loading: _Cubic, dissipated: Array, least: float) -> Array:
+    """``int dD/P`` at the nodes of ``loading``, with the dissipation at its last nodes; forces are
+    taken to be ``least`` at least."""
+    lost = np.append(np.zeros(len(loading.x) - len(dissipated)), dissipated)
+    force = (loading.f[1:] + loading.f[:-1]) / 2
+    return np.append(0.0, np.cumsum(np.diff(lost) / force.clip(least)))
 
 
 def _errors_back(

@@ -35,9 +35,12 @@ def magnification(scene: Scene, fields: Fields) -> float:
     dR = abs(scene.joint.dR)
     near = np.hypot(*fields.coordinates.T) < _NEAR * R
     moved = max(float(np.abs(fields.displacement[near]).max()), abs(fields.delta))
-    wanted = max(1.0, min(_VISIBLE * R / dR, _FARTHEST * R / (dR + moved)))
+    visible = _VISIBLE * R / dR
+    recognisable = _FARTHEST * R / (dR + moved)
+    wanted = max(1.0, min(visible, recognisable))
     decade = 10.0 ** math.floor(math.log10(wanted))
-    return max(step * decade for step in (1, 2, 3, 5) if step * decade <= wanted * (1 + 1e-9))
+    steps = [step * decade for step in (1, 2, 3, 5)]
+    return max(step for step in steps if step <= wanted * (1 + 1e-9))
 
 
 def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = True) -> Array:
@@ -84,8 +87,8 @@ def force_panel(axes: Any, run: Run) -> None:
     yielded = np.flatnonzero(run.columns["peeq_max"])
     if len(yielded):
         first = int(yielded[0]) + 1
-        ring = {"ms": 8, "mfc": "none", "color": "tab:red", "label": "first plastic strain"}
-        axes.plot(delta[first], P[first], "o", **ring)
+        ring = {"ms": 8, "mfc": "none", "color": "tab:red"}
+        axes.plot(delta[first], P[first], "o", label="first plastic strain", **ring)
         axes.legend(frameon=False, loc="upper left")
     axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.units['P']}]")
     axes.set(title="force of the joint", xlim=(min(delta), None), ylim=(min(P), None))
@@ -134,12 +137,13 @@ def field_panel(axes: Any, run: Run, step: int | None = None, field: str = "") -
     right = min(1.6 * R + gap, scene.joint.W)
     low = -min(1.9 * R + gap, scene.joint.W)
     high = right if ring or scene.pin.whole else 0.06 * R
-    corners = x[fields.cells[:, :3]]
-    above = (corners.max(axis=1) > [0, low]).all(axis=1)
-    below = (corners.min(axis=1) < [right, high]).all(axis=1)
+    corners = fields.cells[:, :3]
+    above = (x[corners].max(axis=1) > [0, low]).all(axis=1)
+    below = (x[corners].min(axis=1) < [right, high]).all(axis=1)
     # in a ring the core on which the load acts does not count for the range of colours
-    middles = fields.coordinates[fields.cells[:, :3]].mean(axis=1)
-    away = np.hypot(*middles.T) > (R / 2 if ring else 0)
+    core = R / 2 if ring else 0
+    middles = fields.coordinates[corners].mean(axis=1)
+    away = np.hypot(*middles.T) > core
     draw_field(axes, run, fields, x, above & below, away, field)
     draw_outline(axes, fields, magnified(scene, fields, factor, displaced=False), **_BEFORE)
     draw_outline(axes, fields, x, color="black", lw=1.1)
