@@ -18,7 +18,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save(figure: Figure, target: Path, dots: int = DOTS) -> Path:
+def save(figure: Figure, target: Path) -> Path:
     """Write ``figure`` as ``target``, in the format of its suffix; returns it. Raises `OSError`,
     and `ValueError` for a suffix that matplotlib does not know."""
     formats = figure.canvas.get_supported_filetypes()
@@ -26,5 +26,5 @@ def save(figure: Figure, target: Path, dots: int = DOTS) -> Path:
         raise ValueError(
             f"{target}: must end in one of {', '.join(f'.{name}' for name in sorted(formats))}."
         )
-    figure.savefig(target, dpi=dots)
+    figure.savefig(target, dpi=DOTS)
     return target

@@ -45,20 +45,20 @@ class Table:
             for line in lines
         )
 
-    def within(self, width: int, kept: int = 1) -> str:
+    def within(self, width: int) -> str:
         """As `str`, but in blocks of columns that are no wider than ``width``, each beginning with
-        the ``kept`` first columns."""
+        the first column."""
         lines = [list(self.headings), *self.rows]
         wide = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
-        room = width + 2 - sum(wide[:kept])
+        room = width + 2 - wide[0]
         blocks: list[list[int]] = [[]]
-        for k in range(kept, len(wide)):
+        for k in range(1, len(wide)):
             if blocks[-1] and sum(wide[j] for j in blocks[-1]) + wide[k] > room:
                 blocks.append([])
             blocks[-1].append(k)
         parts = []
         for block in blocks:
-            columns = [*range(kept), *block]
+            columns = [0, *block]
             rows = ([row[k] for k in columns] for row in self.rows)
             parts.append(
                 str(Table(*(self.headings[k] for k in columns), rows=rows, left=self.left))

@@ -50,29 +50,23 @@ class Size:
         return f"Min({size}, {self.at_edge!r} + {self.growth!r} * {from_edge})"
 
 
-def mesh_of_joint(
-    comm: MPI.Comm, size: Size, thickness: float, pin_length: float, partitioner: Any = None
-) -> TaggedMesh:
+def mesh_of_joint(comm: MPI.Comm, size: Size, thickness: float, pin_length: float) -> TaggedMesh:
     """The lower half of a pin that touches a block of this ``thickness``. Collective.
 
     Facet sets are "pin" and "hole", and of "block" and "pin" the tops, where they are held, the
     sides in x = 0 and the middles in z = 0: "pin top", "block side" and so on.
     """
-    draw = partial(_draw_joint, size, thickness, pin_length)
-    return gmsh_to_mesh(comm, draw, partitioner=partitioner)
+    return gmsh_to_mesh(comm, partial(_draw_joint, size, thickness, pin_length))
 
 
-def mesh_of_clevis(
-    comm: MPI.Comm, size: Size, lug: float, fork: float, partitioner: Any = None
-) -> TaggedMesh:
+def mesh_of_clevis(comm: MPI.Comm, size: Size, lug: float, fork: float) -> TaggedMesh:
     """A pin through a lug from z = 0 to ``lug`` and a fork from there to ``fork``, which is the lug
     turned upside down. Collective.
 
     Facet sets are "lug hole", "fork hole", "pin in lug", "pin in fork", and sides, middles and tops
     as of `mesh_of_joint`.
     """
-    draw = partial(_draw_clevis, size, lug, fork)
-    return gmsh_to_mesh(comm, draw, partitioner=partitioner)
+    return gmsh_to_mesh(comm, partial(_draw_clevis, size, lug, fork))
 
 
 def _draw_joint(size: Size, thickness: float, pin_length: float, gmsh: Any) -> None:

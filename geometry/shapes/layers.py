@@ -13,14 +13,6 @@ from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 
-def graded(begin: float, end: float, layers: int, last: float = 1.0) -> Array:
-    """Heights ``(layers + 1,)`` from ``begin`` to ``end`` between layers that become thicker or
-    thinner by the same factor; the ``last`` one is so many times as thick as the first."""
-    thickness = np.geomspace(1.0, last, layers)
-    share = np.concatenate([[0.0], thickness.cumsum() / thickness.sum()])
-    return begin + (end - begin) * share
-
-
 def layered(plane: TaggedMesh, heights: Mapping[str, Sequence[float]]) -> TaggedMesh:
     """Extrude a ``plane`` mesh of quadrilaterals to hexahedra. Collective.
 
@@ -46,10 +38,9 @@ def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshA
     n_cells = 0
     for levels, chosen in _cells_by_heights(plane, heights).items():
         n_layers = len(levels) - 1
-        steps = np.arange(plane.order * n_layers + 1) / plane.order
-        z = np.interp(steps, np.arange(len(levels)), levels)
+        z = _node_heights(levels, plane.order)
         x.append(np.column_stack([plane.x.repeat(len(z), axis=0), np.tile(z, len(plane.x))]))
-        over = n_nodes + np.arange(len(x[-1])).reshape(-1, len(z))  # nodes of the plane
+        over = n_nodes + np.arange(len(x[-1])).reshape(-1, len(z))  # (nodes of the plane, heights)
         cells.append(_hexahedra(plane, chosen, over))
         corners = plane.cells[chosen, :4]
         for name, tags in plane.cell_sets.items():
@@ -60,11 +51,8 @@ def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshA
                 facet_sets[f"{name} above"].append(over[corners[within], -1])
         for name in plane.facet_sets:
             ends = plane.facets_of(name)[:, :2]
-            own = over[ends[np.isin(ends, corners).all(axis=1)]]
-            low = own[..., : -1 : plane.order]
-            high = own[..., plane.order :: plane.order]
-            sides = np.concatenate([low, high], axis=1)
-            facet_sets[name].append(sides.swapaxes(1, 2).reshape(-1, 4))
+            own = ends[np.isin(ends, corners).all(axis=1)]
+            facet_sets[name].append(_sides(over[own], plane.order))
         for name, nodes in plane.point_sets.items():
             point_sets[name].append(over[nodes].ravel())
         n_nodes += len(x[-1])
@@ -77,6 +65,21 @@ def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshA
         _joined(facet_sets),
         _joined(point_sets),
     )
+
+
+def _node_heights(levels: tuple[float, ...], order: int) -> Array:
+    """The heights of the nodes of layers of this ``order`` between ``levels``."""
+    steps = np.arange(order * (len(levels) - 1) + 1) / order
+    return np.interp(steps, np.arange(len(levels)), levels)
+
+
+def _sides(over: np.ndarray, order: int) -> np.ndarray:
+    """Corners ``(n layers, 4)`` of the faces over edges, whose two ends have the nodes ``over``
+    ``(n, 2, heights)`` them."""
+    low = over[..., :-1:order]
+    high = over[..., order::order]
+    corners = np.concatenate([low, high], axis=1)
+    return corners.swapaxes(1, 2).reshape(-1, 4)
 
 
 def _joined(parts: Mapping[str, list[np.ndarray]]) -> dict[str, np.ndarray]:
@@ -108,9 +111,11 @@ def _hexahedra(plane: MeshArrays, chosen: np.ndarray, over: np.ndarray) -> np.nd
     """The cells ``(n layers, b)`` over the ``chosen`` ones ``(n,)`` of the plane mesh, whose nodes
     have the nodes ``over`` ``(nodes, levels)`` them."""
     order = plane.order
-    points = lagrange_element(HEXAHEDRON, order).points
+    points = lagrange_element(HEXAHEDRON, order).points  # (b, 3)
     below = lagrange_element(QUADRILATERAL, order).points
-    column = np.abs(points[:, None, :2] - below).sum(axis=-1).argmin(axis=1)
-    level = np.rint(order * points[:, 2]).astype(int)
-    first = np.arange(0, over.shape[1] - 1, order)[:, None]
-    return over[plane.cells[chosen][:, None, column], first + level].reshape(-1, len(points))
+    distance = np.abs(points[:, None, :2] - below).sum(axis=-1)
+    column = distance.argmin(axis=1)  # (b,), the node of the quadrilateral below
+    level = np.rint(order * points[:, 2]).astype(int)  # (b,), the height within the layer
+    first = np.arange(0, over.shape[1] - 1, order)[:, None]  # (layers, 1)
+    feet = plane.cells[chosen][:, None, column]  # (n, 1, b)
+    return over[feet, first + level].reshape(-1, len(points))

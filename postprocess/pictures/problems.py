@@ -91,10 +91,10 @@ def shown_step(run: Run) -> int:
     return last if sizes[-1] > _UNLOADED else int(sizes.argmax()) + 1
 
 
-def shown_steps(run: Run, number: int = 4) -> list[int]:
-    """Up to ``number`` steps for curves, evenly spaced, with the last one and `shown_step`."""
+def shown_steps(run: Run) -> list[int]:
+    """Up to four steps for curves, evenly spaced, with the last one and `shown_step`."""
     last = run.number(None)
-    steps = {max(1, round(last * k / number)) for k in range(1, number + 1)}
+    steps = {max(1, round(last * share)) for share in (0.25, 0.5, 0.75, 1.0)}
     return sorted(steps | {shown_step(run)})
 
 

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from archord.scene.sections.errors import Fault, toml_value
 
 _MOST_SENTENCES = 20
+_LONGEST = 80  # characters of a value as it is shown
 _ELSEWHERE = {
     "lug.pin": "pin.whole",
     "bushing.pin": "pin.whole",
@@ -82,9 +83,9 @@ def of_section(errors: list[Any], data: dict[str, Any], section: type[BaseModel]
     return in_sentences(placed, {name: shown}, whole, f"archord.{section.__name__}", {})
 
 
-def shortened(text: str, length: int = 80) -> str:
+def shortened(text: str) -> str:
     """``text`` with its middle left out if it is long."""
-    return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 20]} ... {text[-15:]}"
 
 
 def _sentence(

@@ -49,7 +49,6 @@ def read_mesh(
     refine: int = 0,
     sizes: Sizes | None = None,
     sets: Mapping[str, Sequence[str]] | None = None,
-    partitioner=None,
 ) -> TaggedMesh:
     """The mesh of ``source`` times ``scale``, `refined` with ``circles`` in scaled lengths, on the
     ranks of ``comm``.
@@ -78,7 +77,7 @@ def read_mesh(
         failure = failure and f"{name}: {failure}"
     if failure := comm.bcast(failure):
         raise ValueError(failure)
-    return distribute(comm, made, partitioner, strips)
+    return distribute(comm, made, cut=strips)
 
 
 def arrays_of(source: Source, comm: MPI.Comm, order: int | None, sizes: Sizes) -> MeshArrays | None:

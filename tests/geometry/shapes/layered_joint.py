@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.layers import graded, layered
+from archord.geometry.shapes.layers import layered
 
 PIN_RADIUS = 10.0
 HOLE_RADIUS = 10.05
@@ -37,9 +38,16 @@ def joint(
         Circle("hole", (0.0, 0.0), HOLE_RADIUS),
     ]
     plane = gmsh_to_mesh(comm, lambda gmsh: _draw(gmsh, size), circles, order=order, quads=True)
-    through = graded(0.0, THICKNESS, layers, last)
+    through = graded(layers, last)
     beyond = [*through, length] if length > THICKNESS else through
     return layered(plane, {"block": through, "pin": beyond})
+
+
+def graded(layers: int, last: float) -> np.ndarray:
+    """Heights ``(layers + 1,)`` between layers that become thinner by the same factor."""
+    thickness = np.geomspace(1.0, last, layers)
+    share = np.concatenate([[0.0], thickness.cumsum() / thickness.sum()])
+    return THICKNESS * share
 
 
 def _draw(gmsh, size: float) -> None:

@@ -9,7 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
-from archord.geometry.shapes.layers import graded, layered
+from archord.geometry.shapes.layers import layered
 from tests.geometry.shapes.layered_joint import (
     DEPTH,
     HOLE_RADIUS,
@@ -17,6 +17,7 @@ from tests.geometry.shapes.layered_joint import (
     PIN_RADIUS,
     THICKNESS,
     WIDTH,
+    graded,
     joint,
 )
 
@@ -68,18 +69,9 @@ def test_nodes_lie_on_cylinders_and_between_heights(comm):
         on = x[mesh.dofs_in(V, name)]
         np.testing.assert_allclose(np.hypot(on[:, 0], on[:, 1] - middle), radius, rtol=1e-13)
     heights = np.unique(np.concatenate(comm.allgather(np.round(x[:, 2], 9))))
-    first, second, third = graded(0.0, THICKNESS, 2, 0.4)
+    first, second, third = graded(2, 0.4)
     halves = [first, (first + second) / 2, second, (second + third) / 2, third]
     np.testing.assert_allclose(heights, halves, atol=1e-8)
-
-
-def test_layers_are_graded_by_the_same_factor():
-    heights = graded(1.0, 9.0, 4, 0.2)
-    thickness = np.diff(heights)
-    assert heights[[0, -1]] == pytest.approx([1.0, 9.0])
-    assert thickness[-1] == pytest.approx(0.2 * thickness[0])
-    assert thickness[1:] / thickness[:-1] == pytest.approx(0.2 ** (1 / 3))
-    assert graded(0.0, 2.0, 1) == pytest.approx([0.0, 2.0])
 
 
 def draw_two(gmsh):
