@@ -80,41 +80,48 @@ class Coulomb(ContactLaw):
     def respond(
         self, opening: Array, trial: Array, gamma: Array, state: FrictionState, dt: float
     ) -> Response:
-        """Pressure as without friction, and the shear returned to the cone."""
-        slip = opening[:, 1]
-        shear_stiffness = gamma[:, 1]
+        """Pressure as without friction, and the shear returned to the cone along itself."""
+        m, d = trial.shape
+        stiffness = gamma[:, 1:]
+        before = state.elastic_slip.reshape(m, d - 1)
         touches = ~(trial[:, 0] <= 0)
         touched = state.pressure > 0
-        friction = np.where(touched, self.friction, 0.0) if self.held else self.friction
+        friction = np.full(m, self.friction)
+        if self.held:
+            friction[~touched] = 0.0
 
         pressure = np.where(touches, trial[:, 0], 0.0)
         limit = friction * pressure
-        sticking = np.where(touches, trial[:, 1] - shear_stiffness * state.elastic_slip, 0.0)
-        direction = np.sign(sticking)
-        size = np.abs(sticking)
+        sticking = np.where(touches[:, None], trial[:, 1:] - stiffness * before, 0.0)
+        size = np.linalg.norm(sticking, axis=1)
+        direction = sticking / np.where(size > 0, size, 1.0)[:, None]
         slides = size > limit
         if self.held:
             slides &= ~touched
         sticks = touches & ~slides
-        shear = np.where(slides, direction * limit, sticking)
-        slid = np.where(slides, direction * (size - limit) / shear_stiffness, 0.0)
+        over = np.where(slides, size - limit, 0.0)
+        shear = np.where(slides[:, None], limit[:, None] * direction, sticking)
+        slid = over[:, None] * direction / stiffness
 
-        by_trial = np.zeros((len(trial), 2, 2))
+        by_trial = np.zeros((m, d, d))
         by_trial[:, 0, 0] = touches
-        by_trial[:, 1, 1] = sticks
-        if self.secant:
-            by_trial[slides, 1, 1] = limit[slides] / size[slides]
-        else:
-            by_trial[:, 1, 0] = np.where(slides, direction * friction, 0.0)
+        across = np.where(slides, limit / np.where(slides, size, 1.0), sticks)
+        by_trial[:, 1:, 1:] = across[:, None, None] * np.eye(d - 1)
+        if not self.secant:
+            along = np.where(slides, across, 0.0)[:, None, None]
+            by_trial[:, 1:, 1:] -= along * direction[:, :, None] * direction[:, None]
+            by_trial[:, 1:, 0] = np.where(slides, friction, 0.0)[:, None] * direction
 
-        backwards = (direction < 0) & (friction > 0)
+        backwards = (direction[:, 0] < 0) & (friction > 0) & (d == 2)
         sliding = np.where(backwards, SLIDE_BACK, SLIDE)
         branch = np.where(touches, np.where(sticks, STICK, sliding), OPEN)
 
-        lost = 0.5 * friction * (state.pressure + pressure) * np.abs(slid)
-        elastic_slip = np.where(touches, state.elastic_slip + slip + slid, 0.0)
+        way = np.linalg.norm(slid, axis=1)
+        lost = 0.5 * friction * (state.pressure + pressure) * way
+        moved = np.where(touches[:, None], before + opening[:, 1:] + slid, 0.0)
+        elastic_slip = moved.reshape(state.elastic_slip.shape)
         new = FrictionState(elastic_slip, pressure, state.dissipated + lost)
-        return Response(np.stack([pressure, shear], axis=1), by_trial, None, branch, new)
+        return Response(np.column_stack([pressure, shear]), by_trial, None, branch, new)
 
     def elastic(self) -> Coulomb:
         """The law in which points that touched are ``held``."""
@@ -139,8 +146,7 @@ class Coulomb(ContactLaw):
 
 @dataclass(frozen=True)
 class CoulombInSpace(Coulomb):
-    """Coulomb's friction with two components of slip and shear: the shear is returned to the cone
-    along itself.
+    """Coulomb's friction with two components of slip and shear.
 
     The elastic slip ``(m, 2)`` is kept along the tangents of the frame, which follow the normal.
     """
@@ -148,48 +154,6 @@ class CoulombInSpace(Coulomb):
     def state(self, n: int) -> FrictionState:
         """Points at rest."""
         return FrictionState(np.zeros((n, 2)), np.zeros(n), np.zeros(n))
-
-    def respond(
-        self, opening: Array, trial: Array, gamma: Array, state: FrictionState, dt: float
-    ) -> Response:
-        """Pressure as without friction, and the shear returned to the cone."""
-        slip = opening[:, 1:]
-        shear_stiffness = gamma[:, 1:]
-        touches = ~(trial[:, 0] <= 0)
-        touched = state.pressure > 0
-        friction = np.where(touched, self.friction, 0.0) if self.held else self.friction
-
-        pressure = np.where(touches, trial[:, 0], 0.0)
-        limit = friction * pressure
-        trial_shear = trial[:, 1:] - shear_stiffness * state.elastic_slip
-        sticking = np.where(touches[:, None], trial_shear, 0.0)
-        size = np.linalg.norm(sticking, axis=1)
-        direction = sticking / np.where(size > 0, size, 1.0)[:, None]
-        slides = size > limit
-        if self.held:
-            slides &= ~touched
-        sticks = touches & ~slides
-        over = np.where(slides, size - limit, 0.0)
-        shear = sticking - over[:, None] * direction
-        slid = over[:, None] * direction / shear_stiffness
-
-        by_trial = np.zeros((len(trial), 3, 3))
-        by_trial[:, 0, 0] = touches
-        across = np.where(slides, limit / np.where(slides, size, 1.0), sticks)
-        by_trial[:, 1:, 1:] = across[:, None, None] * np.eye(2)
-        if not self.secant:
-            along = np.where(slides, across, 0.0)[:, None, None]
-            by_trial[:, 1:, 1:] -= along * direction[:, :, None] * direction[:, None]
-            by_trial[:, 1:, 0] = np.where(slides, friction, 0.0)[:, None] * direction
-
-        branch = np.where(touches, np.where(sticks, STICK, SLIDE), OPEN)
-        way = np.linalg.norm(slid, axis=1)
-        lost = 0.5 * friction * (state.pressure + pressure) * way
-        moved = state.elastic_slip + slip + slid
-        elastic_slip = np.where(touches[:, None], moved, 0.0)
-        new = FrictionState(elastic_slip, pressure, state.dissipated + lost)
-        traction = np.column_stack([pressure, shear])
-        return Response(traction, by_trial, None, branch, new)
 
     def in_space(self) -> CoulombInSpace:
         """The law itself."""
