@@ -16,14 +16,13 @@ from archord.solver.linear.strategy import Facts, Strategy
 # the facts.
 _MODULES = bordered, condensed, multigrid, substructured, lagged, look_ahead
 RULES = {module.__name__.rpartition(".")[2]: module.why_not for module in _MODULES}
-# of MUMPS on the whole matrix: the first that fits
-INSTEAD = ("condensed", "multigrid", "substructured")
-_WITHOUT = {"condensed": ["lagged", "look_ahead"], "multigrid": ["lagged"]}  # strategies they spare
-_SAID = {
+# of MUMPS on the whole matrix the first that fits, and how the system is said to be solved then
+INSTEAD = {
     "condensed": "condensed",
     "multigrid": "solved by multigrid",
     "substructured": "substructured",
 }
+_WITHOUT = {"condensed": ["lagged", "look_ahead"], "multigrid": ["lagged"]}  # strategies they spare
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
 
@@ -70,4 +69,4 @@ def choose(facts: Facts) -> Choice:
         given_way += _WITHOUT[fitting[0]]
         if facts.by_force:  # its preconditioner solves by iterations
             given_way.append("look_ahead")
-    return Choice(reasons | {name: f"the system is {_SAID[fitting[0]]}" for name in given_way})
+    return Choice(reasons | {name: f"the system is {INSTEAD[fitting[0]]}" for name in given_way})
