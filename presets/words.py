@@ -22,7 +22,7 @@ from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.laws.coulomb import Coulomb
 from archord.solver.contact.laws.named import LAWS
 from archord.solver.expansion import disc_of
-from archord.solver.parts import Body, Load, Support
+from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.problem import Problem
 
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
@@ -53,7 +53,7 @@ def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str,
         "mesh": _mesh(problem.mesh, mesh_file),
         "body": [_body(body) for body in problem.bodies],
         "interaction": [_interaction(part) for part in problem.interactions],
-        "coupling": [vars(coupling) for coupling in problem.couplings],
+        "coupling": [_coupling(coupling, dimension) for coupling in problem.couplings],
         "support": [_support(support, dimension) for support in problem.supports],
         "load": [_load(load) for load in problem.loads if isinstance(load, Load)],
         "path": {"steps": problem.steps, "fit_steps": problem.fit_steps},
@@ -160,6 +160,10 @@ def _law(law: Any) -> dict[str, Any]:
 
 def _support(support: Support, dimension: int) -> dict[str, Any]:
     return {"name": support.name, "on": support.on, "fixed": support.held(dimension)}
+
+
+def _coupling(coupling: Coupling, dimension: int) -> dict[str, Any]:
+    return vars(coupling) | {"point": coupling.point or (0.0,) * dimension}
 
 
 def _load(load: Load) -> dict[str, Any]:

@@ -234,7 +234,7 @@ class Coupling:
     facets : str
         The set of facets.
     point : tuple of float
-        The reference point (x, y), in space (x, y, z); the origin by default.
+        The reference point (x, y), in space (x, y, z). Without it a problem takes the origin.
     kind : {"rigid", "distributing"}
         Facets of a rigid coupling move as one body. Facets of a distributing one do so only on
         average, and forces are spread over them.
@@ -253,7 +253,7 @@ class Coupling:
 
     name: str
     facets: str = ""
-    point: tuple[float, ...] = (0.0, 0.0)
+    point: tuple[float, ...] = ()
     kind: Literal["rigid", "distributing"] = "rigid"
 
     def __post_init__(self) -> None:
@@ -262,7 +262,8 @@ class Coupling:
         object.__setattr__(self, "facets", self.facets or self.name)
         _require_name(self, "facets")
         said = "must be two numbers, x and y, or three in space"
-        require_of(self, _is_place(self.point), "point", said)
+        is_place = len(self.point) == 0 or _is_place(self.point)
+        require_of(self, is_place, "point", said)
         known = self.kind in ("rigid", "distributing")
         require_of(self, known, "kind", 'must be "rigid" or "distributing"')
         object.__setattr__(self, "point", tuple(map(float, self.point)))

@@ -193,6 +193,9 @@ class Problem:
     def _take(self, kinematics: Kinematics) -> None:
         """Take these ``kinematics``. Raises `InputError` for a mesh of others."""
         object.__setattr__(self, "kinematics", kinematics)
+        origin = (0.0,) * kinematics.dimension
+        couplings = [replace(part, point=part.point or origin) for part in self.couplings]
+        object.__setattr__(self, "couplings", couplings)
         if kinematics.is_plane and kinematics.thickness != 1:
             object.__setattr__(self, "thickness", kinematics.thickness)
         self._require_fitting_mesh()
@@ -315,6 +318,17 @@ class Problem:
     def fits(self) -> bool:
         """Whether a stage comes before them in which interferences arise."""
         return self.fit or any(i.interference or i.overlap for i in self.interactions)
+
+    @property
+    def targets(self) -> list[float]:
+        """The load factor at every output step. Raises ValueError for steps of other stages."""
+        steps = self.steps
+        counts = list(steps) if isinstance(steps, Sequence) else [steps] * self.n_stages
+        if len(counts) != self.n_stages:
+            raise ValueError(f"steps must have one number for each of the {self.n_stages} stages")
+        if self.fits:
+            counts = [self.fit_steps, *counts]
+        return [stage + k / n for stage, n in enumerate(counts) for k in range(1, n + 1)]
 
     def values(self, load: Load) -> tuple[float, ...]:
         """The values of ``load`` at the load factors 0, 1, 2, ..., the ends of all stages."""

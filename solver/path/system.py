@@ -53,10 +53,12 @@ def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:
 class System(Totals):
     """A problem made ready to be solved, without a run folder. Collective.
 
+    `archord.solve` warns of the mesh and of surfaces that do not face each other; this does not.
+
     Parameters
     ----------
     problem : Problem
-        The problem.
+        The problem, whose ``steps`` are the default path of `solve`.
     timer : Timer
         Where times are counted, by default a new one.
 
@@ -98,7 +100,8 @@ class System(Totals):
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
-        problem = expanded(problem.on())
+        self.stated = problem.on()
+        problem = expanded(self.stated)
         self.problem = problem
         self.timer = timer or Timer()
         mesh = problem.mesh.mesh
@@ -152,9 +155,10 @@ class System(Totals):
         """Nodes ``(n,)`` of the ``body`` on this rank, ghosts included."""
         return self.equilibrium.drives.nodes_of(body)
 
-    def solve(self, loads: Sequence[float], rules: StepRules | None = None) -> None:
-        """Follow the path of the ``loads``, from where the last call has ended. Raises
-        `StepFailure`."""
+    def solve(self, loads: Sequence[float] | None = None, rules: StepRules | None = None) -> None:
+        """Follow the path of the ``loads``, from where the last call has ended; by default through
+        the problem's steps. Raises `StepFailure`."""
+        loads = self.stated.targets if loads is None else loads
         self._path = self._path or self.load_path()
         self._path.at.targets_done = 0
         self._path.at.size = None

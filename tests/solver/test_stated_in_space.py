@@ -157,6 +157,25 @@ def test_a_force_presses_a_block_that_floats(law, comm):
     assert system.stabilisation_energy < 1e-6 * system.energies()[0]
 
 
+@pytest.mark.parametrize("steps", [2, [2]])
+def test_a_coupling_is_at_the_origin_and_the_path_has_the_steps_unless_told(steps, comm):
+    """The moment of an even pressure about the origin, at the end of every step."""
+    load = Load("press", on="end", direction="z", displacement=-2e-4 * SIZE[2])
+    problem = Problem(
+        box(comm, (1, 1, 1), SIZE),
+        [Body("box", NO_NU)],
+        supports=WALL,
+        loads=[load],
+        couplings=[Coupling("end", "z1")],
+        steps=steps,
+    )
+    system = System(problem)
+    system.solve()
+    assert problem.couplings[0].point == (0.0, 0.0, 0.0)
+    assert problem.targets == [0.5, 1.0]
+    assert system.drive_displacement("press") == pytest.approx(-2e-4 * SIZE[2])
+
+
 def test_a_tie_pulls(comm):
     load = Load("pull", on="lid", direction="z", displacement=4e-4)
     system = column(comm, [load], COLUMN, law="tied")
