@@ -11,6 +11,7 @@ import basix
 import numpy as np
 import numpy.typing as npt
 
+from archord.geometry.vectors import crossed
 from archord.kernels.compat import cell_degree, cell_nodes
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ def _inverse(J: Array) -> tuple[Array, Array]:
     """Determinant ``(n, q)`` and inverse ``(n, q, d, d)`` of ``J``: d X_j / d x_i as [j, i]."""
     inverse = np.empty_like(J)
     if J.shape[-1] == 2:
-        det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+        det = crossed(J[..., 0, :], J[..., 1, :])
         inverse[..., 0, 0] = J[..., 1, 1]
         inverse[..., 1, 1] = J[..., 0, 0]
         inverse[..., 0, 1] = -J[..., 0, 1]

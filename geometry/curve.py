@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from archord.geometry.vectors import unit
 from archord.kernels.compiled import library, pointer
 from archord.materials.material import Array
 from archord.report.errors import is_number, require_between, require_of
@@ -137,7 +138,8 @@ class Curve:
     def shapes(self, xi: Array) -> tuple[Array, Array]:
         """Shape functions and their derivatives, ``(..., degree + 1)`` each, at ``xi``."""
         k = np.arange(self.degree + 1)
-        powers = np.stack([xi[..., None] ** k, k * xi[..., None] ** np.maximum(k - 1, 0)])
+        at = xi[..., None]
+        powers = np.stack([at**k, k * at ** np.maximum(k - 1, 0)])
         # one product of two matrices: numpy would multiply point by point
         flat = powers.reshape(-1, self.degree + 1) @ self._coefficients.T
         value, slope = flat.reshape(powers.shape)
@@ -153,7 +155,7 @@ class Curve:
         x = np.concatenate([start, end[ends_free]])
         step = np.concatenate([end - start[earlier], (end - start)[ends_free]])
         outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
-        return x, outward / np.linalg.norm(outward, axis=1)[:, None]
+        return x, unit(outward)
 
     def arc_length(self, xi: Array) -> Array:
         """Length ``(n, m)`` along each piece from its start to ``xi`` ``(m,)``, or ``(n, m)``, of
@@ -353,7 +355,7 @@ class RigidCircle:
         `Curve.closest_point`."""
         m = len(x)
         ray = x - self.centre - displacement
-        normal = ray / np.linalg.norm(ray, axis=1)[:, None]
+        normal = unit(ray)
         return Projection(
             found=(normal * outward).sum(1) < 0,
             point=x - ray + self.radius * normal,

@@ -17,6 +17,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.geometry.curve import Index
 from archord.geometry.patches import Patches
+from archord.geometry.vectors import crossed
 from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_name("overlay.c")
@@ -92,7 +93,7 @@ def piece_rule(pieces: Array, degree: int) -> tuple[Array, Array]:
     points = start + s * one + t * two + s * t * twist
     by_s = one + t * twist
     by_t = two + s * twist
-    area = by_s[..., 0] * by_t[..., 1] - by_s[..., 1] * by_t[..., 0]
+    area = crossed(by_s, by_t)
     return points, area * w
 
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from archord.geometry.basis import Array, element_of
 from archord.geometry.curve import Index, ProjectionError
+from archord.geometry.vectors import unit
 from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_name("patches.c")
@@ -242,10 +243,9 @@ class Patches:
         shape, slope = self.shapes(self.reference_corners().mean(axis=0)[None])
         nodes = self.X[self.connectivity]
         middle = shape[0] @ nodes
-        normal = np.cross(*(slope[0][:, None, None] @ nodes[None])[:, :, 0])
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        by_s, by_t = (slope[0][:, None, None] @ nodes[None])[:, :, 0]
         radius = np.linalg.norm(nodes - middle[:, None], axis=2).max(axis=1)
-        return middle, normal, radius
+        return middle, unit(np.cross(by_s, by_t)), radius
 
     def _project(
         self,

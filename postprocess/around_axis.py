@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archord.geometry.vectors import unit
 from archord.materials.material import Array
 from archord.measures.edge import PatchProfile
 
@@ -27,10 +28,9 @@ class Axis:
     def cylindrical(self, x: Array) -> tuple[Array, Array, Array]:
         """Radius, angle in degrees and place along the axis ``(...)`` of the points ``x``
         ``(..., 3)``."""
-        along = np.array(self.direction) / np.linalg.norm(self.direction)
+        along = unit(np.array(self.direction))
         first = np.eye(3)[np.flatnonzero(np.abs(along) < np.sqrt(0.5))[0]]
-        first -= (first @ along) * along
-        first /= np.linalg.norm(first)
+        first = unit(first - (first @ along) * along)
         arm = np.asarray(x) - self.point
         a = arm @ first
         b = arm @ np.cross(along, first)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from archord.geometry.vectors import unit
 from archord.materials.kinematics import AXISYMMETRIC, Kinematics, kinematics
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
@@ -469,14 +470,13 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
 def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
     """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet
     without a corner their mean; and which facets ``(k,)`` are so followed by the next."""
-    tangent = np.einsum("qa,fai->fqi", [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]], x)
-    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    by_ends = [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]]  # of the parabola, at its nodes
+    tangent = unit(np.einsum("qa,fai->fqi", by_ends, x))
     here, after = np.nonzero(nodes[:, 2:] == nodes[:, 0])
     smooth = (tangent[here, 2] * tangent[after, 0]).sum(axis=1) > _SMOOTH
     here = here[smooth]
     after = after[smooth]
-    mean = tangent[here, 2] + tangent[after, 0]
-    mean /= np.linalg.norm(mean, axis=1)[:, None]
+    mean = unit(tangent[here, 2] + tangent[after, 0])
     tangent[here, 2] = mean
     tangent[after, 0] = mean
     return tangent, np.isin(np.arange(len(nodes)), here[after == here + 1])

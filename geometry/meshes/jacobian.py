@@ -17,6 +17,7 @@ import numpy as np
 from archord.geometry.basis import Array, dimension_of, lagrange_element, tabulate
 from archord.geometry.meshes.cells import is_simplex, parts_of
 from archord.geometry.meshes.mesh_arrays import MeshArrays
+from archord.geometry.vectors import crossed
 
 _DEEPEST = 6  # cuts; a part that is open then is 1/64 of its cell long
 # in space, of a cell's largest determinant: a smallest one above this is not looked for
@@ -75,7 +76,7 @@ def _determinants(mesh: MeshArrays, cells: np.ndarray, degree: int) -> Array:
     by_X, by_Y, *by_Z = np.tensordot(slopes, mesh.x[cells], axes=(2, 1))  # (q, n, d) each
     if by_Z:
         return np.einsum("qni,qni->nq", np.cross(by_X, by_Y), by_Z[0])
-    return (by_X[..., 0] * by_Y[..., 1] - by_X[..., 1] * by_Y[..., 0]).T
+    return crossed(by_X, by_Y).T
 
 
 def _points(kind: basix.CellType, degree: int) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from archord.geometry.basis import Array
+from archord.geometry.vectors import crossed
 
 PLANE: Sequence[str] = ("x", "y", "rotation")
 SPACE: Sequence[str] = ("x", "y", "z", "rotation x", "rotation y", "rotation z")
@@ -67,5 +68,5 @@ def _along(n: Array, x: Array, motions: Sequence[str]) -> Array:
     if x.shape[1] == 3:
         moved |= zip(SPACE[3:], np.cross(x, n).T, strict=True)
     else:
-        moved["rotation"] = x[:, 0] * n[:, 1] - x[:, 1] * n[:, 0]
+        moved["rotation"] = crossed(x, n)
     return np.column_stack([moved[motion] for motion in motions])

@@ -18,6 +18,7 @@ from archord.geometry.curve import circle_through, nearest_circle
 from archord.geometry.meshes.cells import corners_of, parts_of, side_kind
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.tagged_mesh import tags_of
+from archord.geometry.vectors import unit
 
 _OFF_CIRCLE = 0.05  # of the radius
 _ELSEWHERE = 1e-4  # of the radius: more than the rounding of a file moves nodes onto their circle
@@ -65,8 +66,7 @@ def cylinder_through(x: Array, facets: np.ndarray) -> Circle | None:
     from scipy.optimize import least_squares  # a solve without first-order arcs does not pay for it
 
     a, b, c = np.swapaxes(x[facets[:, :3]], 0, 1)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = unit(np.cross(b - a, c - a))
     turned = np.linalg.svd(normal.T @ normal)[2]  # across the axis twice, then along it
     corners = np.unique(x[facets[:, :3]].reshape(-1, 3), axis=0)
     middle, radius = nearest_circle(corners @ turned[:2].T)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.geometry.vectors import unit
 
 
 def plane_frames(normal: Array) -> Array:
@@ -19,8 +20,7 @@ def frames_at_rest(normal: Array) -> Array:
     tangent leads along the coordinate axis that is least along the normal, as far as it may."""
     axis = np.eye(3)[np.abs(normal).argmin(axis=1)]
     along_normal = np.einsum("mi,mi->m", axis, normal)
-    tangent = axis - along_normal[:, None] * normal
-    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    tangent = unit(axis - along_normal[:, None] * normal)
     return np.stack([normal, tangent, np.cross(normal, tangent)], axis=1)
 
 
