@@ -91,7 +91,8 @@ def draw(tables: dict[str, pd.DataFrame], file: Path) -> None:
     figure = new_figure(wide * columns, high * rows)
     grid = figure.subplots(rows, columns, squeeze=False)
     panels: Sequence[Axes] = grid.ravel()[: len(tables)]
-    for unused in grid.ravel()[len(tables) :]:
+    spare: Sequence[Axes] = grid.ravel()[len(tables) :]
+    for unused in spare:
         unused.set_axis_off()
     for ax, (case, table) in zip(panels, tables.items(), strict=True):
         for code, points in table.groupby("code", sort=False):
@@ -111,14 +112,11 @@ def draw(tables: dict[str, pd.DataFrame], file: Path) -> None:
     for ax in panels:
         lines, names = ax.get_legend_handles_labels()
         shown |= dict(zip(names, lines, strict=True))
-    figure.legend(
-        shown.values(),
-        shown.keys(),
-        loc="outside upper center",
-        ncols=min(len(shown), 3),
-        fontsize=_TEXT,
-        frameon=False,
-    )
+    place = {"loc": "outside upper center", "ncols": min(len(shown), 3)}
+    if len(spare):
+        place = {"loc": "center", "ncols": 1}
+    on = spare[0] if len(spare) else figure
+    on.legend(shown.values(), shown.keys(), fontsize=_TEXT, frameon=False, **place)
     with replacing(file) as new:
         save(figure, new)
 

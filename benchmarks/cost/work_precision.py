@@ -97,7 +97,8 @@ def row(line: Line) -> dict[str, object]:
         "iterations": found.get("iterations", ""),
         "factorisations": found.get("factorisations", ""),
     }
-    entries |= dict.fromkeys(("seconds", "from - to", "MB", "P/(E* R)"), "")
+    force = CASES[point.case].get("force", "P/(E* R)")
+    entries |= dict.fromkeys(("seconds", "from - to", "MB", force), "")
     if found:
         runs = line.timing.runs
         seconds = sorted(run.seconds for run in runs)
@@ -105,7 +106,7 @@ def row(line: Line) -> dict[str, object]:
         entries["from - to"] = f"{seconds[0]:.4g} - {seconds[-1]:.4g}"
         entries["MB"] = f"{max(run.memory for run in runs) / 1e6:.0f}"
     if "P" in found:
-        entries["P/(E* R)"] = f"{found['P']:.8f}"
+        entries[force] = f"{found['P']:.8g}"
     for name in quantities(point.case):
         entries[f"error of {name}"] = f"{errors[name]:.1e}" if name in errors else ""
     entries["error of the reference"] = CASES[point.case]["current"]["P"][1]
@@ -114,4 +115,5 @@ def row(line: Line) -> dict[str, object]:
 
 def quantities(case: str) -> list[str]:
     """What ``case`` is judged by."""
-    return [name for name in NAMES if name == "profile" or name in CASES[case]["current"]]
+    known = CASES[case].keys() | CASES[case]["current"].keys()
+    return [name for name in NAMES if name in known]

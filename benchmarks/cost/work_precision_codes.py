@@ -2,9 +2,9 @@
 timed processes.
 
 What is solved is in work_precision.toml. The result of a process is a dict of what the code found
-at the last step: "P" (over E* R), "p0" (over E*), "eps" [rad], "dissipation" (over E* R^2),
-"profile" (pressure over E* at `ANGLES`), "dofs", "iterations", "factorisations", and "kinematics"
-where the pairs are fixed; without what it does not tell.
+at the last step: "P" (over E* R, of a lug in N/mm), "p0" (over E*), "eps" [rad], "dissipation"
+(over E* R^2), "profile" (pressure over E* at `ANGLES`), "dofs", "iterations", "factorisations", and
+"kinematics" where the pairs are fixed; without what it does not tell.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from archord.geometry.basis import Array
 from archord.postprocess.run import Run
 from archord.report.errors import InputError
 from archord.report.version import VERSION
-from archord.scene.file import resolved
+from archord.scene.file import AnyScene, parse_any, resolved
 from archord.scene.presets.joint import Scene
 
 DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
@@ -39,7 +39,7 @@ CASES: dict[str, dict[str, Any]] = DATA["cases"]
 OURS = "archord"
 CALCULIX = "CalculiX"
 ANGLES = np.linspace(0.0, np.pi / 2, 401)  # of pressure profiles, from the contact axis
-# of history.csv
+# of history.csv, of the joint
 _COLUMNS = {
     "P": "P/(E* R)",
     "p0": "p0/E*",
@@ -109,11 +109,18 @@ def _of_series(case: str, series: dict[str, Any], version: str) -> Iterator[Poin
     steps = series.get("steps", given["steps"])
     prepare = _calculix if code == CALCULIX else _archord
     for size, growth in zip(series["element_size"], series["growth"], strict=True):
-        joint = {"growth": growth}
-        if series.get("edge"):
-            joint["edge_angle"] = given["edge_angle"]
+        mesh = {"element_size": size, "growth": growth}
         analysis = {"degree": series.get("degree", 2)}
-        scene = paper_joint(size, steps, given.get("yield_stress"), joint=joint, analysis=analysis)
+        scene: AnyScene
+        if "scene" in given:
+            lug = given["scene"]["lug"]
+            mesh["element_size"] *= lug["radius"]
+            scene = parse_any(given["scene"] | {"lug": lug | mesh, "analysis": analysis})
+        else:
+            if series.get("edge"):
+                mesh["edge_angle"] = given["edge_angle"]
+            yields = given.get("yield_stress")
+            scene = paper_joint(size, steps, yields, joint=mesh, analysis=analysis)
         start = partial(prepare, scene)
         yield Point(case, code, version, series["name"], size, steps, start)
 
@@ -133,16 +140,20 @@ def profile(angle: Array, pressure: Array) -> Array:
     return np.interp(ANGLES, angle[order], pressure[order])
 
 
-def _archord(scene: Scene, folder: Path) -> Process:
+def _archord(scene: AnyScene, folder: Path) -> Process:
     (folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
 
     def read() -> dict[str, Any]:
         run = Run(folder / "run")
-        # the unbiased contact integrates one half of the pressure on either side
-        sides = [profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in run.contact().values()]
-        return {
-            **{name: run.columns[column][-1] for name, column in _COLUMNS.items()},
-            "profile": np.mean(sides, axis=0),
+        if not isinstance(scene, Scene):
+            found = {"P": run.columns["pull force"][-1]}
+        else:
+            found = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
+            # the unbiased contact integrates one half of the pressure on either side
+            arcs = run.contact().values()
+            sides = [profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in arcs]
+            found["profile"] = np.mean(sides, axis=0)
+        return found | {
             "dofs": run.summary["mesh"]["dofs"],
             "iterations": round(sum(run.columns["iterations"])),
             "factorisations": run.summary["totals"]["factorisations"],
@@ -152,7 +163,7 @@ def _archord(scene: Scene, folder: Path) -> Process:
     return Process(OURS, command, folder, read)
 
 
-def _calculix(scene: Scene, folder: Path) -> Process:
+def _calculix(scene: AnyScene, folder: Path) -> Process:
     process = calculix.process(scene, folder)
 
     def read() -> dict[str, Any]:
@@ -164,7 +175,7 @@ def _calculix(scene: Scene, folder: Path) -> Process:
             "dofs": 2 * len(opinion.mesh.x),
             "iterations": opinion.iterations,
         }
-        if scene.pin.yield_stress:
+        if isinstance(scene, Scene) and scene.pin.yield_stress:
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
             found["dissipation"] = scene.pin.yield_stress * opinion.peeq_integral
         return {
