@@ -136,7 +136,7 @@ def test_a_pulled_pin_comes_free_and_says_so():
     with pytest.raises(
         StepFailure, match=r"no equilibrium at P = -.*singular mode.*last load that held is P = "
     ):
-        solve(by_force([0.006, -0.001], 2))
+        solve(by_force([0.006, -0.001], 2, stepping={"minimum": 0.05}))
 
 
 def test_a_force_beyond_the_limit_load_ends_at_it():
