@@ -141,12 +141,22 @@ def _mean_in_bodies(system: System, parts: Sequence[PointFields], row: CellField
 
 
 def _mean_on_contact(system: System, row: CellField) -> Array:
-    length: Array = np.zeros(system.bulk.n_cells)
-    whole = np.zeros_like(length)
+    """The means ``(cells,)``. A facet in two interactions, each with another body, has the sum of
+    their values over its one area."""
+    whole: Array = np.zeros(system.bulk.n_cells)
+    found = []
     for pair in system.contact.pairs:
-        weight = pair.surface.weight
-        cells = pair.surface.cells
-        np.add.at(length, cells, weight.sum(axis=1))
-        np.add.at(whole, cells, (weight * row.values(pair)).sum(axis=1))
+        surface = pair.surface
+        np.add.at(whole, surface.cells, (surface.weight * row.values(pair)).sum(axis=1))
+        facet = np.column_stack([surface.cells, surface.trace])
+        facets, number = np.unique(facet, axis=0, return_inverse=True)
+        found.append((facets, np.bincount(number.ravel(), surface.weight.sum(axis=1))))
+    if not found:
+        return whole
+    together = np.concatenate([facets for facets, _ in found])
+    facets, number = np.unique(together, axis=0, return_inverse=True)
+    area = np.zeros(len(facets))
+    np.maximum.at(area, number.ravel(), np.concatenate([areas for _, areas in found]))
+    length = np.bincount(facets[:, 0], area, minlength=len(whole))
     length[length == 0] = 1.0
     return whole / length

@@ -48,7 +48,7 @@ def check(problem: Problem) -> list[str]:
         moves = _free(problem, whole, cells, owner)
         faults = chain(
             beyond_axis(whole.x) if around_axis else [],
-            _shared(problem, whole),
+            _shared(problem, whole, owner),
             _half_loaded(problem, whole),
             _loose(moves, set(owner.values()), SPACE if whole.dimension == 3 else ("rotation",)),
         )
@@ -164,20 +164,31 @@ def _moved_in_contact(problem: Problem, whole: MeshArrays) -> Iterator[str]:
             )
 
 
-def _shared(problem: Problem, whole: MeshArrays) -> Iterator[str]:
-    """What is said of facets that two interactions have: what is between them would be counted
-    twice."""
-    surfaces = [(part.name, name) for part in problem.interactions for name in _surfaces(part)]
-    for (first, one), (second, other) in combinations(surfaces, 2):
+def _shared(problem: Problem, whole: MeshArrays, owner: dict[str, str]) -> Iterator[str]:
+    """What is said of facets that two interactions have, facing the same body in both: what is
+    between them would be counted twice."""
+    surfaces = [
+        (part.name, name, _faced(part, name, owner))
+        for part in problem.interactions
+        for name in _surfaces(part)
+    ]
+    for (first, one, faced), (second, other, also) in combinations(surfaces, 2):
+        if first == second or faced != also:
+            continue
         tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
         common = whole.facets[np.isin(whole.tags, [*tags])]
-        if first != second and len(common):
+        if len(common):
             at = place(whole.x[common[0, : whole.dimension]].mean(axis=0))
             yield (
                 f"the surfaces {one!r} of the interaction {first!r} and {other!r} of {second!r} "
                 f"have {len(common)} facets in common, the first at {at}, whose "
-                "contact would count twice: a facet goes to one interaction"
+                "contact would count twice: a facet meets a body in one interaction"
             )
+
+
+def _faced(part: Interaction, name: str, owner: dict[str, str]) -> str:
+    """The body that the surface ``name`` of an interaction meets, "" for a rigid disc."""
+    return next((owner[other] for other in _surfaces(part) if other != name), "")
 
 
 def _free(

@@ -134,9 +134,11 @@ class ProblemScene(Checked):
         for part, name in [(i, name) for i in self.interaction for name in i.surfaces]:
             place = ("interaction", part.name, "surfaces")
             other = used.setdefault(name, part.name)
-            require(
-                other == part.name, place, f"must not name {name!r}, which {other!r} has already"
+            said = (
+                f"must not name {name!r}, which {other!r} has already; give its facets a second "
+                "name in mesh.sets if they meet another body here"
             )
+            require(other == part.name, place, said)
         drawn = self.analysis.plane != "axisymmetric" or self.mesh.shape is None
         said = 'must be "strain" or "stress" for the shape of a preset, which is plane'
         require(drawn, "analysis.plane", said)

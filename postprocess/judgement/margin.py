@@ -1,45 +1,31 @@
-"""Margins of safety of lugs: what a run found beside the usual sections of a hand calculation.
+"""Margins of safety: what a run found beside the usual sections of a hand calculation.
 
-Margins are ``MS = allowable / applied - 1``. Forces are of the whole lug, as in history.csv:
-per unit thickness where the scene has none. The applied force is ``load`` for the yield margins and
-``load * factor`` for the ultimate ones.
-
-By hand, of a plate of width ``W``, edge distance ``e``, thickness ``t``, with a hole of diameter
-``D`` and a pin of diameter ``d``, or a bushing pressed in (``d = D``), and the proof strength or
-the tensile strength for ``f``:
-
-    net section   f (W - D) t
-    bearing       1.5 f d t                               EN 1993-1-8, table 3.10
-    shear-out     2 (e - D/2 cos 40 deg) t f / sqrt(3)    Bruhn 1973, chapter D1
-
-By finite elements the allowable is the largest force that the run had reached when the PEEQ of the
-lug passed a limit.
-
-Each plate of a clevis is such a lug. Its forces are of the whole clevis there: ``t`` is the
-thickness of the inner plate, and of both outer plates together.
+Margins are ``MS = allowable / applied - 1``. Forces are of the whole, as in history.csv: per unit
+thickness where the scene has none. The applied force is ``load`` for the yield margins and
+``load * factor`` for the ultimate ones. `archord.postprocess.judgement.sections` has the hand
+formulas. By finite elements the allowable is the largest force that the run had reached when the
+PEEQ of the part passed a limit.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from archord.materials.material import Array
+from archord.postprocess.judgement.parts import Part, no_sections, parts_of
+from archord.postprocess.judgement.sections import proof_strength, tensile_strength
 from archord.report.errors import InputError
 from archord.report.table import Table
-from archord.scene.presets.lug import LugShape
 from archord.scene.sections.bodies import Solid
 
 if TYPE_CHECKING:
     from archord.postprocess.run import Run
 
-PROOF = 0.002  # plastic strain at the proof strength
 YIELD_PEEQ = 0.01
-_SPREAD = math.radians(40)  # where the shear-out planes leave the hole, from the load axis
-_BEARING = 1.5
 
 
 @dataclass(frozen=True)
@@ -66,9 +52,9 @@ class StrengthCheck:
 
 @dataclass(frozen=True)
 class Margins:
-    """The ``checks`` of a lug under a ``load``, the ``strengths`` that the hand formulas used, with
-    a word on each, and ``notes``: what is assumed, and what the run cannot tell. ``plate`` is the
-    plate of a clevis, "" for a lug."""
+    """The ``checks`` of a part under a ``load``, the ``strengths`` that the hand formulas used,
+    with a word on each, and ``notes``: what is assumed, and what the run cannot tell. ``part`` is
+    what a clevis' part or a body is called, "" for a lug."""
 
     load: float
     factor: float
@@ -77,7 +63,7 @@ class Margins:
     strengths: dict[str, tuple[float, str]]
     checks: list[StrengthCheck]
     notes: list[str]
-    plate: str = ""
+    part: str = ""
 
     def weakest(self, kind: str, by: str) -> StrengthCheck | None:
         """The check of this ``kind`` and origin with the smallest allowable."""
@@ -85,57 +71,38 @@ class Margins:
         return min(found, key=lambda check: check.allowable) if found else None
 
 
-@dataclass(frozen=True)
-class _Lug:
-    """One lug of a run: its ``shape``, its ``body``, the load that pulls it, the ``thickness`` of
-    all plates of its kind, and what its column of forces is multiplied by for the force on the
-    whole, in the ``unit``."""
-
-    shape: LugShape
-    body: Any
-    pull: str
-    thickness: float
-    factor: float
-    unit: str
-
-
-def plates_of(run: Run) -> list[str]:
-    """What `margins` takes for ``plate``: the plates of a clevis, "" alone for a lug. Raises
-    `InputError`."""
-    return list(_lugs_of(run))
-
-
 def margins(
     run: Run,
     load: float,
     *,
-    plate: str = "",
+    part: str = "",
     factor: float = 1.0,
     proof: float | None = None,
     tensile: float | None = None,
     yield_peeq: float = YIELD_PEEQ,
     ultimate_peeq: float | None = None,
 ) -> Margins:
-    """The margins of safety of the lug of ``run`` under a pull ``load``.
+    """The margins of safety of a lug, of a part of a clevis or of a body under a force.
 
     Parameters
     ----------
     run : Run
-        a run of a [lug] or a [clevis], or of a general scene on the shape of one
+        any run whose bodies yield under one load; a lug and a clevis have sections by hand
     load : float
-        force on the whole lug, positive, in the unit of history.csv; on a whole clevis in its unit
+        force on the whole, positive, in the unit of history.csv; on a whole clevis in its unit
         of force
-    plate : str
-        "inner" or "outer" of a clevis
+    part : str
+        "inner", "outer" or, in space, "pin" of a clevis; a body of any other scene, which may be
+        left out if one body alone yields
     factor : float
         what the load is multiplied by for the ultimate margins, 1.5 if it is a limit load
     proof, tensile : float, optional
         strengths of the hand formulas; the run's hardening curve's if absent
     yield_peeq, ultimate_peeq : float
-        largest PEEQ of the lug at the yield load and at the ultimate load; the latter is the end of
-        the hardening curve if absent
+        largest PEEQ of the part at the yield load and at the ultimate load; the latter is the end
+        of the hardening curve if absent
 
-    Raises `InputError` for other runs, for numbers that are not positive, and for an elastic lug
+    Raises `InputError` for other runs, for numbers that are not positive, and for an elastic part
     without strengths.
     """
     given = {"--load": load, "--factor": factor, "--proof": proof, "--tensile": tensile}
@@ -143,48 +110,59 @@ def margins(
     for name, value in given.items():
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"{name} {value:g}: must be a positive number.")
-    lugs = _lugs_of(run)
-    if plate not in lugs:
-        fault = "must be inner or outer"
-        if "" in lugs:
-            fault = "is for a clevis, and this run is one of a lug"
-        raise InputError(f"--plate {plate!r}: {fault}.")
-    lug = lugs[plate]
-    strengths = _strengths(run, lug.body, proof, tensile)
+    judged = _chosen(parts_of(run), part)
     applied = {"yield": load, "ultimate": load * factor}
-    checks = [
-        StrengthCheck(kind, "hand", name, allowable, applied[kind])
-        for kind, (strength, _) in strengths.items()
-        for name, allowable in by_hand(lug.shape, strength, lug.thickness).items()
-    ]
-    bears = "hole" if lug.shape.wall else "pin"
-    notes = [f"bearing by hand is {_BEARING:g} times the strength on the diameter of the {bears}"]
-    if lug.body.yield_stress is None:
+    strengths: dict[str, tuple[float, str]] = {}
+    checks = []
+    if judged.by_hand is not no_sections:
+        strengths = _strengths(run, judged, proof, tensile)
+        for kind, (strength, _) in strengths.items():
+            for name, allowable in judged.by_hand(kind, strength).items():
+                checks.append(StrengthCheck(kind, "hand", name, allowable, applied[kind]))
+    notes = list(judged.notes)
+    body = judged.body
+    if body.yield_stress is None:
         notes.append(
-            "the lug of this run is elastic: it has no yield, and no margins by finite elements"
+            f"the {judged.noun} of this run is elastic: it has no yield, and no margins by finite "
+            "elements"
         )
     else:
-        last = _end_of_curve(lug.body) if ultimate_peeq is None else ultimate_peeq
-        force = np.asarray(run.columns[f"{lug.pull} force"]) * lug.factor
-        peeq = np.asarray(run.columns[f"{lug.body.name} peeq_max"])
-        found, said = _by_elements(force, peeq, applied, yield_peeq, last)
+        last = _end_of_curve(body) if ultimate_peeq is None else ultimate_peeq
+        peeq: Array = np.asarray(run.columns[f"{body.name} peeq_max"])
+        found, said = _by_elements(judged, peeq, applied, yield_peeq, last)
         checks += found
         notes += said
-    return Margins(load, factor, lug.unit, run.scene.units.stress, strengths, checks, notes, plate)
+    stress = run.scene.units.stress
+    title = judged.noun if judged.name else ""
+    return Margins(load, factor, judged.unit, stress, strengths, checks, notes, title)
+
+
+def _chosen(parts: dict[str, Part], asked: str) -> Part:
+    """The part that is asked for, or the only one. Raises `InputError`."""
+    if not asked and len(parts) == 1:
+        return next(iter(parts.values()))
+    if asked in parts:
+        return parts[asked]
+    known = " or ".join(name for name in parts if name)
+    said = f"must be {known}" if known else "is for a clevis or for bodies, and this run has a lug"
+    raise InputError(f"--part {asked!r}: {said}.")
 
 
 def _by_elements(
-    force: Array, peeq: Array, applied: dict[str, float], yields: float, breaks: float | None
+    part: Part, peeq: Array, applied: dict[str, float], yields: float, breaks: float | None
 ) -> tuple[list[StrengthCheck], list[str]]:
-    """The checks of the steps' forces ``(n,)`` and largest PEEQ ``(n,)`` against the PEEQ at which
-    the lug ``yields`` and ``breaks``, and notes on them."""
+    """The checks of the steps' forces on a ``part`` and its largest PEEQ ``(n,)`` against the PEEQ
+    at which it ``yields`` and ``breaks``, and notes on them."""
+    force = part.force
     limits = [("yield", "first yield", 0.0), ("yield", f"PEEQ of {yields:.3g}", yields)]
-    notes = ["first yield is local, at the hole, and no failure"]
+    notes = ["first yield is local, and no failure"]
     if peeq[0] > 0:
-        notes.append("the lug yields within the first step: shorter steps tell at what force")
+        notes.append(
+            f"the {part.noun} yields within the first step: shorter steps tell at what force"
+        )
     if breaks is None:
         notes.append(
-            "no PEEQ is known at which the lug breaks, as its curve has no end: give "
+            f"no PEEQ is known at which the {part.noun} breaks, as its curve has no end: give "
             "--ultimate-peeq"
         )
     else:
@@ -199,20 +177,6 @@ def _by_elements(
             f"largest force that was solved, {force.max():.5g}; solve further"
         )
     return checks, notes
-
-
-def by_hand(lug: LugShape, strength: float, thickness: float) -> dict[str, float]:
-    """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin
-    or the bushing."""
-    edge = lug.arguments()["edge_distance"]
-    bore = lug.hole
-    bearing = bore if lug.wall else lug.radius
-    planes = 2 * (edge - bore * math.cos(_SPREAD))
-    return {
-        "net section": strength * (lug.width - 2 * bore) * thickness,
-        "bearing": _BEARING * strength * 2 * bearing * thickness,
-        "shear-out": planes * thickness * strength / math.sqrt(3),
-    }
 
 
 def load_at(force: Array, peeq: Array, limit: float) -> tuple[float, bool]:
@@ -233,125 +197,42 @@ def load_at(force: Array, peeq: Array, limit: float) -> tuple[float, bool]:
     return max(before, force_before + share * (float(force[k]) - force_before)), True
 
 
-def proof_strength(solid: Solid) -> float:
-    """The engineering stress at a plastic strain of 0.2 %, or first yield where that is higher, as
-    with a plateau."""
-    first = float(solid.yield_stress or 0.0)
-    true = float(solid.law.stress(np.array([PROOF]))[0])
-    return max(first, true * math.exp(-PROOF - true / solid.E))
-
-
-def tensile_strength(solid: Solid) -> float:
-    """The largest engineering stress of the hardening curve; beyond it a bar necks (Considere)."""
-    peeq = np.append(solid.law.knots(), PROOF)
-    true = solid.law.stress(peeq)
-    return max(proof_strength(solid), float((true * np.exp(-peeq - true / solid.E)).max()))
-
-
 def _strengths(
-    run: Run, plate: Solid, proof: float | None, tensile: float | None
+    run: Run, part: Part, proof: float | None, tensile: float | None
 ) -> dict[str, tuple[float, str]]:
     """The strengths of the hand formulas by kind of margin, and where they are from. Raises
     `InputError`."""
-    if plate.yield_stress is None:
+    body = part.body
+    if body.yield_stress is None:
         if proof is None and tensile is None:
             raise InputError(
-                f"{run.folder}: the lug is elastic: it has no yield; give --proof and --tensile "
-                "for the hand formulas, or solve with a yield_stress."
+                f"{run.folder}: the {part.noun} is elastic: it has no yield; give --proof and "
+                "--tensile for the hand formulas, or solve with a yield_stress."
             )
         said = {"yield": proof, "ultimate": tensile}
         return {kind: (value, "given") for kind, value in said.items() if value is not None}
-    if plate.back_stresses and (proof is None or tensile is None):
+    if body.back_stresses and (proof is None or tensile is None):
         raise InputError(
-            f"{run.folder}: the lug has back stresses, and no tension test of it is known here; "
-            "give --proof and --tensile."
+            f"{run.folder}: the {part.noun} has back stresses, and no tension test of it is known "
+            "here; give --proof and --tensile."
         )
-    found = {"yield": (proof_strength(plate), "at 0.2 % plastic strain of the run's curve")}
+    found = {"yield": (proof_strength(body), "at 0.2 % plastic strain of the run's curve")}
     if proof:
         found["yield"] = (proof, "given")
     highest = "the largest engineering stress of the run's curve"
-    if plate.perfectly_plastic:
+    if body.perfectly_plastic:
         highest = "the yield stress, as the run is perfectly plastic; --tensile gives another"
-    found["ultimate"] = (tensile, "given") if tensile else (tensile_strength(plate), highest)
+    found["ultimate"] = (tensile, "given") if tensile else (tensile_strength(body), highest)
     return found
 
 
-def _end_of_curve(plate: Solid) -> float | None:
+def _end_of_curve(body: Solid) -> float | None:
     """PEEQ at the last point of a hardening table; None of a law, which has no end."""
-    if plate.yield_stress is None or isinstance(plate.hardening, float):
+    if body.yield_stress is None or isinstance(body.hardening, float):
         return None
-    table = isinstance(plate.hardening, list) or plate.hardening.engineering is not None
-    last = float(plate.law.knots()[-1])
+    table = isinstance(body.hardening, list) or body.hardening.engineering is not None
+    last = float(body.law.knots()[-1])
     return last if table and last > 0 else None
-
-
-def _lugs_of(run: Run) -> dict[str, _Lug]:
-    """The lugs of a run: the inner and the outer plate of a clevis, or "". Raises `InputError` for
-    other runs, and where no load pulls."""
-    shape = getattr(getattr(run.scene, "mesh", None), "shape", None)
-    kind = getattr(shape, "kind", "")
-    if kind not in ("lug", "clevis"):
-        raise InputError(
-            f"{run.folder}: is no run of a [lug] or a [clevis], whose sections the hand formulas "
-            "know."
-        )
-    run.number(None)
-    if kind == "lug":
-        lugs = {"": _lug_of(run)}
-    else:
-        lugs = {name: _plate_of(run, name) for name in ("inner", "outer")}
-    for lug in lugs.values():
-        if max(run.columns[f"{lug.pull} force"]) <= 0:
-            raise InputError(
-                f"{run.folder}: the pin never pulls at the lug's end: the force of {lug.pull!r} is "
-                "never above 0."
-            )
-    return lugs
-
-
-def _lug_of(run: Run) -> _Lug:
-    """The lug of a run of a [lug]. Raises `InputError`."""
-    pulls = [load.name for load in run.scene.load if load.direction == "x"]
-    if len(pulls) != 1 or len(run.scene.load) != 1:
-        names = ", ".join(load.name for load in run.scene.load)
-        raise InputError(
-            f"{run.folder}: is loaded by {names}; the hand formulas are for one load along the "
-            "lug, in x."
-        )
-    pull = pulls[0]
-    unit = run.units[f"{pull} force"]
-    body = _body_of(run, "lug")
-    shape = run.scene.mesh.shape
-    thickness = run.scene.thickness if shape.space is None else shape.space.thickness
-    return _Lug(shape, body, pull, thickness, 1.0, unit)
-
-
-def _plate_of(run: Run, name: str) -> _Lug:
-    """The inner or the outer plate of a run of a [clevis]; its columns of forces are per unit of
-    its thickness. Raises `InputError`."""
-    shape = run.scene.mesh.shape
-    in_space = shape.space is not None
-    pull = "pull" if in_space else f"{name} pull"
-    drawn = getattr(shape, name)
-    known = {"pull"} if in_space else {"inner pull", "outer pull"}
-    if {load.name for load in run.scene.load} != known:
-        names = " and ".join(map(repr, sorted(known)))
-        raise InputError(f"{run.folder}: margins of a clevis are for its loads {names} alone.")
-    if drawn.thickness is None:
-        raise InputError(
-            f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it "
-            "again."
-        )
-    number = {"inner": 1, "outer": 2}[name]
-    together = number * drawn.thickness
-    lug = LugShape(radius=shape.radius, clearance=shape.clearance, **drawn.outline(shape))
-    unit = run.scene.units.force_of(1.0)
-    per = 1.0 if in_space else together
-    return _Lug(lug, _body_of(run, name), pull, together, per, unit)
-
-
-def _body_of(run: Run, cells: str) -> Any:
-    return next(body for body in run.scene.body if (body.cells or body.name) == cells)
 
 
 def margin_text(found: Margins) -> str:
@@ -359,7 +240,7 @@ def margin_text(found: Margins) -> str:
     ultimate = ""
     if found.factor != 1:
         ultimate = f", ultimate load {found.load * found.factor:g} {found.unit}"
-    title = f"{found.plate} plate: " if found.plate else ""
+    title = f"{found.part}: " if found.part else ""
     lines = [f"{title}load {found.load:g} {found.unit}{ultimate}; MS = allowable / applied - 1"]
     for kind, (strength, source) in found.strengths.items():
         name = {"yield": "proof strength", "ultimate": "tensile strength"}[kind]

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from archord.cli import run as command
-from archord.postprocess.judgement.margin import (
-    by_hand,
-    load_at,
-    margin_text,
-    margins,
+from archord.postprocess.judgement.margin import load_at, margin_text, margins
+from archord.postprocess.judgement.sections import (
+    ClevisPin,
+    lug_forces,
     proof_strength,
     tensile_strength,
 )
@@ -52,14 +51,33 @@ def runs(tmp_path_factory):
 def test_hand_formulas_are_those_of_the_sections():
     """A plate of width 40 and edge distance 20 with a hole of 20.2 and a pin of 20, 5 thick, at 100
     MPa."""
-    found = by_hand(LugShape(**SHAPE, edge_distance=20.0), 100.0, 5.0)
+    found = lug_forces(LugShape(**SHAPE, edge_distance=20.0), 100.0, 5.0)
     assert found["net section"] == pytest.approx(100 * (40 - 20.2) * 5)
     assert found["bearing"] == pytest.approx(1.5 * 100 * 20 * 5)
     planes = 2 * (20 - 10.1 * math.cos(math.radians(40))) * 5
     assert found["shear-out"] == pytest.approx(planes * 100 / math.sqrt(3))
-    bushed = by_hand(LugShape(**SHAPE, wall=2.0, interference=0.1), 100.0, 5.0)
+    bushed = lug_forces(LugShape(**SHAPE, wall=2.0, interference=0.1), 100.0, 5.0)
     assert bushed["net section"] == pytest.approx(100 * (40 - 24) * 5)
     assert bushed["bearing"] == pytest.approx(1.5 * 100 * 24 * 5)
+
+
+def test_a_pin_bends_about_the_faces_that_bear():
+    """A solid pin by hand: shear on two sections, Bruhn's arm, and the moment of Melcon and Hoblit
+    with the lengths that bear; plates of any strength bear at their faces alone."""
+    pin = ClevisPin(radius=10.0, bore=0.0, inner=20.0, outer=10.0, gap=1.0)
+    found = pin.forces("yield", 300.0)
+    assert found["shear"] == pytest.approx(2 * math.pi * 100 * 300 / math.sqrt(3))
+    moment = 300 * math.pi * 1000 / 4
+    assert found["bending, even bearing"] == pytest.approx(moment / ((5 + 1 + 5) / 2))
+    assert "bending, ends bear" not in found
+    plates = (2e5, 4e5)
+    force = pin.forces("ultimate", 300.0, plates)["bending, ends bear"]
+    inner, outer = (force / 2 * 20 / plate for plate in plates)
+    assert force / 2 * (inner / 2 + 1.0 + outer / 2) == pytest.approx(300 * 4 / 3 * 1000)
+    hard = pin.forces("ultimate", 300.0, (1e12, 1e12))["bending, ends bear"]
+    assert hard == pytest.approx(2 * 300 * 4 / 3 * 1000 / 1.0, rel=1e-4)
+    soft = pin.forces("ultimate", 300.0, (1e4, 1e4))
+    assert soft["bending, ends bear"] == soft["bending, even bearing"]
 
 
 def test_strengths_are_those_of_the_tension_test_behind_the_curve():
@@ -159,7 +177,7 @@ def test_the_command_prints_what_the_function_finds(runs, capsys):
         capsys.readouterr().out == margin_text(margins(runs["cycled"], 9000.0, factor=1.5)) + "\n"
     )
     assert command(["margin", "--help"]) == 0
-    assert "net section, bearing" in capsys.readouterr().out
+    assert "by hand formulas (net" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -197,9 +215,9 @@ def test_plates_of_a_clevis_have_the_margins_of_lugs_under_their_share(tmp_path,
         scenes[name] = parse_any(alone)
     folders = solved(scenes, tmp_path)
     for name in plates:
-        found = margins(Run(folders["clevis"]), 15000.0, plate=name)
+        found = margins(Run(folders["clevis"]), 15000.0, part=name)
         lug = margins(Run(folders[name]), 15000.0)
-        assert (found.plate, found.unit, found.strengths) == (name, "N", lug.strengths)
+        assert (found.part, found.unit, found.strengths) == (f"{name} plate", "N", lug.strengths)
         for check, expected in zip(found.checks, lug.checks, strict=True):
             assert (check.kind, check.name, check.bound) == (
                 expected.kind,
@@ -213,7 +231,7 @@ def test_plates_of_a_clevis_have_the_margins_of_lugs_under_their_share(tmp_path,
     printed = capsys.readouterr().out
     assert printed.index("inner plate: load 15000 N") < printed.index("outer plate: load 15000 N")
     assert command(["margin", clevis, "--load", "15000", "--proof", "400"]) == 2
-    assert "--proof: is the strength of one plate" in capsys.readouterr().err
+    assert "--proof: is the strength of one part" in capsys.readouterr().err
     assert command(["margin", clevis, "--load", "15000", "--proof", "400", "--plate", "outer"]) == 0
     assert command(["margin", str(folders["inner"]), "--load", "1", "--plate", "outer"]) == 2
 
@@ -227,5 +245,5 @@ def test_runs_of_other_problems_are_refused(tmp_path):
         "load": {"displacement": 0.2, "steps": 1},
     }
     run = Run(solved({"joint": parse_any(joint)}, tmp_path)["joint"])
-    with pytest.raises(InputError, match=r"is no run of a \[lug\] or a \[clevis\]"):
+    with pytest.raises(InputError, match=r"this run has the loads of a \[joint\]"):
         margins(run, 1.0)
