@@ -25,7 +25,7 @@ def test_the_step_file_has_the_faces_that_the_scene_names(tmp_path, capsys):
     assert named == {"face 6": "6.03", "face 13": "6.03", "face 17": "6"}
     scene = archord.load_scene(folder / "clevis.toml")
     preset = archord.load_scene(folder / "preset.toml")
-    assert {body.name: body.material for body in scene.body} == {
-        body.name: body.material for body in preset.body
+    assert {body.name: body.yield_stress for body in scene.body} == {
+        body.name: body.yield_stress for body in preset.body
     }
     assert preset.load[0].force == scene.load[0].force == pytest.approx(60000.0)
