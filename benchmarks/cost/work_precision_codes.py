@@ -32,7 +32,7 @@ from archord.postprocess.run import Run
 from archord.report.errors import InputError
 from archord.report.version import VERSION
 from archord.scene.file import AnyScene, parse_any, resolved
-from archord.scene.presets.joint import Scene
+from archord.scene.sections.bodies import Pin
 
 DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
 CASES: dict[str, dict[str, Any]] = DATA["cases"]
@@ -140,12 +140,17 @@ def profile(angle: Array, pressure: Array) -> Array:
     return np.interp(ANGLES, angle[order], pressure[order])
 
 
+def _pin_of(scene: AnyScene) -> Pin | None:
+    """The pin of the paper's joint, None of a general scene."""
+    return getattr(scene, "pin", None)
+
+
 def _archord(scene: AnyScene, folder: Path) -> Process:
     (folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
 
     def read() -> dict[str, Any]:
         run = Run(folder / "run")
-        if not isinstance(scene, Scene):
+        if _pin_of(scene) is None:
             found = {"P": run.columns["pull force"][-1]}
         else:
             found = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
@@ -175,9 +180,10 @@ def _calculix(scene: AnyScene, folder: Path) -> Process:
             "dofs": 2 * len(opinion.mesh.x),
             "iterations": opinion.iterations,
         }
-        if isinstance(scene, Scene) and scene.pin.yield_stress:
+        pin = _pin_of(scene)
+        if pin is not None and pin.yield_stress:
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
-            found["dissipation"] = scene.pin.yield_stress * opinion.peeq_integral
+            found["dissipation"] = pin.yield_stress * opinion.peeq_integral
         return {
             name: value
             for name, value in found.items()
