@@ -213,15 +213,19 @@ def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:
         )
     if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
         raise ValueError("elastic_tangent of a material must be symmetric")
-    at_rest = material.update(np.zeros((2, len(working))), material.state(2))[0]
+    n_strain = len(working)
+    n_stress = kinematics.n_stress
+    if material.finite:
+        n_strain = n_stress = len(kinematics.gradient)
+    at_rest = material.update(np.zeros((2, n_strain)), material.state(2))[0]
     stress = np.asarray(at_rest)
-    shape = (2, kinematics.n_stress)
+    shape = (2, n_stress)
     if stress.shape != shape or stress.dtype.kind != "f":
         raise ValueError(
             f"update of a material must give real stresses of the shape {shape} at 2 points, not "
             f"{stress.dtype} of the shape {stress.shape}"
         )
-    if material.yields:
+    if material.yields or material.finite:
         return
     strains = [[3.0, -1.0, 4.0, 2.0, -3.0, 1.0], [-20.0, 5.0, 7.0, 10.0, 8.0, -6.0]]
     probe = 1e-3 * np.array(strains)[:, working]

@@ -82,9 +82,18 @@ class Outside:
         }
 
 
-def displacement_at(run: Run, body: str, place: tuple[float, float], axis: int) -> float:
-    """The component of displacement at the node of the ``body`` that lies at the ``place``."""
-    return float(run.fields().displacement[_node(run, body, place), axis])
+def stage_ends(run: Run, column: str) -> list[float]:
+    """The values of a ``column`` of the history at the end of each stage of the path."""
+    history = run.history
+    return history.loc[history["load_factor"] % 1 == 0, column].to_list()
+
+
+def displacement_at(
+    run: Run, body: str, place: tuple[float, float], axis: int, step: int | None = None
+) -> float:
+    """The component of displacement at the node of the ``body`` that lies at the ``place``, at a
+    ``step`` (the last)."""
+    return float(run.fields(step).displacement[_node(run, body, place), axis])
 
 
 def stress_at(run: Run, body: str, place: tuple[float, float], axis: int) -> float:

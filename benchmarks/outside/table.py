@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from archord.benchmarks.case import matches, write_table
-from archord.benchmarks.outside import nafems, others
+from archord.benchmarks.outside import eyebar, kratos, nafems, others
 from archord.benchmarks.outside.problem import Outside
 from archord.report.files import Row
 
-PROBLEMS = (*nafems.PROBLEMS, *others.PROBLEMS)
+PROBLEMS = (*nafems.PROBLEMS, *others.PROBLEMS, *kratos.PROBLEMS, *eyebar.PROBLEMS)
 
 
 def chosen(pattern: str) -> Sequence[Outside]:

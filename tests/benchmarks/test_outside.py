@@ -2,9 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from archord.benchmarks.axisymmetric.case import solved
 from archord.benchmarks.outside import table
+from archord.benchmarks.outside.neo_hooke import NeoHooke
+from archord.solver.problem import Load
 
 
 def of(name):
@@ -40,3 +44,46 @@ def test_every_published_value_is_of_a_quantity_that_is_read(tmp_path):
     text, files = table.write(rows, [problem], tmp_path)
     assert problem.verdict in text
     assert all(file.exists() for file in files)
+
+
+def last_force(name, folder, moved, steps, **held):
+    """The last force on the drive "press" where it alone moves, on the coarsest mesh."""
+    problem = of(name).problem(1)
+    (press,) = (load for load in problem.loads if load.name == "press")
+    loads = [Load("press", on=press.on, direction=press.direction, displacement=moved)]
+    loads += [
+        Load(name, on=press.on, direction=axis, displacement=0.0) for name, axis in held.items()
+    ]
+    run = solved(replace(problem, loads=loads, steps=steps), folder)
+    return run.history["press force"].iloc[-1]
+
+
+def test_the_eye_bar_is_that_of_calculix(tmp_path):
+    """CalculiX with elements of second order and small strain: see examples/eyebar."""
+    assert last_force("eye bar", tmp_path, 0.05, 4) == pytest.approx(807.2, rel=5e-3)
+
+
+def test_the_iron_presses_a_slab_as_on_finer_meshes(tmp_path):
+    """0.05 mm, in the neo-Hookean solid, which is archord's own at small strain."""
+    force = last_force("*ironing, friction 0", tmp_path, -0.05, 1, slide="x")
+    assert force == pytest.approx(-11.2, rel=0.01)
+
+
+def test_the_derivative_of_the_neo_hookean_stress_is_that_of_differences():
+    """The stress is the derivative of the energy, and the moduli those of the stress; Cauchy's
+    stress does not turn with the axes of a pure rotation."""
+    solid = NeoHooke(3.0, 0.3)
+    gradient = np.array([[0.2, -0.3, 0.1, -0.15]])
+    stress, tangent, _ = solid.update(gradient, None)
+    h = 1e-6
+    for k in range(4):
+        steps = [gradient + sign * h * np.eye(4)[k] for sign in (1, -1)]
+        up, down = (solid.update(step, None)[0] for step in steps)
+        more, less = (solid.stored(step, stress, None) for step in steps)
+        assert (up - down)[0] / (2 * h) == pytest.approx(tangent[0, :, k], rel=1e-7, abs=1e-8)
+        assert (more - less)[0] / (2 * h) == pytest.approx(stress[0, k], rel=1e-7)
+    cos, sin = np.cos(0.7), np.sin(0.7)
+    turned = np.array([[cos - 1, cos - 1, -sin, sin]])
+    assert solid.true_stress(turned, solid.update(turned, None)[0], None) == pytest.approx(
+        0, abs=1e-12
+    )

@@ -1,0 +1,81 @@
+"""The compressible neo-Hookean solid of codes for large strain, in plane strain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.materials.elasticity import Elastic
+from archord.materials.material import Material, State
+
+# of gradients [xx, yy, xy, yx]: the derivative of the cofactors (F_yy, F_xx, -F_yx, -F_xy)
+_COFACTORS = np.array([[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, -1], [0, 0, -1, 0]], dtype=float)
+_ONE = np.array([1.0, 1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class NeoHooke(Material):
+    """Energy ``mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2``, as of Kratos and GetFEM.
+
+    Nominal stresses ``(n, 4)`` of displacement gradients ``(n, 4)`` are ``P = mu F + (lambda ln J -
+    mu) F^-T``.
+    """
+
+    E: float
+    nu: float
+    finite: ClassVar[bool] = True
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lame's constants ``(lambda, mu)``."""
+        return Elastic(self.E, self.nu).lame
+
+    @property
+    def elastic_tangent(self) -> Array:
+        """The moduli ``(3, 3)`` of small strains."""
+        return Elastic(self.E, self.nu).elastic_tangent
+
+    def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
+        """Nominal stress ``(n, 4)``, its derivative ``(n, 4, 4)`` and the state; not a number at
+        points that are turned inside out."""
+        lam, mu = self.lame
+        F, J, inverse = _deformation(strain)
+        k = lam * np.log(J) - mu
+        stress = mu * F + k[:, None] * inverse
+        dyads = inverse[:, :, None] * inverse[:, None, :]
+        tangent = (lam - k)[:, None, None] * dyads + (k / J)[:, None, None] * _COFACTORS
+        return stress, tangent + mu * np.eye(4), state
+
+    def energy(self, stress: Array) -> Array:
+        """Energy density ``(n,)`` of stresses ``(n, 4)`` of small strains."""
+        return Elastic(self.E, self.nu).energy(stress)
+
+    def stored(self, strain: Array, stress: Array, state: State) -> Array:
+        """Energy density ``(n,)`` per undeformed volume."""
+        lam, mu = self.lame
+        F, J, _ = _deformation(strain)
+        log = np.log(J)
+        return mu / 2 * ((F**2).sum(axis=1) - 2) - mu * log + lam / 2 * log**2
+
+    def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
+        """Cauchy's stress ``(n, 4)``: ``P F^T / J``, and ``lambda ln J / J`` out of the plane."""
+        F, J, _ = _deformation(strain)
+        F_xx, F_yy, F_xy, F_yx = F.T
+        P_xx, P_yy, P_xy, P_yx = stress.T
+        xx = P_xx * F_xx + P_xy * F_xy
+        yy = P_yx * F_yx + P_yy * F_yy
+        zz = self.lame[0] * np.log(J)
+        xy = P_xx * F_yx + P_xy * F_yy
+        return np.stack([xx, yy, zz, xy], axis=1) / J[:, None]
+
+
+def _deformation(gradient: Array) -> tuple[Array, Array, Array]:
+    """``F`` ``(n, 4)``, its determinant ``(n,)`` and its inverse, transposed, ``(n, 4)``."""
+    F = gradient + _ONE
+    cofactors = F @ _COFACTORS
+    J = F[:, 0] * F[:, 1] - F[:, 2] * F[:, 3]
+    J = np.where(J > 0, J, np.nan)
+    return F, J, cofactors / J[:, None]
