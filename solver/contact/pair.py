@@ -4,7 +4,7 @@ points."""
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,15 @@ from archord.solver.contact.slip import SlipOrigin
 from archord.solver.contact.surface import RigidSurface, Surface
 
 Start = Literal["anywhere", "near", "held"]
+
+
+class Answers(NamedTuple):
+    """The law's answers at ``m`` points, on which the tangent depends linearly (see `Pair`)."""
+
+    active: np.ndarray  # (m,)
+    traction: Array  # (m, d)
+    by_trial: Array  # (m, d, d)
+    by_opening: Array | None  # (m, d, d)
 
 
 class Pair:
@@ -118,6 +127,22 @@ class Pair:
         if self.counts_slip:  # what has no partner has no history
             self.trial[~self.projection.found, 0] = -1.0
         self._answer(self.opening, self.trial)
+        self._evaluated = self.answers()
+
+    def answers(self) -> Answers:
+        """The law's answers, which `expect` may have changed since the last evaluation."""
+        return Answers(self.active, self.traction, self.by_trial, self.by_opening)
+
+    def changes_of_answers(self) -> Answers:
+        """By how much, ``active`` where they have."""
+        before = self._evaluated
+        by_trial = self.by_trial - before.by_trial
+        has_changed = by_trial.any(axis=(1, 2)) | (self.active != before.active)
+        by_opening = None
+        if self.by_opening is not None and before.by_opening is not None:
+            by_opening = self.by_opening - before.by_opening
+            has_changed |= by_opening.any(axis=(1, 2))
+        return Answers(has_changed, self.traction - before.traction, by_trial, by_opening)
 
     def _turn_frames(self) -> None:
         """The frames at the normals of the partners."""

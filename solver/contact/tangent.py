@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.patches import PatchProjection
 from archord.kernels.compiled import library, pointer, structure
-from archord.solver.contact.pair import Pair
+from archord.solver.contact.pair import Answers, Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import Surface
 
@@ -24,6 +24,13 @@ _SOURCES = {  # by the dimension
     2: Path(__file__).with_name("contact_tangent.c"),
     3: Path(__file__).with_name("space_tangent.c"),
 }
+
+
+class Filled(NamedTuple):
+    """Blocks that points fill, where others are zero."""
+
+    at: np.ndarray  # (k,) numbers of their places
+    values: Array  # (k, d, d)
 
 
 class ContactTangent:
@@ -46,13 +53,35 @@ class ContactTangent:
 
     def blocks(self) -> Array:
         """Derivative ``(n, d, d)`` of the residual at the last evaluation."""
-        d = self._block_size
-        values = np.zeros((len(self.rows), d, d))
+        values = np.zeros((len(self.rows), self._block_size, self._block_size))
         for reach, keys, slots in zip(self._reaches, self._keys, self._slots, strict=True):
             place = np.searchsorted(keys, reach.point_keys()).astype(np.int32)
-            side = _side(reach.pair)
+            side = _side(reach.pair, reach.pair.answers())
             self._kernels.contact_tangent(side, *map(pointer, (place, slots, values)))
         return values
+
+    def filled(self, *, by_changes: bool = False) -> Filled:
+        """The same where points carry something; or what the branches add to it to which points
+        have gone over since the last evaluation."""
+        is_filled = np.zeros(len(self.rows), dtype=bool)
+        met = []
+        for reach, keys, slots in zip(self._reaches, self._keys, self._slots, strict=True):
+            answers = reach.pair.changes_of_answers() if by_changes else reach.pair.answers()
+            place = np.searchsorted(keys, reach.point_keys())
+            used = np.unique(place[answers.active])
+            slots_of_used = slots.reshape(len(keys), -1)[used] if len(used) else slots[:0]
+            is_filled[slots_of_used] = True
+            # points that carry nothing may have any place
+            place = np.minimum(np.searchsorted(used, place), max(len(used) - 1, 0))
+            met.append((reach.pair, answers, place.astype(np.int32), slots_of_used))
+        at = np.flatnonzero(is_filled)
+        number = np.zeros(len(self.rows), dtype=np.int32)
+        number[at] = np.arange(len(at))
+        values = np.zeros((len(at), self._block_size, self._block_size))
+        for pair, answers, place, slots in met:
+            side = _side(pair, answers)
+            self._kernels.contact_tangent(side, *map(pointer, (place, number[slots], values)))
+        return Filled(at, values)
 
 
 def _numbered(
@@ -96,12 +125,13 @@ def point_rates(pair: Pair, u: Array, levels: Array) -> tuple[Array, Array]:
     trial = np.empty_like(pair.trial)
     opening = np.empty_like(pair.trial)
     arrays = own, partner, trial, opening
-    library(_SOURCES[u.shape[1]]).point_rates(_side(pair), *map(pointer, arrays))
+    library(_SOURCES[u.shape[1]]).point_rates(_side(pair, pair.answers()), *map(pointer, arrays))
     return trial, opening
 
 
-def _side(pair: Pair) -> Any:
-    """The structure ``Side`` for the kernels, of arrays that the pair and its surface hold."""
+def _side(pair: Pair, answers: Answers) -> Any:
+    """The structure ``Side`` for the kernels, of the ``answers`` and of arrays that the pair and
+    its surface hold."""
     surface = pair.surface
     partners = pair.projection
     n, q, a = surface.shape.shape
@@ -121,11 +151,11 @@ def _side(pair: Pair) -> Any:
         "weight": surface.weight,
         "share": pair.share,
         "gamma": pair.gamma,
-        "active": pair.active,
-        "traction": pair.traction,
-        "by_trial": pair.by_trial,
-        "has_by_opening": int(pair.by_opening is not None),
-        "by_opening": pair.by_trial if pair.by_opening is None else pair.by_opening,
+        "active": answers.active,
+        "traction": answers.traction,
+        "by_trial": answers.by_trial,
+        "has_by_opening": int(answers.by_opening is not None),
+        "by_opening": answers.by_trial if answers.by_opening is None else answers.by_opening,
         "stress_vector": pair.stress_vector,
         "moduli": pair.moduli,
         "separation": pair.separation,

@@ -96,9 +96,9 @@ class LinearSystem:
             change = self._go_over(*self.unknowns.change(increment))
         if change is None:
             return None
-        matrix, blocks = self.tangent.revised()
+        matrix, of_contact = self.tangent.revised()
         if self.border:
-            matrix = Border(matrix, *self.tangent.border(blocks)).matrix()
+            matrix = Border(matrix, *self.tangent.border(of_contact)).matrix()
         return matrix, change
 
     def _revise_condensed(self, increment: Array) -> Array | None:

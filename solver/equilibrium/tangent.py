@@ -15,8 +15,10 @@ from archord.kernels.blocks import add_blocks
 from archord.kernels.compat import ghosted_vector
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.assembly import assemble, matrix
+from archord.solver.contact.tangent import Filled
 from archord.solver.equilibrium.evaluation import Evaluation
-from archord.solver.linear.condensed import Condensed, filled
+from archord.solver.linear.condensed import Condensed
+from archord.solver.linear.strategy import Sum
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 _SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
@@ -66,8 +68,7 @@ class TangentMatrix:
         self._bcs = [self._held(axis) for axis in range(self.dimension)]
         self._prescribed, self._rates = self._prescribed_rates()
         self.A = PETSc.Mat()
-        self._elastic = PETSc.Mat()  # the constant part, with room for all
-        self._revised = PETSc.Mat()
+        self._elastic = PETSc.Mat()  # the constant part, with room for all, unless all is constant
         self.condensed: Condensed | None = None
         if revise is not None:
             with timer(BEFORE_SOLVING):
@@ -113,14 +114,14 @@ class TangentMatrix:
         contact alone."""
         tangent = self.contact.tangent
         self._slots = self._slots_of(tangent.rows, tangent.columns)
-        self._contact_blocks: Array = np.zeros((len(tangent.rows), self.dimension, self.dimension))
+        nothing: Array = np.zeros((0, self.dimension, self.dimension))
+        self._of_contact = Filled(np.zeros(0, dtype=np.int64), nothing)
         if self.condensed is not None:
             inside = self._slots.in_matrix
             self.condensed.occupy(tangent.rows[inside], tangent.columns[inside])
             return
         self.A.destroy()
         self._elastic.destroy()
-        self._revised.destroy()
         rows, columns = self.contact.pattern()
         mine = (rows >= self._start) & (rows < self._start + self._n_owned)
         rows = rows[mine]
@@ -130,7 +131,8 @@ class TangentMatrix:
         add_blocks(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
         self.A.assemble()
         self.A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
-        self._elastic = self.A.copy()
+        if self.bulk.plastic or self.bulk.finite or self.springs:
+            self._elastic = self.A.copy()
 
     def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
         in_matrix = (rows < self._size) & (columns < self._size)
@@ -147,13 +149,13 @@ class TangentMatrix:
         is_free = self._prescribed[at] != dofs
         return is_free, np.where(is_free[..., None], 0.0, self._rates[at])
 
-    def _add_contact(self, A: PETSc.Mat, blocks: Array) -> None:
-        """Add ``blocks`` ``(k, d, d)`` in the slots of the contact to ``A``."""
+    def _add_contact(self, A: PETSc.Mat, of_contact: Filled) -> None:
+        """Add what the contact fills to ``A``."""
         tangent = self.contact.tangent
-        kept = filled(blocks)
-        kept = kept[self._slots.in_matrix[kept]]
-        values = blocks[kept] * self._slots.is_free[kept]
-        add_blocks(A, tangent.rows[kept], tangent.columns[kept], values)
+        inside = self._slots.in_matrix[of_contact.at]
+        at = of_contact.at[inside]
+        values = of_contact.values[inside] * self._slots.is_free[at]
+        add_blocks(A, tangent.rows[at], tangent.columns[at], values)
         A.assemble()
 
     def update(self, *, factorise: bool = True) -> None:
@@ -163,48 +165,56 @@ class TangentMatrix:
             return
         self.factorisations += factorise
         with self.timer("assemble bulk"):
-            self._elastic.copy(self.A, _SAME)
+            if self._elastic:
+                self._elastic.copy(self.A, _SAME)
+            else:
+                at, values = self._of_contact
+                self._add_contact(self.A, Filled(at, -values))
             if self.springs:
                 self.A.axpy(1.0, self.springs.of_free, _SUBSET)
             self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
-            self._contact_blocks = self.contact.tangent.blocks()
-            self._add_contact(self.A, self._contact_blocks)
+            self._of_contact = self.contact.tangent.filled()
+            self._add_contact(self.A, self._of_contact)
 
     def _update_condensed(self, condensed: Condensed) -> None:
         self.factorisations = 1
         with self.timer("assemble contact"):
-            self._contact_blocks = self.contact.tangent.blocks()
-            inside = self._slots.in_matrix
-            condensed.update(self._contact_blocks[inside] * self._slots.is_free[inside])
-
-    def revised(self) -> tuple[PETSc.Mat, Array]:
-        """``A`` for the branches that contact points are on now, beside ``A`` of the last `update`
-        and valid until the next call; and the contact's blocks."""
-        with self.timer("assemble contact"):
             blocks = self.contact.tangent.blocks()
-            if not self._revised:
-                self._revised = self.A.duplicate()
-            self.A.copy(self._revised, _SAME)
-            self._add_contact(self._revised, blocks - self._contact_blocks)
-        return self._revised, blocks
+            inside = self._slots.in_matrix
+            condensed.update(blocks[inside] * self._slots.is_free[inside])
 
-    def border(self, blocks: Array | None = None) -> tuple[Array, Array, Array]:
+    def revised(self) -> tuple[PETSc.Mat, list[Filled]]:
+        """``A`` for the branches that contact points are on now, valid until the next `update`; and
+        what the contact fills, in parts."""
+        with self.timer("assemble contact"):
+            changes = self.contact.tangent.filled(by_changes=True)
+            change = PETSc.Mat().create(self.A.comm)
+            change.setSizes(self.A.getSizes(), bsize=self.dimension)
+            change.setType("aij")
+            change.setUp()
+            self._add_contact(change, changes)
+        return Sum(self.A, change).matrix(), [self._of_contact, changes]
+
+    def border(self, of_contact: list[Filled] | None = None) -> tuple[Array, Array, Array]:
         """The border of the matrix, of the ``m`` unknown levels: derivatives ``B`` ``(n_owned dofs,
         m)`` of the residual by the levels, ``C``, alike, of what the levels' equations prescribe by
         the displacements, and ``D`` ``(m, m)``, of all ranks, by the levels.
 
-        With the contact's ``blocks``, without them the blocks of the last `update`. The bulk's part
+        With what the contact fills, in parts, without them as in the last `update`. The bulk's part
         of B and C is the same where its tangent is symmetric, as of all materials without recovery
         of back stresses.
         """
-        blocks = self._contact_blocks if blocks is None else blocks
+        parts = of_contact or [self._of_contact]
+        at = np.concatenate([part.at for part in parts])
+        blocks = np.concatenate([part.values for part in parts])
+        tangent = self.contact.tangent
         drives = self.drives
         m = len(drives.unknown)
         load = drives.unknown_load.reshape(m, -1)
         rate = drives.unknown_rate[:, : self._n_owned].reshape(m, -1)
-        row_rate = self._slots.row_rate
-        on_rows = np.einsum("nij,njm->nim", blocks, self._slots.column_rate)
+        row_rate = self._slots.row_rate[at]
+        on_rows = np.einsum("nij,njm->nim", blocks, self._slots.column_rate[at])
         on_columns = np.einsum("nim,nij->njm", row_rate, blocks)
         D = np.tensordot(row_rate, on_rows, ((0, 1), (0, 1))) - rate @ load.T + load @ rate.T
         B = -load.T
@@ -212,12 +222,8 @@ class TangentMatrix:
         for level in range(m):
             of_bulk = self._bulk_along(level)
             D[:, level] += rate @ of_bulk
-            B[:, level] += self._with_contact(
-                of_bulk, self.contact.tangent.rows, on_rows[..., level]
-            )
-            C[:, level] += self._with_contact(
-                of_bulk, self.contact.tangent.columns, on_columns[..., level]
-            )
+            B[:, level] += self._with_contact(of_bulk, tangent.rows[at], on_rows[..., level])
+            C[:, level] += self._with_contact(of_bulk, tangent.columns[at], on_columns[..., level])
         D = self.V.mesh.comm.allreduce(D)
         if self.springs:
             D += np.diag(self.springs.of_levels[drives.unknown] * drives.weight**2)

@@ -70,3 +70,22 @@ class Product:
         strategy = self._strategy()
         assert strategy is not None  # it holds the matrix
         strategy.mult(matrix, x, y)
+
+
+class Sum:
+    """Python context of the matrix ``A`` and a ``change`` of it. Collective."""
+
+    def __init__(self, A: PETSc.Mat, change: PETSc.Mat) -> None:
+        self.A = A
+        self.change = change
+
+    def matrix(self) -> PETSc.Mat:
+        """The matrix."""
+        found = PETSc.Mat().createPython(self.A.getSizes(), context=self, comm=self.A.comm)
+        found.setUp()
+        return found
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y = (A + change) x``, called by PETSc."""
+        self.A.mult(x, y)
+        self.change.multAdd(x, y, y)
