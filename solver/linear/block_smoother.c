@@ -1,7 +1,12 @@
 #include "block_smoother.h"
+#include <math.h>
 #include <string.h>
 
 typedef float Four __attribute__((vector_size(16)));
+
+/* Ranks smooth at once: with the sizes of all ghosts' entries on the diagonal that converges whatever the matrix (Baker,
+ * Falgout, Kolev and Yang 2011). An eighth of them is enough at nu = 0.49, and costs few iterations elsewhere. */
+static const float PART = 0.125f;
 
 /* y += B x. Columns of three are read as four, of which the last is not used. */
 static inline void add_product(int d, const float *B, const float *x, float *y)
@@ -62,6 +67,18 @@ static void put(BlockRows *A, int32_t at, int32_t column, const double *block)
     for (int k = 0; k < size; k++) A->block[(int64_t)size * at + k] = (float)block[k];
 }
 
+/* Add a part of the sizes of the entries of ghosts to the diagonal. */
+static void stiffen(BlockRows *A, int32_t i, int32_t end)
+{
+    const int d = A->d;
+    float *added = A->added + d * i, *middle = A->block + (int64_t)d * d * A->middle[i];
+    for (int r = 0; r < d; r++) {
+        added[r] = 0;
+        for (int64_t k = (int64_t)d * A->border[i]; k < (int64_t)d * end; k++) added[r] += PART * fabsf(A->block[d * k + r]);
+        middle[(d + 1) * r] += added[r];
+    }
+}
+
 void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values,
                  const int32_t *other_offsets, const int32_t *other_columns, const double *other_values)
 {
@@ -77,6 +94,7 @@ void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, c
         A->border[i] = at;
         for (int32_t k = other_offsets[i]; k < other_offsets[i + 1]; k++)
             if (!is_zero(size, other_values + size * k)) put(A, at++, A->n + other_columns[k], other_values + size * k);
+        stiffen(A, i, at);
         invert(A->d, A->block + size * A->middle[i], A->inverse + size * i);
     }
     A->start[A->n] = at;
@@ -102,7 +120,7 @@ static inline void from_zero(const BlockRows *A, const int d, const double *b, f
     for (int32_t i = 0; i < n; i++) {
         float sum[4] = {0};
         row_times(A, d, A->start[i], A->middle[i], change, sum);
-        for (int r = 0; r < d; r++) residual[d * i + r] = sum[r];
+        for (int r = 0; r < d; r++) residual[d * i + r] = sum[r] + A->added[d * i + r] * x[d * i + r];
     }
 }
 
@@ -132,7 +150,7 @@ static inline void both_ways(const BlockRows *A, const int d, const double *b, f
         float sum[4] = {0}, found[4] = {0};
         row_times(A, d, A->start[i], A->middle[i], x, sum);
         row_times(A, d, A->middle[i] + 1, A->start[i + 1], x, sum);
-        for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] - sum[r];
+        for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] + A->added[d * i + r] * x[d * i + r] - sum[r];
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         memcpy(x + d * i, found, d * sizeof(float));
     }

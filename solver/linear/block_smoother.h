@@ -9,6 +9,7 @@ typedef struct {
     int32_t *border; /* (n) */
     int32_t *column; /* (k) */
     float *block;    /* (k d d + 1) */
+    float *added;    /* (n, d) part of the sizes of the ghosts' entries, which the diagonal blocks have more */
     float *inverse;  /* (n d d) of the diagonal blocks, by columns */
 } BlockRows;
 

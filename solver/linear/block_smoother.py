@@ -59,6 +59,7 @@ class BlockSmoother:
             "border": np.zeros(n, dtype=np.int32),
             "column": np.zeros(n_blocks, dtype=np.int32),
             "block": np.zeros(n_blocks * d**2 + 1, dtype=np.float32),
+            "added": np.zeros((n, d), dtype=np.float32),
             "inverse": np.zeros(n * d**2 + 1, dtype=np.float32),
         }
         self._rows = structure(_SOURCE, "BlockRows", self._members)

@@ -4,8 +4,8 @@ The first level below the displacements are the linear displacements on the same
 Its matrix is the Galerkin product ``P^T A P`` with the interpolation ``P``. Aggregates of its nodes
 make the levels below, with the rigid motions as near null space (smoothed aggregation; Vanek,
 Mandel and Brezina 1996). Sweeps of Gauss-Seidel smooth the displacements, Chebyshev polynomials the
-levels below, so that the number of iterations grows slowly with the mesh, and hardly with the
-ranks.
+levels below, polynomials of sweeps the first of them, so that the number of iterations grows slowly
+with the mesh, and hardly with the ranks.
 
 Prescribed displacements are rows and columns of the unit matrix. The interpolation leaves them out,
 but for the linear displacement at the same node. So the product has unit rows there, too.
@@ -37,6 +37,7 @@ _SUPERLINEAR = 2.0  # power of the last reduction of the residual of Newton's me
 ACCURATE = 1e-10  # the same, where a solve stands for a factorisation
 _MARGIN = 0.01  # of the goal: what the last linear system may leave, as reactions fall meanwhile
 _SMOOTHING = 5  # degree of the polynomials
+_SWEEPS = 2  # degree of the polynomials of sweeps, of the linear displacements
 _GROWN = 2.0  # entry of the diagonal over what it was, above which polynomials may diverge
 _SOFTENED = 0.05  # part of the diagonal that may have shrunk as much
 _FEWEST_COARSE = 100  # equations that are factorised on the last level
@@ -131,8 +132,7 @@ class Multigrid(Strategy):
         if not self._is_ready:
             self.coarse.setNearNullSpace(_near_null_space(self.coarse, self._motions))
             self._right, self._found = self.coarse.createVecs()
-            self._below.setOperators(self.coarse)
-            _use_aggregates(self._below)
+            self._below = _aggregates(self.coarse)
             self._is_ready = True
         self._set_up_below()
 
@@ -149,6 +149,12 @@ class Multigrid(Strategy):
             self._diagonal = diagonal
         self._below.setReusePreconditioner(bool(will_do))
         self._below.setUp()
+
+    def level_sizes(self) -> list[int]:
+        """Equations of the levels below the displacements, finest first, once they are made."""
+        levels = range(self._below.getMGLevels())
+        smoothers = [self._below.getMGSmoother(level) for level in levels]
+        return [smoother.getOperators()[0].getSize()[0] for smoother in reversed(smoothers)]
 
     def _update(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
         """Take the values of the matrix to the smoother and to the level below."""
@@ -175,19 +181,39 @@ class Multigrid(Strategy):
         x.array[:] = self._smoother.again(r.array_r, self._correction.array_r)
 
 
-def _use_aggregates(pc: PETSc.PC) -> None:
-    """Let ``pc`` be multigrid by smoothed aggregation."""
-    # an aggregate with fewer dofs than rigid motions leaves zeros on the diagonal: no blocks
-    aggregation = {
-        "mg_levels_ksp_type": "chebyshev",
-        "mg_levels_ksp_max_it": _SMOOTHING,
-        "mg_levels_pc_type": "jacobi",
+def _aggregates(A: PETSc.Mat) -> PETSc.PC:
+    """Multigrid by smoothed aggregation for ``A``, whose levels are made twice, as options tell
+    levels by their numbers, and the finest one has the last."""
+    # an aggregate with fewer dofs than rigid motions leaves zeros on the diagonal: no blocks, and
+    # no sweeps but on the finest level
+    options = {
         "pc_type": "gamg",
         "pc_gamg_threshold": _WEAK,
         "pc_gamg_coarse_eq_limit": _FEWEST_COARSE,
         "pc_gamg_reuse_interpolation": True,
     }
-    _use_options(pc, _COARSE, aggregation)
+    levels = _set_up(A, _COARSE, options)
+    finest = levels.getMGLevels() - 1
+    if finest == 0:
+        return levels
+    levels.destroy()
+    for level in range(1, finest + 1):
+        sweeps = level == finest
+        options |= {
+            f"mg_levels_{level}_ksp_type": "chebyshev",
+            f"mg_levels_{level}_ksp_max_it": _SWEEPS if sweeps else _SMOOTHING,
+            f"mg_levels_{level}_pc_type": "sor" if sweeps else "jacobi",
+        }
+    # PETSc takes but one number in an option's name for a level's
+    return _set_up(A, f"{_COARSE}{finest * 'i'}_", options)
+
+
+def _set_up(A: PETSc.Mat, prefix: str, options: Mapping[str, Any]) -> PETSc.PC:
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(A)
+    _use_options(pc, prefix, options)
+    pc.setUp()
+    return pc
 
 
 def _use_options(solver: PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> None:
