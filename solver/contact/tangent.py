@@ -72,8 +72,8 @@ class ContactTangent:
             slots_of_used = slots.reshape(len(keys), -1)[used] if len(used) else slots[:0]
             is_filled[slots_of_used] = True
             # points that carry nothing may have any place
-            place = np.minimum(np.searchsorted(used, place), max(len(used) - 1, 0))
-            met.append((reach.pair, answers, place.astype(np.int32), slots_of_used))
+            place = np.searchsorted(used, place).clip(max=max(len(used) - 1, 0)).astype(np.int32)
+            met.append((reach.pair, answers, place, slots_of_used))
         at = np.flatnonzero(is_filled)
         number = np.zeros(len(self.rows), dtype=np.int32)
         number[at] = np.arange(len(at))
