@@ -33,7 +33,7 @@ def solved(chamfer: float, folder: Path) -> archord.Run:
 def pressure_along(run: archord.Run) -> np.ndarray:
     """Mean pressures of the strips of the pin."""
     pin = run.unrolled("pin")
-    load = pin.angle[pin.pressure.argmax()]
+    load = 180.0 * np.round(pin.angle[pin.pressure.argmax()] / 180.0)
     near = np.abs((pin.angle - load + 180) % 360 - 180) < NEAR
     strip = np.digitize(pin.along[near], ENDS) - 1
     inside = (strip >= 0) & (strip < len(ENDS) - 1)
