@@ -41,7 +41,8 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
 
     def excess(b: float) -> float:
         b2 = b * b
-        return (2 - (1 + alpha) * (np.log1p(b2) + 2 * b2**2)) / (2 * np.pi * b2 * (1 + b2)) - load
+        closing = (1 + alpha) * (np.log1p(b2) + 2 * b2**2)
+        return (2 - closing) / (2 * np.pi * b2 * (1 + b2)) - load
 
     eps = 2 * np.arctan(brentq(excess, 1e-6, 1e3))
     peak = persson_pressure(LawJoint(1.0, DR, 1.0), np.array(1.0), np.array(eps), np.array(0.0))

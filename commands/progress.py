@@ -153,7 +153,8 @@ class Progress:
     def step(self, m: Any) -> None:
         """Show an accepted output step."""
         cells = [f"{column.value(m):{column.form}}" for column in self.columns]
-        self.print("  ".join([f"{m.step:5d}", *cells, f"{m.iterations:10d}  {m.cutbacks:8d}"]))
+        cost = [f"{m.iterations:10d}", f"{m.cutbacks:8d}"]
+        self.print("  ".join([f"{m.step:5d}", *cells, *cost]))
         self._done = m.step
         self._substep = 1
         self._warn_of_long(m)

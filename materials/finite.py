@@ -178,8 +178,9 @@ class LargeStrain(Material):
         """Cauchy's stress ``(n, n_stress)`` after an update to the gradients ``strain``, the
         nominal ``stress`` and ``state``."""
         logarithm = _logarithm(strain)
-        T = self._logarithmic(logarithm.strain, state)[0]
-        J = np.exp((1 - 2 * self.inner.nu) / self.inner.E * T[:, :3].sum(axis=1))
+        T, _, _ = self._logarithmic(logarithm.strain, state)
+        compliance = (1 - 2 * self.inner.nu) / self.inner.E
+        J = np.exp(compliance * T[:, :3].sum(axis=1))
         return logarithm.kirchhoff(stress, T) / J[:, None]
 
 
@@ -343,10 +344,12 @@ class Logarithm:
         stretch = 1 + self._gradient[:, 4]
         in_plane = [0, 1, 3]
         P_tt = T[:, 2] / stretch
+        by_hoop = np.einsum("nik,ni->nk", slope, moduli[:, in_plane, 2])
+        of_hoop = np.einsum("ni,nik->nk", moduli[:, 2, in_plane], slope)
         whole = np.empty((len(T), 5, 5))
         whole[:, :4, :4] = tangent
-        whole[:, :4, 4] = np.einsum("nik,ni->nk", slope, moduli[:, in_plane, 2]) / stretch[:, None]
-        whole[:, 4, :4] = np.einsum("ni,nik->nk", moduli[:, 2, in_plane], slope) / stretch[:, None]
+        whole[:, :4, 4] = by_hoop / stretch[:, None]
+        whole[:, 4, :4] = of_hoop / stretch[:, None]
         whole[:, 4, 4] = (moduli[:, 2, 2] / stretch - P_tt) / stretch
         return np.column_stack([stress, P_tt]), whole
 

@@ -185,7 +185,8 @@ class TabularHardening(Hardening):
     def work(self, peeq: Array) -> Array:
         """Plastic work density."""
         at, stress = self._table
-        below = np.append(0.0, np.cumsum(np.diff(at) * (stress[1:] + stress[:-1]) / 2))
+        pieces = np.diff(at) * (stress[1:] + stress[:-1]) / 2
+        below = np.append(0.0, np.cumsum(pieces))
         line = np.searchsorted(at, peeq, side="right") - 1
         return below[line] + (peeq - at[line]) * (stress[line] + self.stress(peeq)) / 2
 

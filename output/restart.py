@@ -121,8 +121,13 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     before = parse_any(data, str(path))
     _same_but_for_the_load(folder, before, scene)
     n = checkpoint.step
-    reached, wanted = np.array(before.travelled[:n]), np.array(scene.travelled[:n])
-    if len(wanted) < n or (np.abs(wanted - reached).max(0) > _SAME * np.abs(reached).max(0)).any():
+    reached = np.array(before.travelled[:n])
+    wanted = np.array(scene.travelled[:n])
+    same = len(wanted) == n
+    if same:
+        apart = np.abs(wanted - reached).max(axis=0)
+        same = (apart <= _SAME * np.abs(reached).max(axis=0)).all()
+    if not same:
         said = f"{scene.loading} and its steps must begin as the steps of the run"
         raise InputError(
             f"{path}: its {n} steps are not the first ones of the scene's path; {said}."

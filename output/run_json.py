@@ -144,11 +144,12 @@ class Report:
         before = self._before.get("totals", {})
         factorisations = self.system.equilibrium.linear.tangent.factorisations
         evaluations = self.system.timer.counts.get("return mapping", 0)
+        krylov = [step.get("krylov_iterations", 0) for step in self.content["steps"]]
         return {
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
             "factorisations": factorisations + before.get("factorisations", 0),
-            "krylov_iterations": sum(s.get("krylov_iterations", 0) for s in self.content["steps"]),
+            "krylov_iterations": sum(krylov),
             "residual_evaluations": evaluations + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.steps),
         }

@@ -110,7 +110,9 @@ def line_load(
     """The load of an interaction with these ``profiles`` along an ``axis``. Their ``shares`` are
     negative where the force on the surface is opposite. A piece of a facet has its force spread
     evenly over the length of the facet."""
-    low, high, force = [], [], []
+    low = []
+    high = []
+    force = []
     for profile, share in zip(profiles, shares, strict=True):
         force.append(share * np.einsum("nq,nqi->ni", profile.weight, profile.traction))
         _, _, ends = axis.cylindrical(profile.corners)
@@ -118,7 +120,8 @@ def line_load(
         high.append(ends.max(axis=1))
     begin = np.concatenate(low)[:, None]
     end = np.concatenate(high)[:, None]
-    edges = np.linspace(begin.min(), end.max(), _PIECES + 1) if along is None else np.array(along)
+    evenly = np.linspace(begin.min(), end.max(), _PIECES + 1)
+    edges = evenly if along is None else np.array(along)
     behind = (edges - begin) / np.maximum(end - begin, np.finfo(float).tiny)
     parts = np.diff(np.clip(behind, 0.0, 1.0), axis=1)
     return LineLoad(edges, parts.T @ np.concatenate(force) / np.diff(edges)[:, None])

@@ -59,13 +59,17 @@ class ChordPressure:
 def chord_coordinate(phi: ArrayLike, eps: float, R: float) -> Array:
     """Chord coordinate ``x`` of the angle ``phi`` [rad], any shape; ``x(0) = 0`` and ``x(eps) =
     l``."""
-    return R * np.cos(eps / 2) * (np.tan(np.asarray(phi) - eps / 2) + np.tan(eps / 2))
+    distance = R * np.cos(eps / 2)  # of the chord from the centre
+    from_middle = np.tan(np.asarray(phi) - eps / 2)
+    return distance * (from_middle + np.tan(eps / 2))
 
 
 def arc_angle(x: ArrayLike, eps: float, R: float) -> Array:
     """Angle ``phi`` [rad] that is projected to ``x``, any shape; the inverse of
     `chord_coordinate`."""
-    return eps / 2 + np.arctan(np.asarray(x) / (R * np.cos(eps / 2)) - np.tan(eps / 2))
+    distance = R * np.cos(eps / 2)
+    from_middle = np.asarray(x) / distance - np.tan(eps / 2)
+    return eps / 2 + np.arctan(from_middle)
 
 
 def chord_projection(

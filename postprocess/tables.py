@@ -40,7 +40,8 @@ def run_text(run: Run, width: int = 0) -> str:
     """State, joint, history, peaks, cost and warnings of a run, in lines no longer than ``width``
     if that is given."""
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
-    said = [f"{words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"]
+    status = words.get(run.status, run.status)
+    said = [f"{status}; {run.steps} of {len(run.scene.targets)} steps"]
     if run.message:
         said.append(run.message)
     state = ": ".join([str(run.folder), *said])
@@ -208,7 +209,8 @@ def peaks_of(run: Run) -> str:
     said = []
     for name, values in columns.items():
         k = int(np.argmax(np.abs(values)))
-        peak = f"{name} = {run.columns[name][k]:.6g} {run.units.get(name, '')}".rstrip()
+        unit = run.units.get(name, "")
+        peak = f"{name} = {run.columns[name][k]:.6g} {unit}".rstrip()
         said.append(f"{peak} at step {steps[k]:g}{_where(run, name, k)}")
     peeq = [values for name, values in columns.items() if name.endswith("peeq_max")]
     yielded = np.flatnonzero(sum(peeq))
@@ -242,7 +244,8 @@ def cost_of(run: Run) -> Iterator[tuple[str, str]]:
     memory = run.summary.get("peak_memory")
     if memory:  # none before the end of a run
         yield "memory", f"{max(memory) / 1e6:.0f} MB at most on a rank"
-    yield "versions", ", ".join(f"{key} {value}" for key, value in run.summary["versions"].items())
+    versions = run.summary["versions"].items()
+    yield "versions", ", ".join(f"{key} {value}" for key, value in versions)
     for warning in first_of_each_kind(run.warnings):
         yield "warning", warning
 

@@ -120,8 +120,9 @@ def _moduli(material: Any) -> dict[str, float]:
     is_thin = getattr(material, "plane", "strain") == "stress"
     nu = across / along if is_thin else across / (along + across)
     nu = min(max(nu, 0.0), _LARGEST_NU)
-    E = along * (1 - nu**2) if is_thin else along * (1 + nu) * (1 - 2 * nu) / (1 - nu)
-    return {"E": E, "nu": nu}
+    if is_thin:
+        return {"E": along * (1 - nu**2), "nu": nu}
+    return {"E": along * (1 + nu) * (1 - 2 * nu) / (1 - nu), "nu": nu}
 
 
 def _own(part: Any) -> dict[str, Any]:

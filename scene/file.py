@@ -144,16 +144,14 @@ def read_targets(data: dict[str, Any], scene: Path) -> None:
     Raises `InputError`.
     """
     load = data.get("load")
-    if (
-        not isinstance(load, dict)
-        or not isinstance(load.get("path"), str)
-        or not load.keys().isdisjoint(LOADS)
-    ):
+    if not isinstance(load, dict):
+        return
+    has_path = isinstance(load.get("path"), str)
+    if not has_path or not load.keys().isdisjoint(LOADS):
         return
     file = scene.parent / load.pop("path")
-    name, *values = [line.strip().strip('"') for line in read_text(file).rstrip().splitlines()] or [
-        ""
-    ]
+    lines = read_text(file).rstrip().splitlines() or [""]
+    name, *values = [line.strip().strip('"') for line in lines]
     if name not in LOADS:
         known = f"{', '.join(LOADS[:-1])} or {LOADS[-1]}"
         raise InputError(

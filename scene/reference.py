@@ -163,15 +163,15 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
         table = Table("key", "unit", "default", "allowed", "what")
         for name, key, schema in _keys(info):
             if known.get(name) != key.description:
-                default = (
-                    "" if schema.get("default") is None else f"`{toml_value(schema['default'])}`"
-                )
-                default = "required" if key.is_required() else default
+                default = ""
+                if schema.get("default") is not None:
+                    default = f"`{toml_value(schema['default'])}`"
+                if key.is_required():
+                    default = "required"
                 table.add(f"`{name}`", schema["unit"], default, _allowed(schema), key.description)
         if table.rows:
-            said = (
-                f"{info.description[0].upper()}{info.description[1:]}{', also' if known else ''}.\n"
-            )
+            also = ", also" if known else ""
+            said = f"{info.description[0].upper()}{info.description[1:]}{also}.\n"
             yield from (f"### {_heading(section, info)}\n", said, table.markdown())
 
 
@@ -201,11 +201,10 @@ def materials() -> str:
         "name", "what", "E", "nu", "yield", "tensile", "hardens from", "to", "at PEEQ", "source"
     )
     for name, m in metals().items():
-        (_, first) = m["hardening"][0]
-        (peeq, last) = m["hardening"][-1]
-        values = (
-            f"{value:g}" for value in (m["E"], m["nu"], m["yield"], m["tensile"], first, last, peeq)
-        )
+        _, first = m["hardening"][0]
+        peeq, last = m["hardening"][-1]
+        numbers = (m["E"], m["nu"], m["yield"], m["tensile"], first, last, peeq)
+        values = [f"{value:g}" for value in numbers]
         table.add(f"`{name}`", m["title"], *values, m["source"])
     return table.markdown()
 
@@ -226,7 +225,5 @@ def _allowed(schema: dict[str, Any]) -> str:
     if "enum" in one:
         return ", ".join(f"`{toml_value(value)}`" for value in one["enum"])
     kind = " or ".join(_KINDS.get(s.get("type"), "table") for s in (one, *more))
-    return (
-        f"{kind} "
-        f"{', '.join(f'{sign} {one[limit]:g}' for limit, sign in _SIGNS.items() if limit in one)}"
-    ).strip()
+    limits = [f"{sign} {one[limit]:g}" for limit, sign in _SIGNS.items() if limit in one]
+    return f"{kind} {', '.join(limits)}".strip()

@@ -65,8 +65,10 @@ def _in_plane(tag: int, gradient: Array) -> Distortion:
     k)``, whose hoop strain, if there is one, comes behind the four in the plane."""
     xx, yy, xy, yx = np.moveaxis(gradient[..., :4], -1, 0)
     hoop = gradient[..., 4:]
-    inside_out = ((1 + xx) * (1 + yy) <= xy * yx) | (hoop <= -1).any(axis=-1)
-    in_plane = np.abs(xx + yy) / 2 + np.hypot(xx - yy, xy + yx) / 2
+    flipped = (1 + xx) * (1 + yy) <= xy * yx
+    inside_out = flipped | (hoop <= -1).any(axis=-1)
+    mean = np.abs(xx + yy) / 2
+    in_plane = mean + np.hypot(xx - yy, xy + yx) / 2
     principal = np.maximum(in_plane, np.abs(hoop).max(axis=-1, initial=0.0))
     turned = np.abs(yx - xy) / 2
     return Distortion(

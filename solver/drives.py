@@ -168,7 +168,8 @@ class Drives:
         lengths = np.sqrt(self.comm.allreduce((motions**2).sum(axis=(1, 2))))
         smallest, modes = np.linalg.eigh(products / np.outer(lengths, lengths))
         if smallest[0] < _DEPENDENT:
-            names = [repr(self.names[level]) for level in means[np.abs(modes[:, 0]) > _PART]]
+            taking_part = np.abs(modes[:, 0]) > _PART
+            names = [repr(self.names[level]) for level in means[taking_part]]
             raise ValueError(
                 f"the mean motions of {' and '.join(names)} cannot be prescribed: "
                 "supports, or each other, decide on them already; "

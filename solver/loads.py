@@ -96,7 +96,8 @@ class Loads:
         arm = x - fem.Constant(mesh, centre)
         lever = np.zeros(d) if mean.point is None else np.array(mean.point) - centre
         by_rotations = self._by_rotations(mean.axis, lever, self._inertia(arm, ds))
-        density = ufl.inner(fem.Constant(mesh, np.eye(d + len(turns))[mean.axis, :d] / length), v)
+        along = np.eye(d + len(turns))[mean.axis, :d]
+        density = ufl.inner(fem.Constant(mesh, along / length), v)
         for rotation, (i, j) in zip(by_rotations, turns, strict=True):
             density += fem.Constant(mesh, rotation) * (arm[i] * v[j] - arm[j] * v[i])
         return self._vector(density * ds)
@@ -107,9 +108,8 @@ class Loads:
         if len(turns) == 1:
             return np.array([[self.integral(ufl.inner(arm, arm) * ds)]])
         d = self.kinematics.dimension
-        second = np.array(
-            [[self.integral(arm[i] * arm[j] * ds) for j in range(d)] for i in range(d)]
-        )
+        axes = range(d)
+        second = np.array([[self.integral(arm[i] * arm[j] * ds) for j in axes] for i in axes])
         return float(np.trace(second)) * np.eye(d) - second
 
     def _by_rotations(self, axis: int, lever: Array, inertia: Array) -> Array:

@@ -205,11 +205,10 @@ class Load:
         said = f"must be {_IN_WORDS}, and None for a pressure, which acts along the normal"
         require_of(self, self.direction in wanted, "direction", said)
         said = "is a circle ((x, y), radius) or a ball ((x, y, z), radius), for a force on cells"
-        is_circle = self.core is None or (
-            len(self.core) == 2 and _is_place(self.core[0]) and _is_number(self.core[1])
-        )
-        alone = self.core is None or self.kind == "force"
-        require_of(self, is_circle and alone, "core", said)
+        if self.core is not None:
+            is_pair = len(self.core) == 2
+            is_circle = is_pair and _is_place(self.core[0]) and _is_number(self.core[1])
+            require_of(self, is_circle and self.kind == "force", "core", said)
 
     @property
     def kind(self) -> str:

@@ -224,7 +224,8 @@ class Prescribed:
         """Where the motions ``a`` and ``b`` meet first, by coordinates, at ``nodes`` of this
         rank; nothing without any."""
         digits = _ALIKE * self._size
-        places = [tuple((np.round(x / digits) * digits + 0.0).tolist()) for x in self._x[nodes]]
+        rounded = np.round(self._x[nodes] / digits) * digits + 0.0
+        places = [tuple(x) for x in rounded.tolist()]
         return [(a, b, min(places))] if places else []
 
     def _everywhere(self, met: list[tuple[int, int, Place]]) -> list[tuple[int, int, Place]]:

@@ -71,7 +71,8 @@ def cylinder_mesh(size: float = 0.05) -> TaggedMesh:
 def plastic_pressure() -> float:
     """The pressure under which the sphere yields up to `PLASTIC_RADIUS`."""
     c = PLASTIC_RADIUS
-    return 2 * SIGY * (math.log(c / INNER) + (1 - c**3 / OUTER**3) / 3)
+    elastic_part = (1 - c**3 / OUTER**3) / 3
+    return 2 * SIGY * (math.log(c / INNER) + elastic_part)
 
 
 def _sphere(material: Any, pressure: float, steps: int) -> Problem:
@@ -131,7 +132,8 @@ def hill_sphere(run: Run) -> Iterator[Compared]:
 def _lame_cylinder(run: Run) -> Iterator[Compared]:
     a2 = INNER**2
     b2 = OUTER**2
-    exact = PRESSURE * INNER * (1 + NU) / E * ((1 - 2 * NU) * a2 + b2) / (b2 - a2)
+    compliance = INNER * (1 + NU) / E
+    exact = PRESSURE * compliance * ((1 - 2 * NU) * a2 + b2) / (b2 - a2)
     fields = run.fields()
     bore = fields.coordinates[:, 0] < INNER + _CLOSE
     ours = fields.displacement[bore, 0].mean()

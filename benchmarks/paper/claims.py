@@ -89,18 +89,21 @@ def chord_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
 def peak_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C2."""
     run = runs.curve("elastic", plane)
-    fit = fit_curve(group([run, runs.curve("elastic", plane, "coarse")]), (0.1, 2.0), "p0").k
+    coarse = runs.curve("elastic", plane, "coarse")
+    fit = fit_curve(group([run, coarse]), (0.1, 2.0), "p0").k
     ratio = columns(tables["fig3"], plane=plane)["p0 R/(E* delta)"]
     off = np.abs(0.85 / ratio - 1)
-    late = float(run.delta[np.flatnonzero(off > GOOD).max(initial=-1) + 1] / run.dR)
+    last_bad = np.flatnonzero(off > GOOD).max(initial=-1)
+    late = float(run.delta[last_bad + 1] / run.dR)
     deviation = float(off[run.delta >= 0.499 * run.dR].max())
-    return (
-        f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; p0 R/(E* delta) goes from "
-        f"{ratio[0]:.3f} at 0.1 "
-        f"dR over {ratio.min():.3f} to {ratio[-1]:.3f} at 2 dR; k = 0.85 is off by up to "
-        f"{deviation:.1%} from "
-        f"0.5 dR on, and within {GOOD:.0%} from {late:.2g} dR on"
-    ), {"": deviation}
+    said = (
+        f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; "
+        f"p0 R/(E* delta) goes from {ratio[0]:.3f} at 0.1 dR "
+        f"over {ratio.min():.3f} to {ratio[-1]:.3f} at 2 dR; "
+        f"k = 0.85 is off by up to {deviation:.1%} from 0.5 dR on, "
+        f"and within {GOOD:.0%} from {late:.2g} dR on"
+    )
+    return said, {"": deviation}
 
 
 def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
@@ -113,13 +116,14 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     joint = LawJoint.from_scene(run.scene)
     laws = [find_law(name) for name in ("johnson", "radzimovsky")]
     ends = [float(law.force(joint, law.limit(joint))) / (run.E_star * run.dR) for law in laws]
-    return (
-        f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR and by up to {deviation:.1%} from 0.2 "
-        "dR on; at 0.5 dR "
-        f"Johnson by {off['johnson'][at]:+.0%}, Radzimovsky as printed by "
-        f"{off['radzimovsky'][at]:+.0%}; their limits "
-        f"are {ends[0]:.4f} and {ends[1]:.3f} E* dR"
-    ), {"": deviation}
+    said = (
+        f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR "
+        f"and by up to {deviation:.1%} from 0.2 dR on; "
+        f"at 0.5 dR Johnson by {off['johnson'][at]:+.0%}, "
+        f"Radzimovsky as printed by {off['radzimovsky'][at]:+.0%}; "
+        f"their limits are {ends[0]:.4f} and {ends[1]:.3f} E* dR"
+    )
+    return said, {"": deviation}
 
 
 def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
@@ -128,11 +132,13 @@ def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
     angle, pressure = runs.run(FULL_YIELD, plane).arc(side="hole").facet_means()
     middle = pressure[angle < 0.5 * run.eps[-1]] / strength(run)
     mean = columns(tables["fig5b"], plane=plane)["P/(A sigY)"][-1]
-    return (
-        f"p0/sigY = {run.p0[-1] / strength(run):.3f}; p over the inner half of the arc "
-        f"{middle.min():.2f} to "
-        f"{middle.max():.2f} sigY; P/A = {mean:.3f} sigY"
-    ), {"": float(max(abs(middle.max() - 1), abs(middle.min() - 1), mean - 1, 0))}
+    low = middle.min()
+    high = middle.max()
+    said = (
+        f"p0/sigY = {run.p0[-1] / strength(run):.3f}; "
+        f"p over the inner half of the arc {low:.2f} to {high:.2f} sigY; P/A = {mean:.3f} sigY"
+    )
+    return said, {"": float(max(abs(high - 1), abs(low - 1), mean - 1, 0))}
 
 
 def plastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
@@ -143,9 +149,8 @@ def plastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     ratios = [
         f"{value:.3f} ({dR} %, {sigma} %)" for value, (dR, sigma) in zip(last, pairs, strict=True)
     ]
-    return f"P/P(eq. 12) at 2 dR: {', '.join(ratios)}", {
-        "": float(np.abs(1 / np.array(last) - 1).max())
-    }
+    off = np.abs(1 / np.array(last) - 1)
+    return f"P/P(eq. 12) at 2 dR: {', '.join(ratios)}", {"": float(off.max())}
 
 
 @dataclass(frozen=True)
@@ -184,14 +189,15 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     low = stress[step - 1, cell]
     high = stress[step, cell]
     share = (yield_stress - low) / np.maximum(high - low, 1e-300)
-    when = np.where(
-        above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf
-    )
+    reached = delta[step - 1] + share * (delta[step] - delta[step - 1])
+    when = np.where(above.any(axis=0), reached, np.inf)
     pin = fields[0].body == BODIES["pin"]
-    radius = np.linalg.norm(centroid + np.where(pin[:, None], [0.0, elastic.dR], 0.0), axis=1)
+    from_centre = centroid + np.where(pin[:, None], [0.0, elastic.dR], 0.0)
+    radius = np.linalg.norm(from_centre, axis=1)
     depth = np.where(pin, elastic.R - radius, radius - elastic.R - elastic.dR) / elastic.R
     angle = np.degrees(np.arctan2(centroid[:, 0], -centroid[:, 1]))
-    when[(depth > near_contact) | ((angle > _CORNER) & (near_contact < 1))] = np.inf
+    in_corner = (angle > _CORNER) & (near_contact < 1)
+    when[(depth > near_contact) | in_corner] = np.inf
     first = int(np.argmin(when))
     found = float(when[first]) / elastic.dR, "pin" if pin[first] else "block"
     return FirstYield(*found, float(depth[first]), float(angle[first]))
@@ -212,9 +218,8 @@ def force_over_angle(runs: Runs, tables: Tables, plane: Plane) -> Found:
     elastic = columns(tables["fig9"], plane=plane, joint="elastic")
     low = elastic["tan(eps/2)"] < 0.4
     unit = np.interp(0.4, elastic["tan(eps/2)"], elastic[Y])
-    law, exact = (
-        np.abs(elastic[name] - elastic[Y])[low].max() / unit for name in (at_angle, "Persson")
-    )
+    off_by = {name: np.abs(elastic[name] - elastic[Y])[low] for name in (at_angle, "Persson")}
+    law, exact = (off.max() / unit for off in off_by.values())
     yielding = columns(tables["fig9"], plane=plane, joint="plastic")
     off = yielding[at_angle] / yielding[Y] - 1
     known = off[np.isfinite(off) & (yielding[X] > 0.5)]

@@ -139,10 +139,12 @@ def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
     chord = read_chord_pressure(run.folder, step, "hole")
     points = read_contact(run.folder, run.scene, step)["hole"].angle.shape[1]
     whole = len(chord.x) // points * points
-    weight, x, py = (
-        v[:whole].reshape(-1, points) for v in (chord.weight, chord.x_over_l, chord.py)
-    )
-    return chord.eps, (weight * x).sum(1) / weight.sum(1), (weight * py).sum(1) / weight.sum(1)
+    at_points = (chord.weight, chord.x_over_l, chord.py)
+    weight, x, py = (values[:whole].reshape(-1, points) for values in at_points)
+    of_facet = weight.sum(axis=1)
+    x_mean = (weight * x).sum(axis=1) / of_facet
+    py_mean = (weight * py).sum(axis=1) / of_facet
+    return chord.eps, x_mean, py_mean
 
 
 def fig2(runs: Runs, plane: Plane) -> list[Part]:
@@ -157,7 +159,8 @@ def fig2(runs: Runs, plane: Plane) -> list[Part]:
         stretch = np.cos(eps / 2) / np.cos(phi - eps / 2) ** 2
         pressure = persson_pressure(LawJoint.from_scene(run.scene), run.P[k], np.array(eps), phi)
         shape = np.where(x < 1, 1 - x**2, 0.0)
-        ratios = {"py/p0": py / run.p0[k], "Persson": pressure * np.cos(phi) / stretch / run.p0[k]}
+        projected = pressure * np.cos(phi) / stretch
+        ratios = {"py/p0": py / run.p0[k], "Persson": projected / run.p0[k]}
         parts.append(
             {
                 "plane": plane,
@@ -198,9 +201,8 @@ def fig5(runs: Runs, plane: Plane) -> list[Part]:
     """Pressure over the yield stress along arc and chord at 2 dR."""
     run = runs.curve(FULL_YIELD, plane)
     eps, x, py = chord_profile(run, len(run.delta))
-    angle, pressure = (
-        v[: len(x)] for v in runs.run(FULL_YIELD, plane).arc(side="hole").facet_means()
-    )
+    hole = runs.run(FULL_YIELD, plane).arc(side="hole")
+    angle, pressure = (means[: len(x)] for means in hole.facet_means())
     sides = ("arc", angle / eps, pressure), ("chord", x, py)
     return [
         {"plane": plane, "on": side, "phi/eps or x/l": at, "p/sigY": p / strength(run)}

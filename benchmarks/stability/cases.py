@@ -132,7 +132,9 @@ def _drawn(blocks: str, triangles: bool) -> Path:
     start = 1
     with file.open("wb") as out:
         for name, (x0, y0, x1, y1, n, m, *polar) in json.loads(blocks).items():
-            x, y = np.meshgrid(np.linspace(x0, x1, n + 1), np.linspace(y0, y1, m + 1))
+            across = np.linspace(x0, x1, n + 1)
+            up = np.linspace(y0, y1, m + 1)
+            x, y = np.meshgrid(across, up)
             if polar:
                 radius = x
                 x = radius * np.cos(np.pi * y)

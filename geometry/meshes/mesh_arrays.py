@@ -229,7 +229,9 @@ def _one_tag_each(
     together, combination = np.unique(within[several], axis=0, return_inverse=True)
     new = given.max(initial=0) + 1 + np.arange(len(together), dtype=np.int32)
     tag[several] = new[combination.ravel()]
-    tags = {name: tuple(np.unique(tag[within[:, k]]).tolist()) for k, name in enumerate(sets)}
+    tags = {}
+    for name, inside in zip(sets, within.T, strict=True):
+        tags[name] = tuple(np.unique(tag[inside]).tolist())
     order = np.argsort(first)
     return distinct[order], tag[order], tags
 

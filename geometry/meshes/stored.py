@@ -81,11 +81,15 @@ def _kind_of(words: dict[str, Any], nodes: int) -> basix.CellType:
 def _require_whole(mesh: MeshArrays) -> None:
     """Raise ValueError for arrays and sets that do not fit together."""
     order_of(mesh.kind, mesh.cells.shape[1])
-    fitting = (
-        mesh.facets.shape[1] == sides_of(mesh.kind, mesh.cells[:1]).shape[1]
+    side = sides_of(mesh.kind, mesh.cells[:1])
+    used = np.concatenate([mesh.cells.ravel(), mesh.facets.ravel(), *mesh.point_sets.values()])
+    is_whole = (
+        len(mesh.cells) > 0
         and len(mesh.cells) == len(mesh.bodies)
         and len(mesh.facets) == len(mesh.tags)
+        and mesh.facets.shape[1] == side.shape[1]
+        and used.min() >= 0
+        and used.max() < len(mesh.x)
     )
-    used = np.concatenate([mesh.cells.ravel(), mesh.facets.ravel(), *mesh.point_sets.values()])
-    if not fitting or not len(mesh.cells) or used.min() < 0 or used.max() >= len(mesh.x):
+    if not is_whole:
         raise ValueError("has cells, edges or sets that do not fit together")

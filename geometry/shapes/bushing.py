@@ -94,9 +94,12 @@ def draw_ring(
         on.facets: sketch.path(body, *places, on=on)
         for on, places in zip(circles, ends, strict=True)
     }
-    across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
+    inner, outer = ends
+    across = [line for k in (0, 2) for line in sketch.path(body, inner[k], outer[k])]
     face = sketch.face(body, **arcs, axis=across)
     layers = (radii[1] - radii[0]) / (size * radii[0])
     if layers < _THIN:
         sketch.parts |= dict.fromkeys(across, max(_LAYERS, layers))
-        sketch.grid[face] = [sketch.point(body, ends[i][j]) for j in (0, 2) for i in (0, 1)]
+        sketch.grid[face] = [
+            sketch.point(body, places[k]) for k in (0, 2) for places in (inner, outer)
+        ]

@@ -87,16 +87,13 @@ def quarter_joint(
         sketch.point("pin", middle)
         arc = sketch.path("pin", bottom, side, on=Circle("pin", middle, 1.0))
         half = sketch.path("pin", side, middle)
-        sketch.face(
-            "pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom)
-        )
+        axis = sketch.path("pin", middle, bottom)
+        sketch.face("pin", **{"pin": arc, "pin top": half, "symmetry": axis})
         if whole_pin:
             sketch.point("pin", top)
             back = sketch.path("pin", side, top, on=Circle("pin back", middle, 1.0))
-            sketch.face(
-                "pin",
-                **{"pin back": back, "symmetry": sketch.path("pin", top, middle), "pin top": half},
-            )
+            axis = sketch.path("pin", top, middle)
+            sketch.face("pin", **{"pin back": back, "symmetry": axis, "pin top": half})
     corners = (hole, 0), (width, 0), (width, -width), (0, -width)
     for place in ((0, 0), bottom, *corners):
         sketch.point("block", place)
@@ -138,26 +135,23 @@ def half_ring(
     from the arcs they grow by ``growth`` per unit of distance, to a third of ``core_radius`` at the
     pin's centre.
     """
-    hole, outer, size, core = (
-        1 + clearance / radius,
-        *(v / radius for v in (outer_radius, element_size, core_radius)),
-    )
+    hole = 1 + clearance / radius
+    outer = outer_radius / radius
+    size = element_size / radius
+    core = core_radius / radius
     sketch = Sketch(("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry"))
 
     def arcs(body: str, name: str, r: float) -> list[int]:
         return sketch.path(body, (0, -r), (r, 0), (0, r), on=Circle(name, (0.0, 0.0), r))
 
     sketch.point("pin", (0, 0))
-    sketch.face(
-        "pin", pin=arcs("pin", "pin", 1.0), symmetry=sketch.path("pin", (0, 1.0), (0, 0), (0, -1.0))
-    )
-    round_lines = {
-        name: arcs("block", name, r) for name, r in (("hole", hole), ("block held", outer))
-    }
-    below, above = (
-        sketch.path("block", *ends) for ends in (((0, -outer), (0, -hole)), ((0, hole), (0, outer)))
-    )
-    sketch.face("block", **round_lines, symmetry=below + above)
+    edge = arcs("pin", "pin", 1.0)
+    axis = sketch.path("pin", (0, 1.0), (0, 0), (0, -1.0))
+    sketch.face("pin", pin=edge, symmetry=axis)
+    edges = {"hole": arcs("block", "hole", hole), "block held": arcs("block", "block held", outer)}
+    below = sketch.path("block", (0, -outer), (0, -hole))
+    above = sketch.path("block", (0, hole), (0, outer))
+    sketch.face("block", **edges, symmetry=below + above)
     from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
     from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
     for body, arc, on_arc in (("pin", "pin", size_ratio * size), ("block", "hole", size)):

@@ -109,7 +109,8 @@ def lines_of(sketch: Sketch, profile: str) -> list[_Line]:
         middle = (start + stop) / 2
         if centre:
             out = middle - centre[0]
-            middle = centre[0] + out * np.linalg.norm(start - centre[0]) / np.linalg.norm(out)
+            radius = np.linalg.norm(start - centre[0])
+            middle = centre[0] + out * radius / np.linalg.norm(out)
         sets = [name for name, members in sketch.lines.items() if number in members]
         lines.append(_Line(middle, sets))
     return lines

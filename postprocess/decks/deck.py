@@ -276,7 +276,8 @@ class _Writer:
             normal = np.zeros_like(x)
             np.add.at(normal, nodes, _outward(self.mesh.x[nodes])[:, None])
             at = np.unique(nodes)
-            x[at] += i.interference * normal[at] / np.linalg.norm(normal[at], axis=1)[:, None]
+            length = np.linalg.norm(normal[at], axis=1)
+            x[at] += i.interference * normal[at] / length[:, None]
         return x
 
     def model_lines(self) -> list[str]:
@@ -391,7 +392,8 @@ class _Writer:
         for drive, forces in self.loads.items():
             total += values[drive] * forces
             ever += np.abs(forces)
-        return [f"{n + 1}, {axis + 1}, {number(total[n, axis])}" for n, axis in np.argwhere(ever)]
+        loaded = np.argwhere(ever)
+        return [f"{n + 1}, {axis + 1}, {number(total[n, axis])}" for n, axis in loaded]
 
 
 def _continued(entries: Iterable[Any]) -> list[str]:

@@ -159,7 +159,8 @@ def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST)
     d = [difference(a, b, largest) for a, b in pairwise(curves)]
     p = highest
     if len(d) > 1 and d[-2] and d[-1]:
-        p = min(highest, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
+        observed = observed_order((1, ratio, ratio**2), d[-1], d[-2])
+        p = min(highest, max(_SLOWEST, observed))
     error = richardson(d[-1], ratio, p)
     if len(d) > 1:
         error = max(error, richardson(d[-2] / ratio**_USUAL, ratio, _HIGHEST))

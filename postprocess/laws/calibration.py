@@ -152,7 +152,8 @@ def fit_curve(
     has too few steps with contact.
     """
     chosen = [(g.run, _selected(g.run, load_range)) for g in groups]
-    if quantity == "p0" and sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen) < 2:
+    n_elastic = sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen)
+    if quantity == "p0" and n_elastic < 2:
         raise InputError(
             f"{groups[0].run.name}: p0 says nothing of k past yield, and fewer than two steps are "
             "before."

@@ -173,9 +173,8 @@ class Law:
         if not reason:
             extremes = (x[beyond].min(), x[beyond].max())
             ends = dict.fromkeys(f"{end / unit:.4g}" for end in extremes)
-            reason = (
-                f"{what} = {' to '.join(ends)} {named} is outside 0 to {limit / unit:.4g} {named}"
-            )
+            given = " to ".join(ends)
+            reason = f"{what} = {given} {named} is outside 0 to {limit / unit:.4g} {named}"
         warnings.warn(LawRangeWarning(f"{self.name}: {reason} (range: {self.range})"), stacklevel=4)
         return np.where(valid, x, np.nan)
 

@@ -77,15 +77,14 @@ def law_table(
         ("eps/deg", "", np.degrees(state.angle), "contact angle" in law.gives),
         ("+-P", "force", state.error * thickness, bool(np.isfinite(state.error).any())),
     ]
-    shown = [
-        (f"{name} [{units[of]}]" if of in units else name, values)
-        for name, of, values, given in columns
-        if given
-    ]
-    rows = np.transpose([values for _, values in shown])
-    table = Table(
-        *(name for name, _ in shown), rows=[[f"{value:.6g}" for value in row] for row in rows]
-    )
+    headings = []
+    shown = []
+    for name, of, values, given in columns:
+        if given:
+            headings.append(f"{name} [{units[of]}]" if of in units else name)
+            shown.append(values)
+    rows = [[f"{value:.6g}" for value in row] for row in np.transpose(shown)]
+    table = Table(*headings, rows=rows)
     return f"{law.name}: {law.title}\n{table}"
 
 
@@ -98,12 +97,17 @@ def draw_laws(
     figure = new_figure(14, 4.4)
     axes = figure.subplots(1, 3)
     for law, state in states:
-        x, y = (state.delta / joint.clearance, state.load / joint.unit)[:: -1 if by_load else 1]
-        for axis, values in zip(
-            axes, (y, state.peak_pressure / joint.E_star, np.degrees(state.angle)), strict=True
-        ):
+        x = state.delta / joint.clearance
+        y = state.load / joint.unit
+        if by_load:
+            x, y = y, x
+        curves = (y, state.peak_pressure / joint.E_star, np.degrees(state.angle))
+        for axis, values in zip(axes, curves, strict=True):
             axis.plot(x, values, label=law.name)
-    over, of = ("δ / ΔR", "P / (E* ΔR)")[:: -1 if by_load else 1]
+    over = "δ / ΔR"
+    of = "P / (E* ΔR)"
+    if by_load:
+        over, of = of, over
     for axis, label in zip(axes, (of, "p0 / E*", "contact semi-angle [°]"), strict=True):
         axis.set(xlabel=over, ylabel=label, xlim=(0, to), ylim=(0, None))
         axis.grid(alpha=0.3)

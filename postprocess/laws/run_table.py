@@ -124,8 +124,9 @@ def _steps_of_loading(steps: RunSteps) -> np.ndarray:
 
 def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> dict[str, Any]:
     """All cubics at the nodes of both ways, by their names in `JointCurve`."""
-    apart = np.abs(back.curve.x[:, None] - loading.x).min(axis=1) > _SAME * loading.x[-1]
-    nodes = np.union1d(loading.x, back.curve.x[apart])
+    distance = np.abs(back.curve.x[:, None] - loading.x).min(axis=1)
+    is_new = distance > _SAME * loading.x[-1]
+    nodes = np.union1d(loading.x, back.curve.x[is_new])
     touched = np.append(k[0], k)
     x = np.append(0.0, steps.x[k])
     root = np.sqrt(steps.y[touched])
@@ -240,7 +241,8 @@ def _unloadings(steps: RunSteps, k: np.ndarray) -> list[np.ndarray]:
 def _opening(x: Array, y: Array, off: Array) -> float:
     """Where a contact of forces ``y`` at rising ``x`` opens: not before the steps without any, at
     ``off``."""
-    found = x[0] - (x[1] - x[0]) / ((y[1] / y[0]) ** (1 / _POWER) - 1)
+    farther = (y[1] / y[0]) ** (1 / _POWER)  # the second step from there, over the first
+    found = x[0] - (x[1] - x[0]) / (farther - 1)
     return float(max(found, off.max(initial=0.0)))
 
 
@@ -267,10 +269,12 @@ def _cubic(x: Array, f: Array, touching: bool = False) -> _Cubic:
     if np.isnan(f).any():
         return _Cubic(x, 0 * x + np.nan, 0 * x + np.nan)
     df = PchipInterpolator(x, f)(x, 1)
-    df[-1] = max(df[-1], _LEAST * (f[-1] - f[-2]) / (x[-1] - x[-2]), key=abs)
+    last = (f[-1] - f[-2]) / (x[-1] - x[-2])
+    df[-1] = max(df[-1], _LEAST * last, key=abs)
     if touching:
         power = np.log(f[2] / f[1]) / np.log(x[2] / x[1])
-        df[0] = max(df[1] + 8 * (0.5**power - 0.5) * f[1] / x[1], 0.0)
+        bend = 8 * (0.5**power - 0.5)
+        df[0] = max(df[1] + bend * f[1] / x[1], 0.0)
     return _Cubic(x, f, df)
 
 
@@ -281,7 +285,8 @@ def _left_out(x: Array, f: Array) -> Array:
     for begin in (1, 2):
         out = np.arange(begin, len(x) - 1, 2)
         kept = np.delete(np.arange(len(x)), out)
-        error[out] = _cubic(x[kept], f[kept], touching=True).at(x[out])[0] - f[out]
+        value, _ = _cubic(x[kept], f[kept], touching=True).at(x[out])
+        error[out] = value - f[out]
     return error
 
 
@@ -299,9 +304,12 @@ def _steps_asked(x: Array, left_out: Array) -> str:
 
 def _around(errors: Array) -> Array:
     """The largest of every one and its neighbours."""
-    return np.maximum.reduce([errors, np.append(errors[1:], 0.0), np.append(0.0, errors[:-1])])
+    after = np.append(errors[1:], 0.0)
+    before = np.append(0.0, errors[:-1])
+    return np.maximum.reduce([errors, after, before])
 
 
 def _sizes(errors: Array) -> str:
     """Rms and largest."""
-    return f"rms {np.sqrt(np.mean(errors**2)):.2%}, largest {np.abs(errors).max():.2%}"
+    rms = np.sqrt(np.mean(errors**2))
+    return f"rms {rms:.2%}, largest {np.abs(errors).max():.2%}"

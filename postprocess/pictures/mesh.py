@@ -80,7 +80,10 @@ def _face_row(
     kind = side_kind(mesh.kind)
     corners = corners_of(mesh.kind, facets)
     cylinder = cylinder_through(mesh.x, facets) if len(facets) else None
-    middle = place(mesh.x[corners].mean(axis=(0, 1)).round(9) + 0.0) if len(facets) else ""
+    middle = ""
+    if len(facets):
+        mean = mesh.x[corners].mean(axis=(0, 1))
+        middle = place(mean.round(9) + 0.0)
     said = f"R {cylinder.radius:.8g}" if cylinder else ""
     ends = mesh.x[entities_of(kind, facets, 1)[:, :2]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -95,7 +98,8 @@ def _facet_row(
 ) -> list[object]:
     """Owners, circle, number, length, shortest and longest of the ``edges`` of a set."""
     nodes, count = np.unique(edges[:, :2], return_counts=True)
-    ends = Curve(mesh.x, edges.shape[1] - 1, along(edges)).arc_length(np.array([0.0, 1.0]))
+    curve = Curve(mesh.x, edges.shape[1] - 1, along(edges))
+    ends = curve.arc_length(np.array([0.0, 1.0]))
     length = np.diff(ends)[:, 0]
     said = []
     circle = circle_through(mesh.x[nodes]) if len(nodes) else None

@@ -158,7 +158,8 @@ def _without_colours(known: Array) -> str:
     """What is said in place of a scale of colours; nothing where the ``known`` values differ."""
     if not len(known):
         return "no finite number"
-    if np.ptp(known) <= _CONSTANT * max(abs(known.min(initial=0)), abs(known.max(initial=0))):
+    largest = np.abs(known).max()
+    if np.ptp(known) <= _CONSTANT * largest:
         return f"{known[0]:.4g} everywhere"
     return ""
 

@@ -232,7 +232,8 @@ def _unrolled(surfaces: dict[str, Any]) -> tuple[str, Array, tuple[str, str]]:
     corners = surfaces[name].corners
     thin = int(np.ptp(corners.reshape(-1, 3), axis=0).argmin())
     a, b = (k for k in range(3) if k != thin)
-    return name, corners[..., [a, b]], (f"{AXES[a]} [{{length}}]", f"{AXES[b]} [{{length}}]")
+    labels = (f"{AXES[a]} [{{length}}]", f"{AXES[b]} [{{length}}]")
+    return name, corners[..., [a, b]], labels
 
 
 def _angle_and_length(corners: Array, centre: Array, across: tuple[int, int], axis: int) -> Array:
@@ -243,6 +244,8 @@ def _angle_and_length(corners: Array, centre: Array, across: tuple[int, int], ax
     direction = middle.mean(axis=0)
     zero = np.arctan2(direction[1], direction[0])
     of_facet = np.arctan2(middle[:, 1], middle[:, 0])
-    turned = np.angle(np.exp(1j * (np.arctan2(arm[..., 1], arm[..., 0]) - of_facet[:, None])))
+    of_corner = np.arctan2(arm[..., 1], arm[..., 0])
+    turned = np.angle(np.exp(1j * (of_corner - of_facet[:, None])))
     of_facet = np.angle(np.exp(1j * (of_facet - zero))) + zero
-    return np.stack([np.degrees(of_facet[:, None] + turned), corners[..., axis]], axis=-1)
+    angle = np.degrees(of_facet[:, None] + turned)
+    return np.stack([angle, corners[..., axis]], axis=-1)

@@ -306,10 +306,11 @@ class Scene(Checked):
     def targets(self) -> list[float]:
         """The load at every output step: the displacement of the pin, or the force on it."""
         ends = [0.0, *(stage * self.load_unit for stage in self.load.stages)]
-        stages = zip(pairwise(ends), self.load.stage_steps, strict=True)
-        return [
-            b if k == n else a + (b - a) * k / n for (a, b), n in stages for k in range(1, n + 1)
-        ]
+        found = []
+        for (begin, end), n in zip(pairwise(ends), self.load.stage_steps, strict=True):
+            found += [begin + (end - begin) * k / n for k in range(1, n)]
+            found.append(end)
+        return found
 
     @property
     def travelled(self) -> list[list[float]]:
@@ -330,9 +331,8 @@ class Scene(Checked):
     def E_star(self) -> float:
         """Contact modulus of the pair, ``1/E* = sum over deformable bodies of 1/E*_i`` (Johnson
         1985, eq. 4.20)."""
-        return 1 / sum(
-            1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in self.solids.values()
-        )
+        plane = self.analysis.plane
+        return 1 / sum(1 / contact_modulus(s.E, s.nu, plane) for s in self.solids.values())
 
     @property
     def solids(self) -> dict[str, Solid]:

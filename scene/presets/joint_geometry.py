@@ -138,9 +138,11 @@ class JointGeometry(Section):
             sign: int, depth: float
         ) -> float:  # integral of r dr / t^2 from the arc outward (1) or inward (-1)
             t = h + g * depth
-            return (1 - sign * h / g) / g * (1 / h - 1 / t) + sign * math.log(t / h) / g**2
+            straight = (1 - sign * h / g) / g * (1 / h - 1 / t)
+            return straight + sign * math.log(t / h) / g**2
 
-        return self.arc_end * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
+        unit_triangle = math.sqrt(3) / 4
+        return self.arc_end * (ring(-1, 1.0) + ring(1, width - 1)) / unit_triangle
 
     @property
     def is_block(self) -> bool:

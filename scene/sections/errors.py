@@ -18,5 +18,6 @@ class Fault(ValueError):
 def toml_value(value: Any) -> str:
     """``value`` as TOML writes it."""
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{name} = {toml_value(part)}' for name, part in value.items())}}}"
+        pairs = [f"{name} = {toml_value(part)}" for name, part in value.items()]
+        return f"{{{', '.join(pairs)}}}"
     return json.dumps(value, default=str, ensure_ascii=False)

@@ -85,7 +85,9 @@ def of_section(errors: list[Any], data: dict[str, Any], section: type[BaseModel]
 
 def shortened(text: str) -> str:
     """``text`` with its middle left out if it is long."""
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 20]} ... {text[-15:]}"
+    if len(text) <= _LONGEST:
+        return text
+    return f"{text[: _LONGEST - 20]} ... {text[-15:]}"
 
 
 def _sentence(
@@ -122,13 +124,14 @@ def _sentence(
         kind = "string_too_short" if context.get("min_length") == 1 else error["type"]
         said = _PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
         said = said.replace("must be False", "must be false")
-    where = next((by for name, by in origin.items() if f"{name}.".startswith(f"{key}.")), source)
-    shown = (
-        ""
-        if value is None or isinstance(value, dict) or where != source
-        else f" = {shortened(toml_value(value))}"
-    )
-    entry = f": entry {place[-1] + 1}" if len(place) > 2 and isinstance(place[-1], int) else ""
+    given_by = (by for name, by in origin.items() if f"{name}.".startswith(f"{key}."))
+    where = next(given_by, source)
+    shown = ""
+    if value is not None and not isinstance(value, dict) and where == source:
+        shown = f" = {shortened(toml_value(value))}"
+    entry = ""
+    if len(place) > 2 and isinstance(place[-1], int):
+        entry = f": entry {place[-1] + 1}"
     return f"{where}: {key}{shown}{entry} {said}."
 
 

@@ -48,5 +48,6 @@ def trace_constants(
     rigid = kinematics.n_rigid
     scaled = vector[..., rigid:] / np.sqrt(value[:, None, rigid:])
     traces = np.stack([traces[0], traces[1:].sum(axis=0)])
-    of_normal, of_shear = np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ traces @ scaled)[..., -1]
+    ratios = np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ traces @ scaled)
+    of_normal, of_shear = ratios[..., -1]
     return of_normal, of_shear

@@ -65,7 +65,8 @@ def read_xdmf(path: Path) -> MeshArrays:
     _, first, which = np.unique(
         np.concatenate(parts), axis=0, return_index=True, return_inverse=True
     )
-    _, *members = np.split(first[which.ravel()], np.cumsum([len(part) for part in parts[:-1]]))
+    ends = np.cumsum([len(part) for part in parts[:-1]])
+    _, *members = np.split(first[which.ravel()], ends)
     x, cells = in_basix_order(kind, x, cells.astype(np.int64), perm_vtk)
     return MeshArrays.of_sets(
         kind,
