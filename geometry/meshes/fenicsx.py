@@ -27,6 +27,7 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.kernels.compat import cell_nodes
 
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
+_MOST_SECTORS = 4  # in space: beyond, boxes have fewer nodes on their sides
 
 # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
 _ALL_QUADS = 3
@@ -75,7 +76,7 @@ def gmsh_to_mesh(
     quads : bool
         Quadrilaterals instead of triangles, in a plane.
     partitioner : callable
-        Replaces the cut in `sectors`, as in dolfinx.
+        Replaces the `usual_cut`, as in dolfinx.
     key : tuple
         All that enters the mesh. If it is given, the mesh is kept and found again by it.
 
@@ -176,15 +177,16 @@ def own_gmsh() -> Iterator[Any]:
 def distribute(
     comm: MPI.Comm, made: MeshArrays | None, partitioner=None, cut: Cut | None = None
 ) -> TaggedMesh:
-    """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None; cut in
-    `sectors`, if not as ``cut`` or ``partitioner`` say. Collective."""
+    """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None; cut by the
+    `usual_cut`, if not as ``cut`` or ``partitioner`` say. Collective."""
     nothing = made and replace(made, **{name: getattr(made, name)[:0] for name in _ARRAYS})
     empty = comm.bcast(nothing)
     made = made or empty
 
     def in_parts(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
         vertices = cells[0].reshape(-1, n_corners(made.kind))
-        return AdjacencyList_int32((cut or sectors)(made.x, vertices, n_parts).reshape(-1, 1))
+        chosen = cut or usual_cut(made.dimension, n_parts)
+        return AdjacencyList_int32(chosen(made.x, vertices, n_parts).reshape(-1, 1))
 
     if partitioner is None and comm.size > 1:
         partitioner = in_parts
@@ -254,6 +256,12 @@ def gathered(tagged: TaggedMesh) -> MeshArrays | None:
     )
 
 
+def usual_cut(dimension: int, n_parts: int) -> Cut:
+    """`sectors`; in space `boxes` for many parts, as sectors become thin, but not their sides
+    smaller."""
+    return boxes if dimension == 3 and n_parts > _MOST_SECTORS else sectors
+
+
 def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     """The rank ``(n,)`` of each of the ``cells`` ``(n, k)`` with vertices ``x`` ``(m, d)``: sectors
     around the origin, or the z axis, numbered from below, of as many cells each.
@@ -270,6 +278,26 @@ def strips(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     """As `sectors`, but in strips across the mesh's longest extent, for contact in any place."""
     longest = np.argmax(np.ptp(x, axis=0)) if len(x) else 0
     return _in_turn(x[cells].mean(axis=1)[:, longest], n_parts)
+
+
+def boxes(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+    """As `sectors`, but in boxes: the cells are cut in two across their longest extent, and so on.
+    Their sides shrink with their number, and what is in contact is mostly in one box."""
+    middle = x[cells].mean(axis=1)
+    part = np.zeros(len(cells), dtype=np.int32)
+    uncut = [(np.arange(len(cells)), 0, n_parts)]
+    while uncut:
+        chosen, first, n = uncut.pop()
+        part[chosen] = first
+        if n == 1 or not len(chosen):
+            continue
+        longest = np.argmax(np.ptp(middle[chosen], axis=0))
+        chosen = chosen[np.argsort(middle[chosen, longest], kind="stable")]
+        half = n // 2
+        at = len(chosen) * half // n
+        uncut.append((chosen[:at], first, half))
+        uncut.append((chosen[at:], first + half, n - half))
+    return part
 
 
 def _in_turn(place: Array, n_parts: int) -> np.ndarray:

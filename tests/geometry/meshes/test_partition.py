@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dolfinx.mesh import entities_to_geometry
 
-from archord.geometry.meshes.fenicsx import sectors
+from archord.geometry.meshes.fenicsx import boxes, sectors, usual_cut
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from tests.geometry.shapes.measures import Facets
 
@@ -24,6 +24,28 @@ def test_parts_have_as_many_cells_each_and_lie_in_order_of_their_angle(n_parts):
     assert (sectors(x, cells[order], n_parts) == part[order]).all()
     assert sectors(x, cells[:0], n_parts).shape == (0,)
     assert sectors(x, cells[:1], n_parts).tolist() == [0]
+
+
+@pytest.mark.parametrize("n_parts", [1, 3, 8, 27])
+def test_boxes_of_a_cube_have_as_many_cells_each_and_short_sides(n_parts):
+    """In whatever order the cells come; also for no cells, and fewer than parts."""
+    n = 12
+    x = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = np.arange(len(x))[:, None]
+    part = boxes(x, cells, n_parts)
+    assert np.ptp(np.bincount(part, minlength=n_parts)) <= 2
+    extents = [np.ptp(x[part == k], axis=0).max() for k in range(n_parts)]
+    assert max(extents) < 2 * n / np.cbrt(n_parts)
+    order = np.random.default_rng(1).permutation(len(cells))
+    again = boxes(x[order], np.argsort(order)[:, None], n_parts)
+    assert np.ptp(np.bincount(again, minlength=n_parts)) <= 2
+    assert boxes(x, cells[:0], n_parts).shape == (0,)
+    assert boxes(x, cells[:1], n_parts).tolist() in ([0], [n_parts - 1])
+
+
+def test_boxes_are_of_many_parts_in_space():
+    assert usual_cut(3, 16) is boxes
+    assert usual_cut(3, 2) is usual_cut(2, 16) is sectors
 
 
 @pytest.mark.mpi
