@@ -285,7 +285,7 @@ def boxes(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     Their sides shrink with their number, and what is in contact is mostly in one box."""
     middle = x[cells].mean(axis=1)
     part = np.zeros(len(cells), dtype=np.int32)
-    uncut = [(np.arange(len(cells)), 0, n_parts)]
+    uncut: list[tuple[np.ndarray, int, int]] = [(np.arange(len(cells)), 0, n_parts)]
     while uncut:
         chosen, first, n = uncut.pop()
         part[chosen] = first
