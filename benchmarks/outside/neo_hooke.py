@@ -1,9 +1,9 @@
-"""The compressible neo-Hookean solid of codes for large strain, in plane strain."""
+"""The compressible neo-Hookean solid of codes for large strain, in a plane."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from archord.materials.material import Material, State
 
 # of gradients [xx, yy, xy, yx]: the derivative of the cofactors (F_yy, F_xx, -F_yx, -F_xy)
 _COFACTORS = np.array([[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, -1], [0, 0, -1, 0]], dtype=float)
+_NEWTON = 12  # steps that find the thickness
 _ONE = np.array([1.0, 1.0, 0.0, 0.0])
 
 
@@ -21,55 +22,71 @@ class NeoHooke(Material):
     """Energy ``mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2``, as of Kratos and GetFEM.
 
     Nominal stresses ``(n, 4)`` of displacement gradients ``(n, 4)`` are ``P = mu F + (lambda ln J -
-    mu) F^-T``.
+    mu) F^-T``. In plane stress they are per undeformed thickness, and the thickness follows.
     """
 
     E: float
     nu: float
+    plane: Literal["strain", "stress"] = "strain"
     finite: ClassVar[bool] = True
 
     @property
-    def lame(self) -> tuple[float, float]:
-        """Lame's constants ``(lambda, mu)``."""
-        return Elastic(self.E, self.nu).lame
+    def _small(self) -> Elastic:
+        """The solid of small strains."""
+        return Elastic(self.E, self.nu, self.plane)
 
     @property
     def elastic_tangent(self) -> Array:
         """The moduli ``(3, 3)`` of small strains."""
-        return Elastic(self.E, self.nu).elastic_tangent
+        return self._small.elastic_tangent
+
+    def _thickness(self, J: Array) -> Array:
+        """The stretch ``(n,)`` out of the plane, where ``J`` ``(n,)`` is the determinant in it."""
+        lam, mu = self._small.lame
+        stretch = np.ones_like(J)
+        for _ in range(_NEWTON if self.plane == "stress" else 0):
+            stress = mu * (stretch**2 - 1) + lam * np.log(J * stretch)
+            stretch = stretch - stress / (2 * mu * stretch + lam / stretch)
+        return stretch
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """Nominal stress ``(n, 4)``, its derivative ``(n, 4, 4)`` and the state; not a number at
         points that are turned inside out."""
-        lam, mu = self.lame
+        lam, mu = self._small.lame
         F, J, inverse = _deformation(strain)
-        k = lam * np.log(J) - mu
+        stretch = self._thickness(J)
+        k = lam * np.log(J * stretch) - mu
+        slope = lam / (1 + lam / (2 * mu * stretch**2)) if self.plane == "stress" else lam
         stress = mu * F + k[:, None] * inverse
         dyads = inverse[:, :, None] * inverse[:, None, :]
-        tangent = (lam - k)[:, None, None] * dyads + (k / J)[:, None, None] * _COFACTORS
+        tangent = (slope - k)[:, None, None] * dyads + (k / J)[:, None, None] * _COFACTORS
         return stress, tangent + mu * np.eye(4), state
 
     def energy(self, stress: Array) -> Array:
         """Energy density ``(n,)`` of stresses ``(n, 4)`` of small strains."""
-        return Elastic(self.E, self.nu).energy(stress)
+        return self._small.energy(stress)
 
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
         """Energy density ``(n,)`` per undeformed volume."""
-        lam, mu = self.lame
+        lam, mu = self._small.lame
         F, J, _ = _deformation(strain)
-        log = np.log(J)
-        return mu / 2 * ((F**2).sum(axis=1) - 2) - mu * log + lam / 2 * log**2
+        stretch = self._thickness(J)
+        log = np.log(J * stretch)
+        stretches = (F**2).sum(axis=1) + stretch**2
+        return mu / 2 * (stretches - 3) - mu * log + lam / 2 * log**2
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
-        """Cauchy's stress ``(n, 4)``: ``P F^T / J``, and ``lambda ln J / J`` out of the plane."""
+        """Cauchy's stress ``(n, 4)``, ``P F^T / J``."""
+        lam, mu = self._small.lame
         F, J, _ = _deformation(strain)
         F_xx, F_yy, F_xy, F_yx = F.T
         P_xx, P_yy, P_xy, P_yx = stress.T
+        stretch = self._thickness(J)
         xx = P_xx * F_xx + P_xy * F_xy
         yy = P_yx * F_yx + P_yy * F_yy
-        zz = self.lame[0] * np.log(J)
+        zz = mu * (stretch**2 - 1) + lam * np.log(J * stretch)
         xy = P_xx * F_yx + P_xy * F_yy
-        return np.stack([xx, yy, zz, xy], axis=1) / J[:, None]
+        return np.stack([xx, yy, zz, xy], axis=1) / (J * stretch)[:, None]
 
 
 def _deformation(gradient: Array) -> tuple[Array, Array, Array]:
