@@ -220,7 +220,7 @@ def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> dict[str, Array]:
 
 
 def _edge_profile(side: Surface, weight: Array, raw_pressure: Array, **others: Any) -> Any:
-    s = side.arc_length(side.curve_xi)
+    s = side.along[:, :-1]
     pressure = project(raw_pressure, s, weight)
     return SurfaceProfile(
         s=s, weight=weight, pressure=pressure, raw_pressure=raw_pressure, **others

@@ -189,6 +189,7 @@ class Surface:
         2)``, with weights ``w``; no history. Pieces are of the facets ``facet`` ``(pieces,)``, in
         rising order; without, every facet is one."""
         self.curve_xi = xi
+        self._along: Array | None = None
         self.facet_of_pieces = np.arange(self.n_facets) if facet is None else facet
         self._take_pieces(self.facet_of_pieces)
         w = w[self.piece]
@@ -246,11 +247,20 @@ class Surface:
             raise ValueError("surfaces in space have no arc length")
         return self.curve.arc_length(xi)
 
+    @property
+    def along(self) -> Array:
+        """Arc length ``(n_facets, q + 1)`` of all points, and of the end of each facet, along
+        each piece. Raises ValueError in space."""
+        if self._along is None:
+            places = np.column_stack([self.curve_xi, np.ones(self.n_facets)])
+            self._along = self.arc_length(places)
+        return self._along
+
     def arc_position(self, origin: Array) -> Array:
         """Arc length ``(n_facets, q)`` of all points, from the end of an open curve nearest to
         ``origin`` ``(2,)``; on closed curves, and on each of several pieces, from where it
         starts."""
-        s = self.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
+        s = self.along
         ends = self.curve.connectivity[[0, -1], [0, -1]]
         first, last = np.linalg.norm(self.curve.X[ends] - origin, axis=1)
         one_piece = isinstance(self.curve, Curve) and self.curve.n_pieces == 1

@@ -26,6 +26,11 @@ class Diagnostics:
         """The points that can yield."""
         return [points for points in self.points() if points.yields]
 
+    def yields(self) -> bool:
+        """Whether any point has left its elastic tangent, on any rank."""
+        here = any(points.flows.any() for points in self.plastic_points())
+        return self.unknowns.comm.allreduce(here, op=MPI.LOR)
+
     def reaction(self, name: str) -> Array:
         """Forces ``(n_owned, d)`` of the supports and means ``name`` on the nodes."""
         drives = self.unknowns.drives

@@ -19,8 +19,9 @@ from archord.solver.linear.strategy import Facts, Strategy
 class LinearSystem:
     """The tangent of the last ``evaluation`` and what solves with it. Collective.
 
-    ``choice`` names the strategies. ``tangent`` is the matrix of all displacements; the unknown
-    levels are in the ``border``, None without any. ``strategy`` solves for all unknowns.
+    ``choice`` names the strategies that the ``facts`` allow. ``tangent`` is the matrix of all
+    displacements; the unknown levels are in the ``border``, None without any. ``strategy`` solves
+    for all unknowns.
     """
 
     def __init__(self, evaluation: Evaluation, timer: Timer) -> None:
@@ -28,7 +29,8 @@ class LinearSystem:
         self.unknowns = evaluation.unknowns
         self.contact = evaluation.contact
         self.timer = timer
-        self.choice = choose(self._facts())
+        self.facts = self._facts()
+        self.choice = choose(self.facts)
         condense = self._revise_condensed if self.choice.uses("condensed") else None
         self.tangent = TangentMatrix(evaluation, timer, condense)
         self._factoriser = partial(self.choice.factoriser, self.unknowns.V, self.unknowns.fixed)

@@ -35,13 +35,16 @@ Revise = Callable[[Array], tuple[PETSc.Mat, Array] | None]
 
 def why_not(facts: Facts) -> str | None:
     """Why the active set waits for the next iteration."""
-    if facts.yields and not facts.friction and facts.dimension < _DIMENSION_WHERE_BODIES_YIELD:
-        return (
-            "bodies yield without friction: it would take as long as the iterations that it saves"
-        )
     if facts.gamma_factor is None:
         return "there is no contact, or one with a law that never opens"
     return None
+
+
+def rests_while_bodies_yield(facts: Facts) -> bool:
+    """Whether the active set waits for the next iteration while any point yields: without friction
+    in a plane an update would take as long as the iterations that it saves."""
+    in_plane = facts.dimension < _DIMENSION_WHERE_BODIES_YIELD
+    return facts.yields and not facts.friction and in_plane
 
 
 def look_ahead(

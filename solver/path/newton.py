@@ -17,7 +17,7 @@ from archord.kernels.compat import RESIDUAL_NOT_FINITE
 from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
-from archord.solver.linear.look_ahead import LookAhead
+from archord.solver.linear.look_ahead import LookAhead, rests_while_bodies_yield
 from archord.solver.linear.multigrid import forcing_term
 from archord.solver.linear.strategy import krylov_iterations
 
@@ -99,6 +99,7 @@ class NewtonSolver:
         self._ahead: LookAhead | None = None
         if choice.uses("look_ahead"):
             self._ahead = LookAhead(self._system.revise, yields=equilibrium.bulk.plastic)
+        self._ahead_rests = rests_while_bodies_yield(self._system.facts)
         for sums in _RANDOM_SUMS:
             PETSc.Options()[sums] = False
         self._x = equilibrium.unknowns.vector()
@@ -156,6 +157,8 @@ class NewtonSolver:
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         self._result.krylov_iterations += krylov_iterations(ksp)
         if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
+            return
+        if self._ahead_rests and self.equilibrium.diagnostics.yields():
             return
         tolerance = ksp.getTolerances()[0] if self._iterates else 0.0
         iterations = self._ahead.improve(b, x, self._strategy.matrix, tolerance)

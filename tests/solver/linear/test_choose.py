@@ -22,7 +22,7 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, 2, False, False, False, False, 0.5, lambda:
         ({}, "condensed"),
         ({"dofs": 10_000}, "look_ahead + direct"),
         ({"dofs": 50_000}, "lagged + look_ahead + direct"),
-        ({"yields": True, "dofs": 50_000}, "direct"),
+        ({"yields": True, "dofs": 50_000}, "look_ahead + direct"),
         ({"yields": True, "friction": True}, "look_ahead + direct"),
         ({"finite": True}, "look_ahead + direct"),
         ({"finite": True, "dofs": 50_000}, "lagged + look_ahead + direct"),

@@ -10,6 +10,7 @@ from tests.solver.solving import SEVERAL, solve
 FORCE = {"displacement": None, "relative_force": 0.01}
 SCENES = {
     "friction": paper_joint(0.08, 4, 0.002, analysis={"friction": 0.3}),
+    "late yield": paper_joint(0.08, 4, 0.004),
     "large strain": paper_joint(0.08, 4, analysis={"strain": "large"}),
     "rigid pin": paper_joint(0.08, 4, 0.002, pin={"rigid": True}, analysis={"friction": 0.3}),
     "by force": paper_joint(0.08, 4, load=FORCE),
