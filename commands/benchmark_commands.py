@@ -131,7 +131,9 @@ def scaling(output: Path, largest: float, ranks: int, repeats: int, quiet: bool)
 
 
 @benchmark.command()
-@click.argument("group", type=click.Choice(["joint", "sweep", "strategies"]), default="joint")
+@click.argument(
+    "group", type=click.Choice(["joint", "sweep", "yielding", "strategies"]), default="joint"
+)
 @output("folder for runs and table", "runs/variants")
 @_repeats(3, "each variant")
 @quiet("what is wrong")
@@ -139,8 +141,9 @@ def variants(group: str, output: Path, repeats: int, quiet: bool) -> int:
     """Solve scenes with one thing switched, by turns, and tell what each variant loads, needs and
     writes.
 
-    GROUP is joint (one scene in variants), sweep (on two ranks and on one) or strategies (without
-    each linear strategy, for hours). Exit code 0 only if none loads what it does not use.
+    GROUP is joint (one scene in variants), sweep (on two ranks and on one), yielding (a sweep of
+    joints that yield, with and without what a sweep leaves out) or strategies (without each linear
+    strategy, for hours). Exit code 0 only if none loads what it does not use.
     """
     from archord.benchmarks.case import write_table
     from archord.benchmarks.cost import variants as table

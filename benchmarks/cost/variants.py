@@ -2,7 +2,8 @@
 
 Each run is a process of its own, timed from outside; nothing else should run. The sets of
 variants.toml are in groups: "joint" (one scene in variants: each should load only what it
-uses), "sweep" (on one rank and on two) and "strategies" (without each linear strategy;
+uses), "sweep" (on one rank and on two), "yielding" (a sweep of joints that yield, with and without
+what a sweep leaves out) and "strategies" (without each linear strategy;
 docs/development/linear_strategies.md says what was decided by it).
 """
 
@@ -64,8 +65,8 @@ sys.exit(code)
 @dataclass(frozen=True)
 class Variant:
     """Of the set ``case``: ``scene`` or a ``sweep`` of scenes/ is solved, or the run of
-    ``picture_of`` drawn, on ``ranks`` ranks, ``without`` a linear strategy; what is ``unused`` must
-    not be loaded."""
+    ``picture_of`` drawn, on ``ranks`` ranks, ``without`` a linear strategy, with the ``options`` of
+    the command; what is ``unused`` must not be loaded."""
 
     case: str
     name: str
@@ -74,6 +75,7 @@ class Variant:
     picture_of: str = ""
     ranks: int = 1
     without: str = ""
+    options: Sequence[str] = ()
     unused: Sequence[str] = ()
 
     def process(self, folder: Path) -> Process:
@@ -97,6 +99,7 @@ class Variant:
             note.name,
             WITHOUT[self.without],
             *arguments,
+            *self.options,
         )
 
         def loaded() -> list[str]:
