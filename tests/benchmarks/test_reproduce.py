@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
     """All figures on meshes and in steps too coarse for the paper, two of them first."""
     target = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_runs, "MESHES", {"coarse": 0.3, "fine": 0.2})
+        patch.setattr(paper_runs, "MESHES", {"coarse": 0.4, "fine": 0.2})
         patch.setattr(paper_runs, "STEPS", STEPS)
         solved: list[str] = []
         files = reproduce(

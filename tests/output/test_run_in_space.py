@@ -245,8 +245,8 @@ def test_pictures_show_bodies_pressures_and_forces(folders, tmp_path):
         run = archord.load(folder)
         assert len(panels_of(run)) == 3
         assert archord.draw_run(run, tmp_path / "all.png").stat().st_size > 1000
-        options = {"field": "uz", "steps": [1], "cut": "x=0.4"}
-        assert archord.draw_run(run, tmp_path / "cut.png", **options).stat().st_size > 1000
+    options = {"field": "uz", "steps": [1], "cut": "x=0.4"}
+    assert archord.draw_run(run, tmp_path / "cut.png", **options).stat().st_size > 1000
     assert write_report(run, tmp_path / "run.pdf").stat().st_size > 1000
     for wrong, said in (
         ({"cut": "q=1"}, r'cut = "q=1" must name a plane, as "z=0"'),

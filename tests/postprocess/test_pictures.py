@@ -120,13 +120,13 @@ def test_show_cuts_no_word(unloaded):
     assert set(wide.split()) <= set(narrow.split())
 
 
-def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refused, capsys):
+def test_a_report_is_a_pdf_of_two_or_three_pages(runs, tmp_path, refused, capsys):
     """With and without fields or warnings; one that is there is kept without --force."""
     bare = shutil.copytree(runs["coarse"], tmp_path / "bare")
     text = (bare / "scene.toml").read_text()
     (bare / "scene.toml").write_text(re.sub(r"fields = .*", "fields = false", text))
     rewrite_report(bare, files={}, warnings=[f"step 1: {'very ' * k}strange" for k in range(60)])
-    for folder in (unloaded.folder, runs["plastic"], bare):
+    for folder in (runs["plastic"], bare):
         target = tmp_path / f"{folder.name}.pdf"
         assert command(["report", str(folder), "-o", str(target)]) == 0
         content = target.read_bytes()
@@ -147,7 +147,7 @@ def test_a_report_that_fails_keeps_the_old_one(unloaded, tmp_path, refused):
     """On a full disk, wherever in the file that is."""
     target = tmp_path / "x.pdf"
     target.write_text("old")
-    for room in (0, 3000, 50_000):
+    for room in (0, 20_000):
         with full_disk(room):
             said = refused(["report", str(unloaded.folder), "-o", str(target), "--force"])
         assert f"{target}: cannot be written: File too large." in said

@@ -100,7 +100,7 @@ def test_the_jacobian_is_the_derivative_of_the_force(name: str) -> None:
     curve = LAWS[name]()
     law = python(curve)
     memory = remembers(law, positions(curve, 12, 1.5))
-    given = motions(curve, 150, 2.0)
+    given = motions(curve, 60, 2.0)
     steps = np.array([1e-6 * curve.length, 1e-6 * curve.length, 1e-4, 1e-4, 1e-5])
     jacobian = values(law, memory, given)[:, 3:].reshape(-1, 3, 5)
     miss = np.empty_like(jacobian)
@@ -156,7 +156,7 @@ def test_memory_only_loses_energy(name: str) -> None:
     """The energy given back from any displacement falls, or stays, as the deepest one grows."""
     curve = LAWS[name]()
     law = python(curve)
-    deepest = np.linspace(0.0, curve.limit, 250)
+    deepest = np.linspace(0.0, curve.limit, 100)
     unit = curve.force * curve.length
     for most in deepest.tolist():
         for delta in np.linspace(0.0, most, 10).tolist():
@@ -295,7 +295,7 @@ def test_all_languages_give_the_same_forces(suffix: str, name: str, tmp_path: Pa
     """Python's, to 1e-12 of the largest in each column; at rest, too, and at no eccentricity."""
     curve = LAWS[name]()
     path = positions(curve, 12, 1.5)
-    given = np.vstack([motions(curve, 300, 2.0), np.zeros((1, 5)), [[0.06, 0.0, 0.0, 0.0, 0.0]]])
+    given = np.vstack([motions(curve, 100, 2.0), np.zeros((1, 5)), [[0.06, 0.0, 0.0, 0.0, 0.0]]])
     law = python(curve)
     memory = remembers(law, path)
     energy = [law.stored_energy(memory, *e) for e in given[:, :2].tolist()]

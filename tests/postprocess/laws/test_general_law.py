@@ -72,7 +72,7 @@ def joints(
 
 
 @given(joints(), some.floats(0.05, 3.0))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 def test_laws_of_nature(pin: LawJoint, deepest: float) -> None:
     """P is 0 up to first touch and rises; the way back lies below, meets first loading, and returns
     less work."""
