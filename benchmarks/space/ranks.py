@@ -10,8 +10,7 @@ joint. Columns are of the rank that has most:
 - ghosts: displacements of other ranks to which its rows refer, contact included
 - ranks met: ranks that own them, and so messages of an exchange
 - contact: nodes of contact surfaces, which every rank holds
-- places: blocks that contact may fill, of all ranks, which every rank gathers when the pattern is
-  made
+- places: blocks that contact may fill, of all ranks together
 - matrix [MB]: of the displacements
 - peak [MB]: memory of the process, with the making of the mesh on rank 0
 - levels: below the displacements: their displacements on all ranks

@@ -49,6 +49,7 @@ class Contact:
         self._slipping = [pair for pair in self.pairs if pair.counts_slip]
         self._block_size = V.dofmap.bs
         self._n_dofs = V.dofmap.index_map.size_global
+        self._first_dof = V.dofmap.index_map.local_range[0]
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
         self.gamma_factor = max((i.interaction.gamma_factor for i in interfaces), default=0.0)
@@ -146,14 +147,16 @@ class Contact:
             surface.add_to_owned(surface.sum_over_ranks(-on[id(surface)]), force)
 
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Block ``(rows, columns)`` that the contacts of all ranks may fill, each once, in global
-        dofs. Collective."""
+        """Block ``(rows, columns)`` that the contacts of all ranks may fill in rows of this rank,
+        each once, in global dofs. Collective."""
         size = self._n_dofs
         rows = self.tangent.rows
         columns = self.tangent.columns
         of_bodies = (rows < size) & (columns < size)
         slots = (rows * size + columns)[of_bodies]
-        return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)
+        first = self.comm.allgather(self._first_dof)
+        by_owner = np.split(slots, np.searchsorted(slots, size * np.array(first[1:])))
+        return np.divmod(np.unique(np.concatenate(self.comm.alltoall(by_owner))), size)
 
     def interface(self, name: str = "") -> Interface:
         """The interface of the interaction ``name``, the first without."""

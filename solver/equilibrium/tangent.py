@@ -123,9 +123,6 @@ class TangentMatrix:
         self.A.destroy()
         self._elastic.destroy()
         rows, columns = self.contact.pattern()
-        mine = (rows >= self._start) & (rows < self._start + self._n_owned)
-        rows = rows[mine]
-        columns = columns[mine]
         self.A = self._allocated((rows, columns))
         # zeros into every other slot: what is not written before the first assembly is given back
         add_blocks(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
