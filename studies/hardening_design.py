@@ -11,7 +11,7 @@ of one of the `CURVES`; half of the joints whose bodies yield at one stress have
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -19,24 +19,28 @@ import numpy as np
 
 from archord.materials.named import metals
 from archord.postprocess.laws.general.general_law import NODES, law_of_numbers
+from archord.postprocess.laws.general.law_fit import EARLY
 from archord.studies.law_design import (
+    CHECK_SIZE,
     FRESH_WAY,
     Drawn,
     Row,
+    checking,
     fresh_nodes,
     joints,
-    loading_nodes,
+    steady_nodes,
     sweep_file,
     yielding_rows,
 )
 
-# how many joints of each kind of law_design.py, in each plane
-JOINTS = {"both": 28, "block": 18, "pin": 12, "block weaker": 12, "pin weaker": 14}
+# how many joints of each kind of law_design.py
+_KINDS = {"both": 28, "block": 18, "pin": 12, "block weaker": 12, "pin weaker": 14}
+JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
 CURVES = ("line", "Swift", "Voce", "plateau", "metal")
 _LATEST = 1.8  # x0 beyond which yielding says little of hardening
 _SPARE = 4  # times as many joints are drawn as have an earlier x0
 _SEED = 3600
-_WAY = np.array([0.2, 0.5, 0.75, 0.9, 1.0])  # parts of the way back
+_NEXT = 1.2  # x of a node to fit to over the last one's
 _TOLERANCE = 1e-5  # of the solver; it moves P by 2e-7
 
 
@@ -85,30 +89,33 @@ def hardened(joint: Drawn, random: np.random.Generator) -> Drawn:
     return replace(joint, own=own)
 
 
-def drawn(number: float, seed: int) -> Iterator[Drawn]:
-    """`JOINTS` times ``number`` joints that harden."""
+def drawn(share: float, seed: int) -> Iterator[Drawn]:
+    """A ``share`` of `JOINTS`, which harden."""
     random = np.random.default_rng(seed)
-    for plane in ("strain", "stress"):
-        for kind, count in JOINTS.items():
-            wanted = max(round(count * number), 1)
-            seed += 1
-            early = (
-                joint
-                for joint in joints(f"{plane} {kind}", _SPARE * wanted, seed)
-                if joint.first < _LATEST
-            )
-            for joint, _ in zip(early, range(wanted), strict=False):
-                yield hardened(joint, random)
+    for kind, count in JOINTS.items():
+        wanted = max(round(count * share), 1)
+        seed += 1
+        candidates = joints(kind, _SPARE * wanted, seed)
+        early = (joint for joint in candidates if joint.first < _LATEST)
+        for joint, _ in zip(early, range(wanted), strict=False):
+            yield hardened(joint, random)
 
 
-def rows(given: Iterator[Drawn], fresh: bool) -> Iterator[Row]:
-    """The scenes of the ``given`` joints: to 3 dR and back, in two step sizes where yielding begins
-    early."""
+def rows_to_fit(given: Iterable[Drawn]) -> Iterator[Row]:
+    """The scenes of the ``given`` joints: to 3 dR, in two step sizes where yielding is early."""
+    for joint in given:
+        row = joint.own | {"load.displacement": [*steady_nodes(joint, _NEXT)]}
+        yield row
+        if min(joint.numbers[5:]) < EARLY:
+            yield row | {"load.steps": 2}
+
+
+def rows_to_check(given: Iterable[Drawn]) -> Iterator[Row]:
+    """The scenes of the ``given`` joints: to 3 dR at other displacements, and back."""
     for joint in given:
         opens = law_of_numbers(joint.numbers).residual
-        nodes = fresh_nodes(joint) if fresh else loading_nodes(joint)
-        way = FRESH_WAY[::2] if fresh else _WAY
-        yield from yielding_rows(joint, nodes, way, 2.0, _up_to_the_last(opens))
+        nodes = fresh_nodes(joint)
+        yield from yielding_rows(joint, nodes, FRESH_WAY[::2], 2.0, _up_to_the_last(opens))
 
 
 def _up_to_the_last(opens: Callable[[float], Any]) -> Callable[[float], Any]:
@@ -121,10 +128,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--element-size", type=float, default=CHECK_SIZE, help="of fresh ones")
     given = parser.parse_args()
-    share = given.fresh / (2 * sum(JOINTS.values())) if given.fresh else 1.0
-    seed = 1000 * given.seed if given.fresh else _SEED
-    text = sweep_file(rows(drawn(share, seed), bool(given.fresh)))
+    text = sweep_file(rows_to_fit(drawn(1.0, _SEED)))
+    if given.fresh:
+        chosen = drawn(given.fresh / sum(JOINTS.values()), 1000 * given.seed)
+        text = checking(sweep_file(rows_to_check(chosen)), given.element_size)
     plane = 'plane = "strain"\n'
     print(text.replace(plane, f"{plane}tolerance = {_TOLERANCE}\n", 1), end="")
 

@@ -2,6 +2,8 @@
 
     python3 -m archord.studies.law_design > law.sweep.toml
     python3 -m archord.studies.law_design --fresh 200 --seed 1 > fresh.sweep.toml
+    python3 -m archord.studies.law_design --fresh 8 --kind "strain elastic soft" > soft.sweep.toml
+    python3 -m archord.studies.law_design --meshes > meshes.sweep.toml
 
 A joint is drawn from Sobol's sequence over Poisson's ratios, the ratio of the moduli, dR/R, the
 yield stress (from the smallest s of the range to one at which yielding begins at 3 dR), and the
@@ -16,7 +18,8 @@ was designed with an earlier law: law_design.npz has the residual clearances tha
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,6 +68,19 @@ JOINTS = {
 _SPECIAL = ("soft", "alike", "early")  # kinds that are not drawn to check the law
 FRESH = {kind: n for kind, n in JOINTS.items() if not kind.endswith(_SPECIAL)}
 FRESH |= {"strain elastic": 90, "stress elastic": 60}
+# Joints that are solved on several meshes, and the sizes of their elements over R: the error of the
+# mesh is largest where a block yields alone in plane stress.
+MESHES = {
+    "stress block": 12,
+    "stress pin": 4,
+    "stress both": 4,
+    "stress block weaker": 2,
+    "strain block": 2,
+}
+SIZES = (0.1, 0.05, 0.02)
+_NEXT = 1.25  # x of their nodes over the last one's
+_SEED_OF_MESHES = 500
+END = 3.0
 # x of elastic joints
 ELASTIC = [0.01, 0.02, 0.035, 0.06, 0.1, 0.16, 0.25, 0.38, 0.55, 0.8, 1.1, 1.5, 2.0, 2.5, 3.05]
 _FRESH_EARLY = [0.02, 0.05, 0.1]  # x of all fresh joints
@@ -77,7 +93,9 @@ FRESH_WAY = np.array(
 )
 _CYCLES = 0.25  # share of joints that are also unloaded from a smaller displacement
 _OPENS = Path(__file__).with_suffix(".npz")
-_BASE = """
+ELEMENT_SIZE = 0.05  # over R, of the joints to fit to
+CHECK_SIZE = 0.025  # of joints to check the law on, unless another one is asked for
+_BASE = f"""
 [base.units]
 length = "R"
 stress = "E*"
@@ -88,7 +106,7 @@ plane = "strain"
 [base.joint]
 radius = 1.0
 clearance = 0.005
-relative_element_size = 0.05
+relative_element_size = {ELEMENT_SIZE}
 
 [base.block]
 E = 2.0
@@ -204,12 +222,30 @@ def loading_nodes(joint: Drawn) -> Array:
     return np.concatenate([before[before < 0.85 * joint.last], x])
 
 
-def fresh(number: int, seed: int) -> Iterator[Row]:
-    """Scenes of ``number`` joints, elastic ones among them, at other displacements than the law was
-    fitted to."""
-    ends = np.cumsum([0, *FRESH.values()])
+def meshes() -> Iterator[Row]:
+    """Scenes of the joints of `MESHES`, each of all `SIZES`, in the same steps."""
+    for seed, (kind, number) in enumerate(MESHES.items(), _SEED_OF_MESHES):
+        for joint in joints(kind, number, seed):
+            for size in SIZES:
+                yield joint.own | {
+                    "load.displacement": [*steady_nodes(joint, _NEXT)],
+                    "joint.relative_element_size": size,
+                }
+
+
+def steady_nodes(joint: Drawn, ratio: float) -> Array:
+    """x from about first yield to 3 dR, each at most ``ratio`` times the one before."""
+    first = 0.95 * joint.first
+    count = math.ceil(math.log(END / first) / math.log(ratio))
+    return np.geomspace(first, END, count + 1)
+
+
+def fresh(number: int, seed: int, of: Mapping[str, int] = FRESH) -> Iterator[Row]:
+    """Scenes of ``number`` joints of these kinds, elastic ones among them, at other displacements
+    than the law was fitted to."""
+    ends = np.cumsum([0, *of.values()])
     shares = np.diff(np.round(ends * number / ends[-1])).astype(int)
-    for seed_of_kind, (kind, share) in enumerate(zip(FRESH, shares, strict=True), 1000 * seed):
+    for seed_of_kind, (kind, share) in enumerate(zip(of, shares, strict=True), 1000 * seed):
         for joint in joints(kind, int(share), seed_of_kind):
             if np.isinf(joint.first):
                 yield joint.own | {"load.displacement": _FRESH_ELASTIC}
@@ -217,6 +253,11 @@ def fresh(number: int, seed: int) -> Iterator[Row]:
             law = law_of_numbers(joint.numbers)
             x = fresh_nodes(joint)
             yield from yielding_rows(joint, x, FRESH_WAY, joint.chance, law.residual)
+
+
+def checking(text: str, size: float) -> str:
+    """The sweep ``text`` with elements of this ``size`` over R."""
+    return text.replace(f"size = {ELEMENT_SIZE}", f"size = {size:g}")
 
 
 def fresh_nodes(joint: Drawn) -> Array:
@@ -268,8 +309,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", choices=JOINTS, help="of the fresh joints; others are of many")
+    parser.add_argument("--element-size", type=float, default=CHECK_SIZE, help="of fresh ones")
+    parser.add_argument("--meshes", action="store_true", help="joints to solve on several meshes")
     given = parser.parse_args()
-    print(sweep_file(fresh(given.fresh, given.seed) if given.fresh else training()), end="")
+    if given.fresh:
+        of = {given.kind: 1} if given.kind else FRESH
+        rows = sweep_file(fresh(given.fresh, given.seed, of))
+        print(checking(rows, given.element_size), end="")
+        return
+    print(sweep_file(meshes() if given.meshes else training()), end="")
 
 
 if __name__ == "__main__":

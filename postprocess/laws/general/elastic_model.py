@@ -60,6 +60,12 @@ def products(joints: Elastic, exponents: Array) -> Array:
     return np.prod(factors[..., None, :] ** exponents, axis=-1)
 
 
+@cache
+def _derivative(length: int) -> Array:
+    """The matrix ``(length - 1, length)`` from a series to the series of its derivative."""
+    return chebyshev.chebder(np.eye(length))
+
+
 def depth(x: Array) -> Array:
     """x on Chebyshev's interval from -1, first touch, to 1."""
     return 2 * (x / (1 + x)) * (1 + FARTHEST) / FARTHEST - 1
@@ -73,11 +79,21 @@ class Polynomials:
     exponents: Array
     coefficients: Array
 
+    def series(self, joints: Elastic) -> Array:
+        """Coefficients ``(degree + 1, ..., 1)`` of Chebyshev's polynomials of `depth`."""
+        return (products(joints, self.exponents) @ self.coefficients).T[..., None]
+
+    def value(self, joints: Elastic, t: Array) -> Array:
+        """The function ``(..., k)`` at the `depth` ``t`` ``(k,)``."""
+        return chebyshev.chebval(t, self.series(joints), tensor=False)
+
     def at(self, joints: Elastic, x: Array) -> tuple[Array, Array]:
         """The function and its derivative by x ``(..., k)``, at ``x`` ``(k,)``."""
-        series = (products(joints, self.exponents) @ self.coefficients).T[..., None]
-        value = chebyshev.chebval(depth(x), series, tensor=False)
-        rise = chebyshev.chebval(depth(x), chebyshev.chebder(series), tensor=False)
+        t = depth(x)
+        series = self.series(joints)
+        value = chebyshev.chebval(t, series, tensor=False)
+        slopes = np.tensordot(_derivative(len(series)), series, 1)
+        rise = chebyshev.chebval(t, slopes, tensor=False)
         return value, rise * (2 * (1 + FARTHEST) / FARTHEST / (1 + x) ** 2)
 
 
@@ -91,11 +107,20 @@ class ElasticModel:
 
     def at(self, joints: Elastic, x: Array) -> ElasticState:
         """All quantities of ``joints`` at ``x > 0`` ``(k,)``."""
+        t = depth(x)
         F, F_slope = self.F.at(joints, x)
-        peak, _ = self.peak.at(joints, x)
-        angle, _ = self.angle.at(joints, x)
         y, slope = line_contact(x, F, F_slope)
-        return ElasticState(y, slope, F, F_slope, peak * np.sqrt(y), angle * np.sqrt(y))
+        root = np.sqrt(y)
+        peak = self.peak.value(joints, t) * root
+        angle = self.angle.value(joints, t) * root
+        return ElasticState(y, slope, F, F_slope, peak, angle)
+
+    def pressure(self, joints: Elastic, x: Array) -> Array:
+        """p0 R/(E* dR) alone, of ``joints`` at ``x > 0`` ``(k,)``."""
+        t = depth(x)
+        F = self.F.value(joints, t)
+        y, _ = line_contact(x, F, np.zeros_like(F))
+        return self.peak.value(joints, t) * np.sqrt(y)
 
     def to_json(self) -> str:
         """The model as a table: a row for each product, its exponents and coefficients in six

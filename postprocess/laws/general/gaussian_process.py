@@ -10,9 +10,10 @@ outputs, as its leading block is the factor of the leading points.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cho_factor, solve_triangular
 
 from archord.postprocess.laws.general.joint import Array
 
@@ -34,9 +35,14 @@ class Kernel:
         b = other / self.lengths
         distance = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
         r = np.sqrt(7 * np.maximum(distance, 0.0))
-        matern = (1 + r * (1 + r * (0.4 + r / 15))) * np.exp(-r)
-        mean = 1 + one @ other.T
-        return matern + _WIDE * mean
+        matern = r / 15  # (1 + r (1 + r (0.4 + r/15))) exp(-r), in one array
+        matern += 0.4
+        for _ in range(2):
+            matern *= r
+            matern += 1
+        matern *= np.exp(-r)
+        matern += _WIDE * (1 + one @ other.T)
+        return matern
 
     def at(self, points: Array) -> Array:
         """Variances ``(n,)`` at points ``(n, d)``."""
@@ -48,40 +54,50 @@ class Process:
     of values is nan from some row on.
 
     - ``points`` ``(n, d)``: inputs of the data
-    - ``factor`` ``(n, n)``: Cholesky's lower factor of the covariance
-    - ``known`` ``(n, outputs)``: whether a value is known
+    - ``factor`` ``(n, n)``: Cholesky's upper factor of the covariance; below it is no number of use
+    - ``known`` ``(n, outputs)``: whether a value is known, 1 or 0
     - ``weights`` ``(n, outputs)``: the factor's inverse times the values, 0 where unknown
+    - ``count`` ``(outputs,)``: how many values are known
     - ``size`` ``(outputs,)``: variance of each output
-    - ``likelihood``: logarithm of the likelihood of all data
     """
 
     def __init__(self, kernel: Kernel, points: Array, values: Array) -> None:
         self.kernel = kernel
         self.points = points
-        covariance = np.zeros((len(points), len(points)))
+        covariance = np.empty((len(points), len(points)))
         for start in range(0, len(points), _ROWS):  # of the half that Cholesky's factor needs
             rows = slice(start, start + _ROWS)
             covariance[rows, : start + _ROWS] = kernel.between(
                 points[rows], points[: start + _ROWS]
             )
         covariance[np.diag_indices_from(covariance)] += kernel.noise
-        self.factor = cholesky(covariance, lower=True, check_finite=False)
-        self.known = ~np.isnan(values)
-        self.weights = solve_triangular(
-            self.factor, np.where(self.known, values, 0.0), lower=True, check_finite=False
-        )
-        self.weights *= self.known
-        count = self.known.sum(0)
-        self.size = (self.weights**2).sum(0) / np.maximum(count, 1)
-        told = np.cumsum(np.log(np.diag(self.factor)))[np.maximum(count, 1) - 1]
-        logarithms = 0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told
-        self.likelihood = -logarithms[count > 0].sum()
+        # The transposed matrix is in LAPACK's order: it is not copied.
+        self.factor, _ = cho_factor(covariance.T, overwrite_a=True, check_finite=False)
+        unknown = np.isnan(values)
+        self.known = 1.0 - unknown
+        self.weights = self._reduced(np.where(unknown, 0.0, values)) * self.known
+        self.count = self.known.sum(0).astype(int)
+        self.size = (self.weights**2).sum(0) / np.maximum(self.count, 1)
+
+    def _reduced(self, right: Array) -> Array:
+        """The inverse of the factor's transpose times ``right`` ``(n, m)``."""
+        return solve_triangular(self.factor, right, trans=1, check_finite=False)
+
+    @cached_property
+    def likelihood(self) -> float:
+        """Logarithm of the likelihood of all data."""
+        known = self.count > 0
+        count = self.count[known]
+        told = np.cumsum(np.log(np.diag(self.factor)))[count - 1]
+        return -float((0.5 * count * np.log(np.maximum(self.size[known], 1e-300)) + told).sum())
+
+    def means(self, points: Array) -> Array:
+        """Means ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
+        return self._reduced(self.kernel.between(self.points, points)).T @ self.weights
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
-        reduced = solve_triangular(
-            self.factor, self.kernel.between(self.points, points), lower=True, check_finite=False
-        )
+        reduced = self._reduced(self.kernel.between(self.points, points))
         told = (reduced**2).T @ self.known
         left = np.maximum(self.kernel.at(points)[:, None] - told, 0.0) + self.kernel.noise
         return reduced.T @ self.weights, np.sqrt(left * self.size)
@@ -90,14 +106,13 @@ class Process:
         """Errors ``(n, outputs)`` of each point's values as the other points predict them, and the
         standard deviations of these errors (section 5.4.2); nan where unknown."""
         off, deviation = np.full((2, *self.known.shape), np.nan)
-        for count in np.unique(self.known.sum(0)):
+        for count in np.unique(self.count):
             if count < 2:
                 continue
-            inverse = solve_triangular(
-                self.factor[:count, :count], np.eye(count), lower=True, check_finite=False
-            )
+            leading = self.factor[:count, :count]
+            inverse = solve_triangular(leading, np.eye(count), trans=1, check_finite=False)
             precision = (inverse**2).sum(0)
-            columns = np.flatnonzero(self.known.sum(0) == count)
+            columns = np.flatnonzero(self.count == count)
             off[:count, columns] = -(inverse.T @ self.weights[:count, columns]) / precision[:, None]
             deviation[:count, columns] = np.sqrt(self.size[columns] / precision[:, None])
         return off, deviation

@@ -22,29 +22,44 @@ from archord.postprocess.laws.general.elastic_model import Elastic, elastic_mode
 from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
     BODIES,
+    STEEPEST,
     TABLE,
     TERMS,
+    At,
     Flows,
     Strains,
+    feedback,
     flows,
     kind,
-    ln_strain,
+    mean_flows,
     representative,
+    rise,
+    slope_at,
+    terms,
     unsure,
 )
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, by_joint, first_loading, rms_largest
-from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss
+from archord.postprocess.laws.general.yield_model import (
+    Loss,
+    Yielding,
+    first_yield,
+    loss,
+    mesh_excess,
+    sides_of,
+)
 from archord.report.table import Table
 
 Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
 _RANGE = (0.05, 3.05)  # x of the data
 _USUAL = (0.099, 2.001)
-_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(8)])
-_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7)])  # how far from it coefficients are likely
+_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(10)])
+# how far from it coefficients are likely
+_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7), 1.0, 1.0])
 _SCATTER = 0.01  # of ln P of a joint, against which that counts
 _PARTS = 5  # of the joints, each of which the other parts predict
-_ITERATIONS = 5
+_ITERATIONS = 6
+_AGAIN = 2  # of a fit that begins with another one
 _SMALL = 1e-2
 _LITTLE = 1e-3  # change of P below which yielding does not matter
 _WITHIN = 0.93  # share of errors that the expected error is to contain
@@ -67,8 +82,12 @@ class Hardened:
         x, y, *_ = first_loading(runs).T
         inside = (x >= _RANGE[0]) & (x <= _RANGE[1])
         x = x[inside]
-        elastic = elastic_model().at(Elastic(*numbers[1:5]), x)
-        return cls(numbers, flows(joint), x, np.log(y[inside] / elastic.y))
+        elastic = elastic_model()
+        of_bodies = Elastic(*numbers[1:5])
+        side = sides_of(numbers)[0]
+        begins = first_yield(elastic, bool(numbers[0]), of_bodies, Yielding(*numbers[5:]).of(side))
+        force = np.log(y[inside] / elastic.at(of_bodies, x).y) - mesh_excess(side, x / begins)
+        return cls(numbers, flows(joint), x, force)
 
     @property
     def plane(self) -> str:
@@ -88,37 +107,33 @@ class Hardened:
         """d(ln P)/d(coefficients) ``(k, 2 terms)`` of pin and block, as if the s of the other body
         were constant."""
         columns = np.zeros((2, len(TERMS), len(self.x)))
-        for i, (body, flow) in enumerate(zip(BODIES, self.given, strict=True)):
-            if flow is None:
+        means = mean_flows(self.numbers[0], self.given)
+        for i, mean in means.items():
+            if np.isinf(self.numbers[5 + i]):
                 continue
+            body = BODIES[i]
             higher: Array = found.s.copy()
             higher[i] *= 1 + _SMALL
             of_s = (loss(self.numbers, Yielding(*higher), self.x).force - lost.force) / _SMALL
-            own = found.s[i]
-            other = found.s[1 - i]
-            rise = np.log(flow(found.strain[i] * (1 + _SMALL)) / flow(found.strain[i])) / _SMALL
-            of = model[f"{self.plane} {body}"]
-            lower_end = ln_strain(of, self.numbers, body, self.x, own, other)
-            upper_end = ln_strain(of, self.numbers, body, self.x, higher[i], other)
-            feedback = rise * (upper_end - lower_end) / _SMALL
-            units: Array = np.eye(len(TERMS))
-            for term in range(len(TERMS)):
-                unit = units[term]
-                shape = ln_strain(unit, self.numbers, body, self.x, own, other)
-                columns[i, term] = of_s * rise * shape / (1 - feedback)
+            strain = found.strain[i]
+            at = At(self.x, found.s[i], rise(mean, strain), found.s[1 - i])
+            slope = slope_at(mean, strain, found.s[i])
+            back = slope * feedback(model[f"{self.plane} {body}"], self.numbers, body, at)
+            part = of_s * slope / (1 - np.minimum(back, STEEPEST))
+            columns[i] = part * terms(self.numbers, body, at)
         return columns.reshape(-1, len(self.x)).T
 
 
-def fit_strain(joints: list[Hardened]) -> dict[str, Array]:
-    """The coefficients by plane and body, by Gauss and Newton's method: each joint counts like five
-    points."""
-    model: dict[str, Array] = {}
-    for plane in ("strain", "stress"):
+def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, Array]:
+    """The coefficients by plane and body, by Gauss and Newton's method, from the ``start`` of a fit
+    to nearly the same joints: each joint counts like five points."""
+    model: dict[str, Array] = dict(start or {})
+    for plane in sorted({joint.plane for joint in joints}):
         own = [joint for joint in joints if joint.plane == plane]
         names = [f"{plane} {body}" for body in BODIES]
-        values = np.tile(_GUESS, 2)
+        values = np.concatenate([model.get(name, _GUESS) for name in names])
         free = np.tile(_FREE, 2)
-        for _ in range(_ITERATIONS):
+        for _ in range(_AGAIN if start else _ITERATIONS):
             model |= dict(zip(names, np.split(values, 2), strict=True))
             rows = [np.diag(1 / free)]
             misses = [(values - np.tile(_GUESS, 2)) / free]
@@ -133,12 +148,14 @@ def fit_strain(joints: list[Hardened]) -> dict[str, Array]:
     return model
 
 
-def predicted(joints: list[Hardened]) -> list[Model]:
-    """For each joint the coefficients that the other parts of the joints give."""
+def predicted(joints: list[Hardened], model: Model) -> list[Model]:
+    """For each joint the coefficients that the other parts of the joints give; ``model`` is of all
+    joints."""
     part_of = np.arange(len(joints)) % _PARTS
-    parts = [
-        fit_strain([joints[i] for i in np.flatnonzero(part_of != part)]) for part in range(_PARTS)
-    ]
+    parts = []
+    for part in range(_PARTS):
+        others = [joints[i] for i in np.flatnonzero(part_of != part)]
+        parts.append(fit_strain(others, model))
     return [parts[part] for part in part_of]
 
 
@@ -149,7 +166,11 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
     for joint, model in zip(joints, models, strict=True):
         found, lost = joint.state(model)
         usual = (joint.x >= _USUAL[0]) & (joint.x <= _USUAL[1])
-        told = [lost.force - joint.force, lost.deviation, unsure(joint.given, found, lost)]
+        told = [
+            lost.force - joint.force,
+            lost.deviation,
+            unsure(joint.numbers[0], joint.given, found, lost),
+        ]
         by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])
     factors = {}
     table = Table("yields", "joints", "P 0.1 to 2 dR", "inside", left=1)
@@ -164,17 +185,16 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
 
 
 def main(folder: Path) -> None:
-    """Fit to the sweep in ``folder``, write the table beside this file, and print how good it
-    is."""
+    """Fit to the sweep in ``folder``, write the table beside this file, and print how good it is. A
+    plane without joints keeps its coefficients."""
     solved = {joint: runs for joint, runs in by_joint(folder).items() if joint.hardens}
     joints = [Hardened.of(joint, runs) for joint, runs in solved.items()]
-    factors, table = errors_of(joints, predicted(joints))
-    strain = {
-        name: [float(f"{value:.5g}") for value in values]
-        for name, values in fit_strain(joints).items()
-    }
-    text = json.dumps({"strain": strain, "error": factors}, indent=1)
-    TABLE.write_text(f"{text}\n", encoding="utf-8")
+    model = fit_strain(joints)
+    factors, table = errors_of(joints, predicted(joints, model))
+    found = {name: [float(f"{value:.5g}") for value in values] for name, values in model.items()}
+    stored = json.loads(TABLE.read_text(encoding="utf-8"))
+    new = {"strain": stored["strain"] | found, "error": stored["error"] | factors}
+    TABLE.write_text(json.dumps(new, indent=1) + "\n", encoding="utf-8")
     print(table.markdown())
 
 

@@ -1,12 +1,13 @@
 """Hardening by a representative strain (Tabor 1951): a body that hardens acts on the joint as a
-perfectly plastic one does whose yield stress is the flow stress at a strain ``eps_rep``.
+perfectly plastic one does whose yield stress is the flow stress at a strain ``eps_rep``, and in
+plane stress, where strains differ more, the mean flow stress of strains up to twice ``eps_rep``.
 
-    P(x) = P_pp(x; s_eff),   s_eff = s(eps_rep(x, s_eff)),   s = sigY R/(E* dR)
+    P(x) = P_pp(x; s_eff),   s_eff = s at eps_rep(x, s_eff),   s = sigY R/(E* dR)
 
-P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x and ln s_eff, and of
-what the two bodies are; it hardly depends on the curve s(PEEQ). hardening_model.json has its
-coefficients by plane and body, and factors of the expected error: hardening_fit.py makes it. p0,
-eps and the way back follow the same s_eff.
+P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x and ln s_eff, of
+what the two bodies are, and in plane stress of how the curve s(PEEQ) rises. hardening_model.json
+has its coefficients by plane and body, and factors of the expected error: hardening_fit.py makes
+it. p0, eps and the way back follow the same s_eff.
 """
 
 from __future__ import annotations
@@ -25,15 +26,21 @@ from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss
 
 TABLE = Path(__file__).parent / "hardening_model.json"
 BODIES = ("pin", "block")
-# of ln(eps_rep R/dR), with s of the body itself
+# Products of inputs (see `terms`), of which ln(eps_rep R/dR) is a sum.
 TERMS = (
-    *("1", "ln x", "ln s", "ln x^2", "ln x ln s", "ln s^2"),
-    *("share", "soft", "weaker", "|weaker|", "ln dR/R"),
+    *("1", "x", "s", "x x", "x s", "s s"),
+    *("share", "soft", "weaker", "apart", "clearance", "rise", "gain"),
 )
-_ITERATIONS = 60  # at most, of the fixed point
+SPREAD = {"strain": 0.0, "stress": 1.0}  # half the range of strains over eps_rep
+_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_ITERATIONS = 60  # at most, of Newton's method
 _CLOSE = 1e-13
+_FARTHEST = 1.0  # of an iteration, in ln(eps_rep)
+_SMALL = 1e-2  # of a difference quotient
+STEEPEST = 0.7  # slope of ln(eps_rep) by itself through s_eff
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
+_LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
 _YIELDED = 0.02
 _LEAST = 0.5  # ln of the rise that counts where a curve is flat
 WIDE = 3.0  # factor on eps_rep, up and down, between which the curve tells the error
@@ -60,41 +67,105 @@ def flows(joint: LawJoint) -> Flows:
     return flow(joint.pin_hardening), flow(joint.block_hardening)
 
 
-def ln_strain(
-    of: Array, numbers: Sequence[float], body: str, x: Array, own: Array, other: Array
-) -> Array:
-    """``ln(eps_rep R/dR)`` ``(k,)`` of a ``body`` of the joint with these ``numbers`` (see
-    `joint_numbers`) with the coefficients ``of`` all `TERMS`, at ``x`` ``(k,)`` with these s of its
-    ``own`` and of the ``other`` body."""
-    _, p, m, n, clearance, *_ = numbers
+def mean_flow(flow: Flow, spread: float) -> Flow:
+    """The mean s ``(k,)`` by strains ``(k,)``, as far below and above each as ``spread`` of it."""
+    parts = 1 + spread * _PLACES
+
+    def mean(strain: Array) -> Array:
+        asked = strain[:, None] * parts
+        return np.broadcast_to(flow(asked), asked.shape) @ (_WEIGHTS / 2)
+
+    return mean
+
+
+def mean_flows(strain: float, given: Flows) -> dict[int, Flow]:
+    """`mean_flow` of the bodies that harden, by their places in `BODIES`, in plane ``strain`` or
+    stress (0)."""
+    spread = SPREAD["strain" if strain else "stress"]
+    return {i: mean_flow(flow, spread) for i, flow in enumerate(given) if flow is not None}
+
+
+def slope_at(mean: Flow, strain: Array, s: Array) -> Array:
+    """d(ln s)/d(ln strain) of a `mean_flow`, which is ``s`` at ``strain`` (all ``(k,)``)."""
+    return np.log(mean((1 + _SMALL) * strain) / s) / np.log1p(_SMALL)
+
+
+def rise(mean: Flow, strain: Array) -> Array:
+    """The same ``(k,)`` on average, from a part of ``strain`` ``(k,)`` to a multiple, `WIDE`."""
+    return np.log(mean(WIDE * strain) / mean(strain / WIDE)) / (2 * np.log(WIDE))
+
+
+class At(NamedTuple):
+    """Where eps_rep of a body is asked for, each ``(k,)``: x, the body's s and `rise`, and the
+    other body's s."""
+
+    x: Array
+    own: Array
+    rise: Array
+    other: Array
+
+
+def terms(numbers: Sequence[float], body: str, at: At) -> Array:
+    """All `TERMS` ``(terms, k)`` of a ``body`` of the joint with these ``numbers`` (see
+    `joint_numbers`)."""
+    _, p, m, n, clearance, *first = numbers
     share, soft = (p, p * m) if body == "pin" else (1 - p, (1 - p) * n)
-    lx = np.log(np.maximum(x, _NEAREST))
-    ls = np.log(own)
-    weaker = np.clip(np.log(other) - ls, -_ALIKE, _ALIKE)
-    first, of_x, of_s, xx, xs, ss, of_share, of_soft, of_weaker, apart, of_clearance = of
-    bodies = of_share * (share - 0.5) + of_soft * soft + of_clearance * np.log(clearance / 0.005)
-    curve = of_x * lx + of_s * ls + xx * lx**2 + xs * lx * ls + ss * ls**2
-    return first + bodies + curve + of_weaker * weaker + apart * np.abs(weaker)
+    ls = np.log(at.own)
+    weaker = np.clip(np.log(at.other) - ls, -_ALIKE, _ALIKE)
+    inputs = {
+        "1": 1.0,
+        "x": np.log(np.maximum(at.x, _NEAREST)),
+        "s": ls,
+        "share": share - 0.5,
+        "soft": soft,
+        "weaker": weaker,
+        "apart": np.abs(weaker),
+        "clearance": np.log(clearance / 0.005),
+        "rise": at.rise,
+        "gain": np.minimum(ls - np.log(first[BODIES.index(body)]), _LARGEST_GAIN),
+    }
+    products: Array = np.ones((len(TERMS), len(at.x)))
+    for product, names in zip(products, TERMS, strict=True):
+        for name in names.split():
+            product *= inputs[name]
+    return products
+
+
+def feedback(of: Array, numbers: Sequence[float], body: str, at: At) -> Array:
+    """d(ln eps_rep)/d(ln s) ``(k,)`` with the coefficients ``of`` all `TERMS`; see `terms`."""
+    higher = at._replace(own=at.own * (1 + _SMALL))
+    change = terms(numbers, body, higher) - terms(numbers, body, at)
+    return of @ change / np.log1p(_SMALL)
 
 
 def representative(
     model: Mapping[str, Array], numbers: Sequence[float], given: Flows, x: Array
 ) -> Strains:
-    """The fixed point of s_eff and eps_rep at ``x`` ``(k,)`` of the joint with these ``numbers``,
-    whose bodies harden as ``given``; ``model`` has the coefficients by plane and body."""
+    """s_eff and eps_rep at ``x`` ``(k,)`` of the joint with these ``numbers``, whose bodies harden
+    as ``given``; ``model`` has the coefficients by plane and body. Newton's method in ln(eps_rep)
+    of each body, with the other body's s_eff of the last iteration."""
     plane = "strain" if numbers[0] else "stress"
     s = np.repeat(np.array(numbers[5:])[:, None], len(x), axis=1)
     strain = np.zeros_like(s)
+    means = mean_flows(numbers[0], given)
+    hardens = [i for i in means if np.isfinite(numbers[5 + i])]
+    for i in hardens:
+        of = model[f"{plane} {BODIES[i]}"]
+        start = At(x, s[i], np.zeros(len(x)), s[1 - i])
+        strain[i] = numbers[4] * np.exp(of @ terms(numbers, BODIES[i], start))
     for _ in range(_ITERATIONS):
-        before = s.copy()
         moved = 0.0
-        for i, (body, flow) in enumerate(zip(BODIES, given, strict=True)):
-            if flow is not None and np.isfinite(s[i]).all():
-                of = model[f"{plane} {body}"]
-                ln = ln_strain(of, numbers, body, x, before[i], before[1 - i])
-                strain[i] = numbers[4] * np.exp(ln)
-                s[i] = np.sqrt(before[i] * flow(strain[i]))
-                moved = max(moved, float(np.abs(s[i] / before[i] - 1).max()))
+        before = s.copy()
+        for i in hardens:
+            mean = means[i]
+            of = model[f"{plane} {BODIES[i]}"]
+            s[i] = mean(strain[i])
+            at = At(x, s[i], rise(mean, strain[i]), before[1 - i])
+            miss = np.log(strain[i] / numbers[4]) - of @ terms(numbers, BODIES[i], at)
+            back = slope_at(mean, strain[i], s[i]) * feedback(of, numbers, BODIES[i], at)
+            step = np.clip(miss / (1 - np.minimum(back, STEEPEST)), -_FARTHEST, _FARTHEST)
+            strain[i] *= np.exp(-step)
+            moved = max(moved, float(np.abs(step).max()), float(np.abs(s[i] / before[i] - 1).max()))
         if moved <= _CLOSE:
             break
     return Strains(s, strain)
@@ -114,7 +185,7 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     found = representative(table["strain"], numbers, given, x)
     lost = loss(numbers, Yielding(*found.s), x)
     slope: Array = CubicSpline(np.log(x), lost.force)(np.log(x), 1) / x
-    wrong = table["error"][kind(numbers)] * unsure(given, found, lost)
+    wrong = table["error"][kind(numbers)] * unsure(numbers[0], given, found, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
     return lost._replace(slope=slope, deviation=error)
 
@@ -128,23 +199,20 @@ def kind(numbers: Sequence[float]) -> str:
     return f"{'strain' if strain else 'stress'} {body}"
 
 
-def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
+def unsure(strain: float, given: Flows, found: Strains, lost: Loss) -> Array:
     """By how much P ``(k,)`` would change, roughly and relatively, if eps_rep were `WIDE` times as
     large: ln of the rise of the curves, at least `_LEAST`, where `_YIELDED` of P and more is
     ``lost`` to yielding, and less before."""
     squares: Array = np.full(len(lost.force), _LEAST**2)
-    for i, flow in enumerate(given):
-        if flow is not None:
-            strain = found.strain[i]
-            rise = np.log(flow(WIDE * strain) / flow(strain / WIDE))
-            squares += rise**2
+    for i, mean in mean_flows(strain, given).items():
+        squares += (2 * np.log(WIDE) * rise(mean, found.strain[i])) ** 2
     return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)
 
 
 @cache
 def hardening_model() -> dict[str, dict[str, Any]]:
-    """The model that comes with archord: ``strain``, the coefficients of `ln_strain` by plane and
-    body, and ``error``, the factor on `unsure` that 9 in 10 errors keep, by `kind`."""
+    """The model that comes with archord: ``strain``, the coefficients of `TERMS` by plane and body,
+    and ``error``, the factor on `unsure` that 9 in 10 errors keep, by `kind`."""
     table = json.loads(TABLE.read_text(encoding="utf-8"))
     strain = {name: np.array(values) for name, values in table["strain"].items()}
     return {"strain": strain, "error": table["error"]}

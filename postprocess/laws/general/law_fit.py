@@ -6,8 +6,8 @@ squares and likelihood.
     python3 -m archord.postprocess.laws.general.law_fit runs/law
 
 A joint that yields is solved with one step between nodes, and with two where yielding begins early;
-steps converge with the first order, so the two extrapolate (Richardson). What comes back tells the
-way back.
+steps converge with the first order, so the two extrapolate (Richardson). P and p0 are corrected for
+the mesh. What comes back tells the way back.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ from archord.postprocess.laws.general.yield_model import (
     SolvedJoints,
     Yielding,
     YieldModel,
+    mesh_excess,
     onset,
     side_model,
     sides_of,
@@ -234,7 +235,9 @@ def yielding_joints(
                 of_pins = total_loss({PIN_ALONE: pins}, model, joint, yielding, _LAW).peak
             x0, lost = onset(side, model, joint, yielding, _LAW, of_pins)
             back += [(len(rows), deepest / x0, *told) for deepest, *told in ways]
-            rows.append((SIDES.index(side), numbers, x0, lost, *_at_multiples(x / x0, curves)))
+            excess = mesh_excess(side, x / x0)
+            told = _at_multiples(x / x0, curves - [excess, excess, 0 * excess])
+            rows.append((SIDES.index(side), numbers, x0, lost, *told))
     columns = (np.array(column) for column in zip(*rows, strict=True))
     indices, given, onsets, of_others, counts, losses = columns
     force, peak, angle = np.moveaxis(losses, 1, 0)

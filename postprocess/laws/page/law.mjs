@@ -405,7 +405,7 @@ function totalLoss(data, side, strain, elastic, stresses, x) {
             return {
                 force: sum.force + own.force,
                 slope: sum.slope + own.slope,
-                deviation: Math.hypot(sum.deviation, own.deviation),
+                deviation: Math.hypot(sum.deviation, own.deviation, own.begun * data.mesh[model]),
                 peak: sum.peak + own.peak,
                 angle: sum.angle + own.angle,
                 travel: mixed("travel"),
@@ -444,43 +444,85 @@ function lossOf(data, strain, elastic, stresses, x) {
 /** The yield stress at a PEEQ: straight between points, constant beyond the last. */
 const flowStress = (points, peeq) => straight(peeq, points.map((point) => point[0]), points.map((point) => point[1]));
 
-/** ln(eps_rep R/dR) of a body at x, where the bodies have these s. */
-function lnStrain(t, { p, m, n, clearance }, body, x, own, other) {
-    const share = body === "pin" ? p : 1 - p;
-    const soft = body === "pin" ? p * m : (1 - p) * n;
-    const lx = Math.log(Math.max(x, 0.05));
+const GAUSS = [
+    [-0.906179845938664, 0.23692688505618908],
+    [-0.5384693101056831, 0.47862867049936647],
+    [0, 0.5688888888888889],
+    [0.5384693101056831, 0.47862867049936647],
+    [0.906179845938664, 0.23692688505618908],
+]; // points and weights from -1 to 1
+const SMALL = 1e-2; // of a difference quotient
+const WIDE = 3; // factor on a strain, up and down
+const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
+const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
+
+/** The mean s by a strain, as far below and above it as `spread` of it. */
+const meanFlow = (flow, spread) => (strain) =>
+    GAUSS.reduce((sum, [place, weight]) => sum + (weight / 2) * flow(strain * (1 + spread * place)), 0);
+
+/** d(ln s)/d(ln strain) of the mean flow, from a third of a strain to three times it. */
+const riseOf = (mean, strain) => Math.log(mean(WIDE * strain) / mean(strain / WIDE)) / (2 * Math.log(WIDE));
+
+/** ln(eps_rep R/dR) of a body at x, where the bodies have these s: a sum of products of inputs. */
+function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, own, rise, other) {
     const ls = Math.log(own);
-    const weaker = clip(Math.log(other) - ls, -0.5, 0.5);
-    const curve = t[1] * lx + t[2] * ls + t[3] * lx ** 2 + t[4] * lx * ls + t[5] * ls ** 2;
-    const bodies = t[6] * (share - 0.5) + t[7] * soft + t[10] * Math.log(clearance / 0.005);
-    return t[0] + bodies + curve + t[8] * weaker + t[9] * Math.abs(weaker);
+    const weaker = clip(Math.log(other) - ls, -ALIKE, ALIKE);
+    const inputs = {
+        1: 1,
+        x: Math.log(Math.max(x, 0.05)),
+        s: ls,
+        share: (body === "pin" ? p : 1 - p) - 0.5,
+        soft: body === "pin" ? p * m : (1 - p) * n,
+        weaker,
+        apart: Math.abs(weaker),
+        clearance: Math.log(clearance / 0.005),
+        rise,
+        gain: Math.min(ls - Math.log(first), LARGEST_GAIN),
+    };
+    const product = (names) => names.split(" ").reduce((all, name) => all * inputs[name], 1);
+    return model.terms.reduce((sum, names, k) => sum + coefficients[k] * product(names), 0);
 }
 
-/** s_eff of both bodies at each x, with their representative strains: a fixed point. */
+/** s_eff of both bodies at each x, with their representative strains, by Newton's method; `flows` are means. */
 function representative(model, strain, elastic, begin, flows, x) {
     const plane = strain ? "strain" : "stress";
     const bodies = ["pin", "block"].filter((body) => flows[body]);
-    let found = x.map(() => ({ ...begin, strain: { pin: 0, block: 0 } }));
-    for (let k = 0; k < 60; k++) {
-        let moved = 0;
-        found = found.map((before, i) => {
-            const now = { ...before, strain: { ...before.strain } };
+    return x.map((place) => {
+        const s = { ...begin };
+        const eps = { pin: 0, block: 0 };
+        const ln = (body, own, rise, other) => {
+            const coefficients = model.strain[`${plane} ${body}`];
+            return lnStrain(model, coefficients, elastic, body, begin[body], place, own, rise, other);
+        };
+        const otherOf = (body) => (body === "pin" ? "block" : "pin");
+        for (const body of bodies) eps[body] = elastic.clearance * Math.exp(ln(body, s[body], 0, s[otherOf(body)]));
+        for (let k = 0; k < 60; k++) {
+            const before = { ...s };
+            let moved = 0;
             for (const body of bodies) {
-                const other = before[body === "pin" ? "block" : "pin"];
-                const ln = lnStrain(model.strain[`${plane} ${body}`], elastic, body, x[i], before[body], other);
-                now.strain[body] = elastic.clearance * Math.exp(ln);
-                now[body] = Math.sqrt(before[body] * flows[body](now.strain[body]));
-                moved = Math.max(moved, Math.abs(now[body] / before[body] - 1));
+                const other = before[otherOf(body)];
+                const own = flows[body](eps[body]);
+                const rise = riseOf(flows[body], eps[body]);
+                const level = ln(body, own, rise, other);
+                const feedback = (ln(body, own * (1 + SMALL), rise, other) - level) / Math.log1p(SMALL);
+                const slope = Math.log(flows[body]((1 + SMALL) * eps[body]) / own) / Math.log1p(SMALL);
+                const miss = Math.log(eps[body] / elastic.clearance) - level;
+                const step = clip(miss / (1 - Math.min(slope * feedback, 0.7)), -1, 1);
+                s[body] = own;
+                eps[body] *= Math.exp(-step);
+                moved = Math.max(moved, Math.abs(step), Math.abs(own / before[body] - 1));
             }
-            return now;
-        });
-        if (moved <= 1e-13) break;
-    }
-    return found;
+            if (moved <= 1e-13) break;
+        }
+        return { ...s, strain: eps };
+    });
 }
 
 /** What yielding does at x to a joint whose bodies harden: as perfectly plastic ones with s_eff. */
-function hardenedLoss(data, strain, elastic, begin, flows, x) {
+function hardenedLoss(data, strain, elastic, begin, given, x) {
+    const spread = data.hardening.spread[strain ? "strain" : "stress"];
+    const flows = {};
+    for (const body of ["pin", "block"]) flows[body] = given[body] && meanFlow(given[body], spread);
     const found = representative(data.hardening, strain, elastic, begin, flows, x);
     const lost = lossOf(data, strain, elastic, found, x);
     const logs = x.map(Math.log);
@@ -488,10 +530,8 @@ function hardenedLoss(data, strain, elastic, begin, flows, x) {
     const alone = ["pin", "block"].filter((body) => Number.isFinite(begin[body]));
     const kind = `${strain ? "strain" : "stress"} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
-        const rises = ["pin", "block"].filter((body) => flows[body]).map((body) => {
-            const eps = found[i].strain[body];
-            return Math.log(flows[body](3 * eps) / flows[body](eps / 3));
-        });
+        const hardens = ["pin", "block"].filter((body) => flows[body]);
+        const rises = hardens.map((body) => 2 * Math.log(WIDE) * riseOf(flows[body], found[i].strain[body]));
         const yielded = Math.min(Math.max((1 - Math.exp(state.force)) / 0.02, 0), 1);
         const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded;
         return { ...state, slope: slopes[i] / x[i], deviation: Math.hypot(state.deviation, wrong) };
@@ -501,7 +541,12 @@ function hardenedLoss(data, strain, elastic, begin, flows, x) {
 // --- the law of one joint
 
 const NODES = [0, ...geomspace(0.02, 3, 60)]; // x = delta/dR
-const ELASTIC_ERROR = 1e-3; // of P, relative
+// Of P, relative: of what is elastic of joints that yield and of small x; and else of elastic joints with p m up to
+// the first of these, and from the second on.
+const ELASTIC_ERROR = 1e-3;
+const SMALL_X = 0.1;
+const CORNER = [0.45, 0.55];
+const CORNER_ERRORS = [4e-4, 8e-4];
 const STEEPEST = 0.999; // secant of the way back over the elastic joint's steepest slope: then it is a straight line
 
 /** A number as Python's `g` prints it, in this many digits. */
@@ -624,7 +669,8 @@ function reduced(elastic, lost) {
     let dy = base.map((state) => state.slope);
     let peak = base.map((state) => state.peak);
     let angle = base.map((state) => state.angle);
-    let error = x.map(() => ELASTIC_ERROR);
+    const corner = straight(elastic.p * elastic.m, CORNER, CORNER_ERRORS);
+    let error = x.map((place) => (lost || place < SMALL_X ? ELASTIC_ERROR : corner));
     let ratio = x.map(() => 1);
     let toe = x.map(() => 0);
     let backError = x.map(() => 0);

@@ -86,7 +86,9 @@ def law_data() -> tuple[str, bytes]:
         "multiples": yield_model.MULTIPLES.tolist(),
         "elastic": _json(elastic_model.TABLE),
         "kernels": _json(yield_model.KERNELS),
-        "hardening": _json(hardening_model.TABLE),
+        "hardening": _json(hardening_model.TABLE)
+        | {"terms": hardening_model.TERMS, "spread": hardening_model.SPREAD},
+        "mesh": yield_model.MESH_ERROR,
         "range": _range(),
         "metals": metals(),
         "exports": _exports(),

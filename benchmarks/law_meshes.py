@@ -1,0 +1,57 @@
+"""How far P of joints like those that the general law is fitted to is from P on the finest mesh.
+
+python3 -m archord.studies.law_design --meshes > meshes.sweep.toml
+mpirun -n 2 archord sweep meshes.sweep.toml
+python3 -m archord.benchmarks.law_meshes runs/meshes
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from archord.benchmarks.law_check import kind_of
+from archord.postprocess.laws.general.general_law import joint_numbers
+from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest
+from archord.postprocess.run import Run
+from archord.report.table import Table
+
+_USUAL = (0.099, 2.001)  # x of the errors
+
+
+def by_size(folder: Path) -> dict[LawJoint, dict[float, Array]]:
+    """By joint and size of its elements over R: the nodes ``(n, 4)`` of `NodeRun`, of the sweep in
+    ``folder``."""
+    found: dict[LawJoint, dict[float, Array]] = defaultdict(dict)
+    for path in sorted((folder / "cases").iterdir()):
+        curve = Run(path).curve
+        if len(curve.delta) == sum(curve.scene.load.stage_steps):
+            size = curve.scene.joint.relative_element_size or 0.0
+            found[LawJoint.from_scene(curve.scene)][size] = NodeRun.of(curve).nodes
+    return dict(found)
+
+
+def mesh_table(folder: Path) -> Table:
+    """Errors of P by kind of joint and size of the elements, in per cent of P on the finest
+    mesh."""
+    errors: dict[tuple[str, float], list[Array]] = defaultdict(list)
+    for joint, solved in by_size(folder).items():
+        finest = solved[min(solved)]
+        usual = (finest[:, 0] >= _USUAL[0]) & (finest[:, 0] <= _USUAL[1])
+        for size, nodes in solved.items():
+            if size > min(solved):
+                off = 100 * (nodes[usual, 1] / finest[usual, 1] - 1)
+                errors[kind_of(joint_numbers(joint)), size].append(off)
+    table = Table("joints", "elements over R", "number", "mean", "rms/largest", left=1)
+    for (kind, size), parts in sorted(errors.items()):
+        off = np.concatenate(parts)
+        table.add(kind, f"{size:g}", len(parts), f"{off.mean():+.2f}", rms_largest(off))
+    return table
+
+
+if __name__ == "__main__":
+    print(mesh_table(Path(sys.argv[1])).markdown())
