@@ -102,15 +102,42 @@ def go_on(problem, folder, comm=MPI.COMM_SELF, *, extend: bool = False, crash: i
     return outcome
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """``whole(problem)`` is the folder of a run that nobody disturbed, solved once; beside it lie
+    its states after the steps, "1" and so on."""
+    folders = {}
+
+    def solved(problem):
+        key = resolved(problem)
+        if key not in folders:
+            parent = tmp_path_factory.mktemp("whole")
+            run(problem, parent / "whole", copies={k: parent / f"{k}" for k in range(1, 9)})
+            folders[key] = parent / "whole"
+        return folders[key]
+
+    return solved
+
+
+@pytest.fixture
+def halted_after(whole, tmp_path):
+    """``halted_after(problem, step)`` is the folder of a run to go on with."""
+
+    def copied(problem, step):
+        return shutil.copytree(whole(problem).with_name(f"{step}"), tmp_path / "halted")
+
+    return copied
+
+
 @pytest.mark.parametrize("name", CASES)
-def test_a_restarted_run_equals_the_uninterrupted_one(tmp_path, name):
+def test_a_restarted_run_equals_the_uninterrupted_one(whole, halted_after, name):
     """Every number of every file, to 1e-12, on one rank."""
     problem, step = CASES[name]
-    run(problem, tmp_path / "whole", copies={step: tmp_path / "halted"})
-    assert accepted_steps(tmp_path / "halted") == step < len(problem.targets)
-    outcome = go_on(problem, tmp_path / "halted")
+    halted = halted_after(problem, step)
+    assert accepted_steps(halted) == step < len(problem.targets)
+    outcome = go_on(problem, halted)
     assert [m.step for m in outcome.steps] == list(range(1, len(problem.targets) + 1))
-    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
+    same_run(whole(problem), halted, 1e-12)
     if name == "cutbacks":
         assert sum(m.cutbacks for m in outcome.steps[step:]) > 0
 
@@ -144,16 +171,16 @@ def test_a_restarted_run_remembers_the_continuation_in_gamma(tmp_path):
     assert halted["P"] == pytest.approx(whole["P"], rel=1e-9)
 
 
-def test_a_checkpoint_of_version_0_1_goes_on(tmp_path):
+def test_a_checkpoint_of_version_0_1_goes_on(whole, halted_after):
     """It calls active-set changes flips."""
     problem, step = CASES["plastic"]
-    run(problem, tmp_path / "whole", copies={step: tmp_path / "halted"})
-    old = checkpoint.read(tmp_path / "halted" / CHECKPOINT)
+    halted = halted_after(problem, step)
+    old = checkpoint.read(halted / CHECKPOINT)
     for attempt in old.scalars["step"]["attempts"]:
         attempt["flips"] = attempt.pop("active_set_changes")
-    checkpoint.write(tmp_path / "halted" / CHECKPOINT, old)
-    go_on(problem, tmp_path / "halted")
-    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
+    checkpoint.write(halted / CHECKPOINT, old)
+    go_on(problem, halted)
+    same_run(whole(problem), halted, 1e-12)
 
 
 def test_a_halted_run_of_version_0_2_at_large_strain_goes_on(tmp_path):
@@ -175,15 +202,14 @@ def test_a_halted_run_of_version_0_2_at_large_strain_goes_on(tmp_path):
     assert halted[name] == pytest.approx(whole[name], rel=2e-3)
 
 
-def test_a_run_may_be_halted_after_every_step(tmp_path):
+def test_a_run_may_be_halted_after_every_step(whole, tmp_path):
     """Restarted as often as it has steps; run.json notes each."""
     problem = CASES["plastic"][0]
-    run(problem, tmp_path / "whole")
     run(problem, tmp_path / "halted", crash=1)
     for step in (2, 3, 4):
         go_on(problem, tmp_path / "halted", crash=step)
     go_on(problem, tmp_path / "halted")
-    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
+    same_run(whole(problem), tmp_path / "halted", 1e-12)
     report = json.loads((tmp_path / "halted" / "run.json").read_text())
     assert [r["after_step"] for r in report["restarts"]] == [1, 2, 3, 4]
     assert report["totals"]["newton_iterations"] == sum(
@@ -226,15 +252,17 @@ LONGER = scene(0.2, **PLASTIC, load={"displacement": 3.0, "steps": 6})
 
 @pytest.mark.parametrize("long", [LONGER, CASES["unloading"][0]], ids=["on", "back"])
 @pytest.mark.parametrize("steps", [3, 2], ids=["finished", "halted"])
-def test_an_extended_run_equals_the_long_one(tmp_path, long, steps):
+def test_an_extended_run_equals_the_long_one(whole, halted_after, tmp_path, long, steps):
     """Further loading or unloading added to a run, which may be killed there and then is restarted
     like any other."""
-    run(SHORT, tmp_path / "run", crash=steps if steps < 3 else 0)
-    go_on(long, tmp_path / "run", extend=True, crash=5)
-    assert (tmp_path / "run" / "scene.toml").read_text() == resolved(long)
-    go_on(None, tmp_path / "run")
-    run(long, tmp_path / "long")
-    same_run(tmp_path / "long", tmp_path / "run", 1e-12)
+    if steps < 3:
+        folder = halted_after(SHORT, steps)
+    else:
+        folder = shutil.copytree(whole(SHORT), tmp_path / "halted")
+    go_on(long, folder, extend=True, crash=5)
+    assert (folder / "scene.toml").read_text() == resolved(long)
+    go_on(None, folder)
+    same_run(whole(long), folder, 1e-12)
 
 
 @pytest.fixture(scope="module")
