@@ -105,8 +105,13 @@ class Prescribed:
         fixed = self.holder >= 0
         largest = np.array([np.abs(self._displaced(motion)).max(initial=0.0) for motion in moving])
         self._comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
-        self._require_free(moving, fixing, fixed, _ALIKE * largest)
-        self._require_alike(moving, fixed, _ALIKE * largest)
+        # along an axis in which a turn displaces nothing all is round-off
+        of_name: dict[str, float] = {}
+        for motion, size in zip(moving, largest, strict=True):
+            of_name[motion.name] = max(size, of_name.get(motion.name, 0.0))
+        round_off = _ALIKE * np.array([of_name[motion.name] for motion in moving])
+        self._require_free(moving, fixing, fixed, round_off)
+        self._require_alike(moving, fixed, round_off)
         meeting = np.zeros(self.holder.shape)
         for motion in moving:
             free = ~fixed[motion.nodes, motion.axis]

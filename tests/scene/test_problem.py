@@ -176,7 +176,8 @@ def test_an_interference_has_a_stage_of_its_own():
                 {"name": "a", "surfaces": ["pin", "hole"]},
                 {"name": "b", "surfaces": ["bore", "pin"]},
             ],
-            'interaction "b".surfaces = .* must not name .pin., which .a. has already; give its facets a second name',
+            'interaction "b".surfaces = .* must not name .pin., which .a. has already; '
+            "give its facets a second name",
         ),
         ("load.1.direction", "up", 'load "side".direction = "up" must be'),
         (
