@@ -38,7 +38,7 @@ ELASTIC_ERROR = 1e-3
 _SMALL = 0.1
 _CORNER = (0.45, 0.55)
 _CORNER_ERRORS = (4e-4, 8e-4)
-_LARGEST_GAIN = 3.2  # of s_eff/s at 3 dR; solved joints reach 2.6
+LARGEST_GAIN = 3.2  # of s_eff/s at 3 dR; solved joints reach 2.6
 # secant of the way back over the elastic joint's steepest slope: then it is a straight line
 _STEEPEST = 0.999
 
@@ -187,8 +187,8 @@ def outside(joint: LawJoint) -> str:
             to = f"to {high:g}" if high < math.inf else "and more"
             return f"{name} = {value:.4g} is outside {low:g} {to}"
     gain = float(gains(joint_numbers(joint), flows(joint), NODES[-1]).max())
-    if gain > _LARGEST_GAIN:
-        said = f"{gain:.3g} times the yield stress, at most {_LARGEST_GAIN:g} times is covered"
+    if gain > LARGEST_GAIN:
+        said = f"{gain:.3g} times the yield stress, at most {LARGEST_GAIN:g} times is covered"
         return f"a body hardens by 3 dR to {said}"
     return ""
 

@@ -518,12 +518,21 @@ function representative(model, strain, elastic, begin, flows, x) {
     });
 }
 
+/** Throw, with Python's sentence, for a body that has hardened to more than `most` times its yield stress. */
+function requireGain(most, { pin, block }, begin, flows) {
+    const gain = Math.max(flows.pin ? pin / begin.pin : 1, flows.block ? block / begin.block : 1);
+    if (gain <= most) return;
+    const said = `${inDigits(gain, 3)} times the yield stress, at most ${inDigits(most)} times is covered`;
+    throw new RangeError(`archord: a body hardens by 3 dR to ${said}.`);
+}
+
 /** What yielding does at x to a joint whose bodies harden: as perfectly plastic ones with s_eff. */
 function hardenedLoss(data, strain, elastic, begin, given, x) {
     const spread = data.hardening.spread[strain ? "strain" : "stress"];
     const flows = {};
     for (const body of ["pin", "block"]) flows[body] = given[body] && meanFlow(given[body], spread);
     const found = representative(data.hardening, strain, elastic, begin, flows, x);
+    requireGain(data.range.gain, found[found.length - 1], begin, flows);
     const lost = lossOf(data, strain, elastic, found, x);
     const logs = x.map(Math.log);
     const slopes = splineSlopes(logs, lost.map((state) => state.force), false);

@@ -114,6 +114,7 @@ def _range() -> dict[str, Any]:
         "clearances": general_law.CLEARANCES,
         "ratios": general_law.RATIOS,
         "smallest": general_law.SMALLEST_S,
+        "gain": general_law.LARGEST_GAIN,
     }
 
 
