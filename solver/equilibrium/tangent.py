@@ -21,6 +21,7 @@ from archord.solver.linear.condensed import Condensed
 from archord.solver.linear.strategy import Sum
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+_WITHOUT_COPY = 3  # dimension from which on elastic joints have no copy of their matrix
 _SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
 Revise = Callable[[Array], Array | None]
 
@@ -68,7 +69,8 @@ class TangentMatrix:
         self._bcs = [self._held(axis) for axis in range(self.dimension)]
         self._prescribed, self._rates = self._prescribed_rates()
         self.A = PETSc.Mat()
-        self._elastic = PETSc.Mat()  # the constant part, with room for all, unless all is constant
+        # the constant part, with room for all; in space none of elastic joints, as it is large
+        self._elastic = PETSc.Mat()
         self.condensed: Condensed | None = None
         if revise is not None:
             with timer(BEFORE_SOLVING):
@@ -128,7 +130,8 @@ class TangentMatrix:
         add_blocks(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
         self.A.assemble()
         self.A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
-        if self.bulk.plastic or self.bulk.finite or self.springs:
+        changes = self.bulk.plastic or self.bulk.finite or self.springs
+        if changes or self.dimension < _WITHOUT_COPY:
             self._elastic = self.A.copy()
 
     def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
