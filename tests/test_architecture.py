@@ -214,6 +214,15 @@ def test_every_file_that_names_the_version_names_the_same():
     assert len({match and match[1] for match in found.values()}) == 1, found
 
 
+def test_every_seeded_fault_has_its_text_once_and_its_tests():
+    """A fault whose code was rewritten can no longer be seeded: see docs/development."""
+    listed = ROOT / "docs" / "development" / "seeded_faults.toml"
+    for fault in tomllib.loads(listed.read_text(encoding="utf-8"))["fault"]:
+        text = (ROOT / fault["file"]).read_text(encoding="utf-8")
+        assert text.count(fault["old"]) == 1, fault["name"]
+        assert all((ROOT / tests).exists() for tests in fault["tests"]), fault["name"]
+
+
 def test_the_requirements_name_all_that_is_imported():
     """petsc4py comes with dolfinx, which PyPI, conda and Debian call differently."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
