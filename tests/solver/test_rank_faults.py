@@ -44,7 +44,7 @@ SCENE = """
 PLACES = {
     "setup": ("solver.bulk", "Bulk", "__init__", 1),
     "residual": ("solver.contact.contact", "Contact", "evaluate", 7),
-    "tangent": ("solver.contact.tangent", "ContactTangent", "blocks", 4),
+    "tangent": ("solver.contact.tangent", "ContactTangent", "filled", 4),
     "return map": ("materials.material", "Points", "update", 13),
     "output": ("solver.path.mesh_order", "MeshOrder", "collect_history", 2),
 }
