@@ -20,6 +20,7 @@ from archord.report.errors import is_number, require_between, require_of
 
 Index = npt.NDArray[np.integer]
 
+_SOURCE = Path(__file__).with_name("closest_point.c")
 _END_MARGIN = (
     0.05  # part of its length by which a facet is continued beyond a free end of its curve
 )
@@ -260,7 +261,7 @@ class Curve:
         results: list[np.ndarray] = list(vars(partners).values())
         on_nodes = results.pop()
         first_lost = np.zeros(1, dtype=np.int32)
-        kernel = library(Path(__file__).with_name("closest_point.c")).closest_points
+        kernel = library(_SOURCE).closest_points
         n_lost = kernel(
             len(x),
             *map(pointer, points),

@@ -11,6 +11,7 @@ from archord.geometry.basis import Array, CellBasis
 from archord.kernels.compiled import library, pointer
 from archord.materials.kinematics import Kinematics
 
+_SOURCE = Path(__file__).with_name("strain.c")
 _ON_AXIS = 1e-9  # radius over the largest one, below which a point lies on the axis
 
 
@@ -46,7 +47,7 @@ class PointStrain:
         strain = np.empty((n, q, self.k))
         sizes = n, q, a, m, self.dimension, len(self.terms), self.k
         arrays = self.terms, self.derivative, self.dofs, u, strain
-        library(Path(__file__).with_name("strain.c")).strains(*sizes, *map(pointer, arrays))
+        library(_SOURCE).strains(*sizes, *map(pointer, arrays))
         return strain
 
     def matrix(self) -> Array:

@@ -28,6 +28,7 @@ from archord.materials.hardening import Hardening
 from archord.materials.kinematics import Kinematics
 from archord.materials.material import Array
 
+_SOURCE = Path(__file__).with_name("radial_return.c")
 _ITERATIONS = 60
 # slope over what elasticity makes of it, from which it says nothing of where the zero is
 STEEP = 1e3
@@ -213,6 +214,6 @@ def radial_return(
     given = map(pointer, (places, strain, old.plastic_strain, old.peeq))
     constants = *m.lame, yield_stress, modulus, pointer(m.elastic_tangent)
     found = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
-    kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
+    kernel = library(_SOURCE).radial_return
     yielding = kernel(n, n_stress, k, *given, *constants, *found)
     return stress, tangent, new if yielding else old

@@ -86,7 +86,7 @@ class Probe:
     >>> probe.unit
     'MPa'
     >>> print(f"{probe.values[probe.largest]:.0f}")
-    528
+    529
     """
 
     place: str

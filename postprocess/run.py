@@ -110,7 +110,7 @@ class Run:
     >>> run.status, run.steps
     ('done', 1)
     >>> print(f"{run.columns['P'][-1]:.0f} {run.units['P']}")
-    5260 N/mm
+    5263 N/mm
     """
 
     def __init__(self, folder: str | Path) -> None:

@@ -1,9 +1,9 @@
 """Quadrature with breaks where facets of the opposite curve or surface end.
 
 A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its
-ends. Points that ignore them integrate a uniform pressure with an error of the order of the mesh;
-facets broken there pass a patch test exactly. Breaks stay, as points carry history: pairs that
-slide by a part of a facet get that part of the error back.
+ends. A kink between two points costs an error of the square of their distance. Facets broken at
+the kinks pass a patch test exactly. Breaks stay, as points carry history, while the kinks of pairs
+that slide do not: so no part of a facet is long.
 """
 
 from __future__ import annotations
@@ -20,14 +20,17 @@ _EXACT = 4  # degree of the rule in a piece
 _NEARLY_EXACT = 2
 _FEWEST = 4  # pieces of a facet with points of the second degree
 _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
+# for each facet that a facet faces: means of a smooth pressure scatter by 0.1 % at most, wherever
+# the kinks slide to
+_PARTS = 7
 
 
 def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     """Positions and weights ``(n_facets of own, q)`` in xi; all facets of ``own`` get equally many
-    segments.
+    parts.
 
-    Breaks lie where ``own`` faces the vertices of ``opposite``; facets with fewer of them are
-    broken further.
+    Breaks lie where ``own`` faces the vertices of ``opposite``; the longest segments between them
+    are cut further.
     """
     met = own.closest_point(*opposite.vertices(), np.zeros_like(own.X))
     inside = met.found & (met.xi > _SHORTEST) & (met.xi < 1 - _SHORTEST)
@@ -37,22 +40,26 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
         breaks.append(
             np.concatenate([[0.0], met_here[np.diff(met_here, prepend=0.0) > _SHORTEST], [1.0]])
         )
-    points = max(map(len, breaks))
-    ends = np.array([_refined(b, points) for b in breaks])
-    # two more than a quadratic pressure against quadratic shape functions wants, as pairs slide and
-    # breaks do not
-    x, w = np.polynomial.legendre.leggauss(own.degree + 3)
+    n_faced = met.found.sum() / max(len(np.unique(met.facet[met.found])), 1)
+    n_parts = max(_PARTS * max(round(n_faced), 1), *(len(ends) - 1 for ends in breaks))
+    ends = np.array([_divided(ends, n_parts) for ends in breaks])
+    # exact for a linear pressure against the shape functions of a facet that is hardly curved
+    x, w = np.polynomial.legendre.leggauss(own.degree + 1)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
     return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
 
 
-def _refined(ends: Array, points: int) -> Array:
-    """``ends`` with the longest segment halved until there are ``points`` of them."""
-    while len(ends) < points:
-        k = int(np.argmax(np.diff(ends)))
-        ends = np.insert(ends, k + 1, (ends[k] + ends[k + 1]) / 2)
-    return ends
+def _divided(ends: Array, n_parts: int) -> Array:
+    """The ``ends`` of segments and between them as many more that there are ``n_parts``, of
+    lengths as equal as segments allow."""
+    length = np.diff(ends)
+    parts = np.ones(len(length), dtype=int)
+    while parts.sum() < n_parts:
+        parts[np.argmax(length / parts)] += 1
+    size = np.repeat(length / parts, parts)
+    within = np.concatenate([np.arange(count) for count in parts])
+    return np.append(np.repeat(ends[:-1], parts) + within * size, ends[-1])
 
 
 def pieces_rule(own: Patches, opposite: Patches) -> tuple[Array, Array, Index]:

@@ -293,7 +293,7 @@ class Surface:
         moduli = self._cut @ tangent
         if not self.material.finite:
             stress = stress[:, self.kinematics.working]
-            moduli = moduli @ self.kinematics.small
+            moduli = moduli[..., self.kinematics.small.argmax(axis=0)]
         stress_vector = np.einsum("mij,mj->mi", self._cut, stress)
         return Deformed(
             self.displacement(u),

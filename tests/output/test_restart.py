@@ -143,7 +143,7 @@ def test_a_restarted_run_equals_the_uninterrupted_one(whole, halted_after, name)
 
 def test_a_restarted_run_remembers_the_continuation_in_gamma(tmp_path):
     """The rest takes the same iterations, and agrees to what such a gamma leaves of the digits."""
-    problem = scene(0.2, 3, **PLASTIC, analysis={"gamma_factor": 1e4})
+    problem = scene(0.2, 3, **PLASTIC, analysis={"gamma_factor": 1e3})
     run(problem, tmp_path / "whole", copies={2: tmp_path / "halted"})
     go_on(problem, tmp_path / "halted")
     whole, halted = (read_history(tmp_path / name / "history.csv") for name in ("whole", "halted"))

@@ -1,0 +1,111 @@
+"""Pressures of surfaces that have slid on each other: points of the quadrature stay where the
+undeformed facets end, the kinks of the partners' shape functions slide away."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.geometry.curve import Curve
+from archord.geometry.meshes.refine import Circle
+from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.materials.elasticity import Elastic
+from archord.measures.edge import surface_profiles
+from archord.solver.contact import quadrature
+from archord.solver.contact.quadrature import segment_rule
+from archord.solver.path.stepping import StepRules
+from archord.solver.path.system import System
+from archord.solver.problem import Body, Dirichlet, Interaction, Problem
+
+E = 210e3
+NU = 0.3
+FACET = 0.2
+STEEL = Elastic(E, NU)
+
+
+def line(n: int, *, backward: bool = False) -> Curve:
+    """A straight curve from 0 to 1 of ``n`` quadratic facets."""
+    x = np.linspace(0.0, 1.0, 2 * n + 1)
+    X = np.column_stack([x[::-1] if backward else x, np.zeros_like(x)])
+    return Curve(X, 2)
+
+
+def forces_of_uniform_pressure(own: Curve, opposite: Curve, slide: float) -> np.ndarray:
+    """Nodal forces on ``opposite`` of the pressure 1 on ``own``, which has slid along x."""
+    xi, w = segment_rule(own, opposite)
+    nodes = own.X[own.connectivity]
+    shape, slope = own.shapes(xi)
+    x = np.einsum("fqa,fai->fqi", shape, nodes).reshape(-1, 2)
+    x[:, 0] += slide
+    length = np.linalg.norm(np.einsum("fqa,fai->fqi", slope, nodes), axis=-1)
+    outward = np.tile([0.0, -1.0], (len(x), 1))
+    partners = opposite.closest_point(x, outward, np.zeros_like(opposite.X))
+    force = partners.shape * (partners.found * (w * length).ravel())[:, None]
+    return np.bincount(partners.nodes.ravel(), force.ravel(), len(opposite.X))
+
+
+@pytest.mark.parametrize("n_own", [10, 12, 30])
+def test_nodes_get_their_share_of_a_uniform_pressure(n_own):
+    """To round-off without slip, and within a hundredth wherever the facets have slid to."""
+    own = line(n_own)
+    opposite = line(10, backward=True)
+    facet = 0.1
+    exact = np.where(np.arange(21) % 2, 2 / 3, 1 / 3) * facet
+    at_rest = forces_of_uniform_pressure(own, opposite, 0.0)
+    np.testing.assert_allclose(at_rest[1:-1], exact[1:-1], rtol=1e-12)
+    x = opposite.X[:, 0]
+    covered = (x > 0.41) & (x < 0.89)
+    for facets in np.linspace(0.05, 3.0, 40):
+        forces = forces_of_uniform_pressure(own, opposite, facets * facet)
+        np.testing.assert_allclose(forces[covered], exact[covered], rtol=1e-2)
+
+
+def shaft_mesh():
+    """A hollow shaft in a hub, whose facets are shorter."""
+    sketch = Sketch(["shaft", "hub"], ["core", "journal", "bore", "rim"])
+    for body, inner, outer, radii in (
+        ("shaft", "core", "journal", (0.5, 1.0)),
+        ("hub", "bore", "rim", (1.0, 1.8)),
+    ):
+        corners = [[(r, 0.0), (0.0, r), (-r, 0.0), (0.0, -r), (r, 0.0)] for r in radii]
+        for k in range(4):
+            ends = [near[k : k + 2] for near in corners]
+            paths = {
+                name: sketch.path(body, *at, on=Circle(name, (0.0, 0.0), radius))
+                for name, at, radius in zip((inner, outer), ends, radii, strict=True)
+            }
+            for side in (0, 1):
+                paths[f"side {side}"] = sketch.path(body, ends[0][side], ends[1][side])
+            sketch.face(body, **paths)
+    growth = "(1 + Abs(Sqrt(x*x + y*y) - 1))"
+    sketch.sizes = {"shaft": f"{FACET} * {growth}", "hub": f"{0.83 * FACET} * {growth}"}
+    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+
+
+def facet_means(slide: float) -> list[np.ndarray]:
+    """Mean pressures of the facets of a shaft pressed into a hub, and turned by so many facets."""
+    turn = slide * FACET
+    turned = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    supports = [Dirichlet(f"rim {axis}", "rim", axis) for axis in range(2)]
+    supports += [
+        Dirichlet(f"core {axis}", "core", axis, lambda x, axis=axis: x @ (turned - np.eye(2))[axis])
+        for axis in range(2)
+    ]
+    names = ("journal", "bore")
+    fit = Interaction("fit", names, interference=2e-3, slide=turn)
+    bodies = [Body("shaft", STEEL), Body("hub", STEEL)]
+    system = System(Problem(shaft_mesh(), bodies, [fit], supports, strain="large"))
+    system.solve([0.5, 1.0], StepRules(minimum=1.0))
+    return [profile.facet_force / profile.width for profile in surface_profiles(system).values()]
+
+
+def test_means_of_facets_do_not_scatter_where_surfaces_slid(monkeypatch):
+    """By at most 0.1 % of the pressure, against a rule of many points."""
+    found = facet_means(1.5)
+    monkeypatch.setattr(quadrature, "_PARTS", 40)
+    exact = facet_means(1.5)
+    for means, fine in zip(found, exact, strict=True):
+        assert np.abs(means - fine).max() < 1e-3 * fine.mean()
