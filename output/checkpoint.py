@@ -27,12 +27,11 @@ from archord.output.files.step_file import all_arrays, hdf5_in_memory, image, pu
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.report.version import VERSION
-from archord.solver.contact.surface import RigidSurface
+from archord.solver.contact.quadrature import RULE
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import Arrays, MeshOrder
 from archord.solver.path.newton import Newton
 from archord.solver.path.stepping import Step
-from archord.solver.path.system import System
 
 _HEADER = 512  # HDF5 looks for its own beginning at powers of two from here
 
@@ -51,6 +50,11 @@ class Checkpoint:
     mesh: str
     scalars: dict[str, Any]
     arrays: Arrays
+
+    @property
+    def contact_points(self) -> str:
+        """The rule by which contact points lie; version 0.2 did not write its own."""
+        return self.scalars.get("contact_points", "halved")
 
 
 def halt(
@@ -71,7 +75,7 @@ def halt(
         "stabilisation_energy": springs.energy if springs else 0.0,
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": levels.tolist(),
-        "contact_points": _contact_points(system),
+        "contact_points": RULE.get(),
     }
     arrays = order.collect_history() | {"fields/displacement": order.collect(u)}
     if position.increment is not None:
@@ -87,15 +91,11 @@ def resume(
 ) -> tuple[Record, Step, Position, Work]:
     """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``);
     returns what `halt` was given. Raises `InputError` if it
-    is of another mesh, or of other contact points. Collective."""
+    is of another mesh. Collective."""
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
-    said = ""
     if not same_mesh:
         said = "belongs to another mesh than the scene makes here (another version of gmsh?)"
-    elif not _has_same_points(scalars, order.system):
-        said = "is of an archord whose contact points lie elsewhere"
-    if said:
         raise InputError(f"{path}: {said}, so that the run cannot be continued.")
     order.spread_history(checkpoint.arrays if checkpoint else None)
 
@@ -116,24 +116,6 @@ def resume(
     step = Step(**scalars["step"])
     step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
     return Record.read(scalars["measures"]), step, position, Work(**scalars["work"])
-
-
-def _contact_points(system: System) -> dict[str, list[int]]:
-    """The numbers of facets, in space of their pieces, and of points on each, by surface."""
-    sides = [pair.surface for pair in system.contact.pairs]
-    return {side.name: list(side.curve_xi.shape[:2]) for side in sides}
-
-
-def _has_same_points(scalars: dict[str, Any], system: System) -> bool:
-    """Whether a checkpoint's contact points are the ones of the ``system``, whose history it holds.
-
-    Version 0.2 put them elsewhere where two curves face each other, and did not write their
-    numbers."""
-    if "contact_points" in scalars:
-        return scalars["contact_points"] == _contact_points(system)
-    in_space = system.problem.kinematics.dimension == 3
-    faces_rigid = [isinstance(pair.opposite, RigidSurface) for pair in system.contact.pairs]
-    return in_space or all(faces_rigid)
 
 
 def _newton(attempt: dict[str, Any]) -> Newton:

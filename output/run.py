@@ -33,6 +33,7 @@ from archord.output.run_json import Report, peak_memory
 from archord.presets.account import account_of
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
+from archord.solver.contact.quadrature import points_by
 from archord.solver.path.coarse_start import coarse_start
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import MeshOrder
@@ -96,6 +97,9 @@ def solve_scene(
     begun = perf_counter() - sum(timer.seconds.values())
     with ExitStack() as stack:
         agreed(comm, lambda: bool(stack.enter_context(occupied(folder))))
+        begun_by = comm.bcast(start.checkpoint.contact_points if start else None)
+        if begun_by:
+            stack.enter_context(points_by(begun_by))
         account = without_stale_forms(lambda: account_of(scene, comm, timer, problem))
         account.system.solver.newton.watch = on_iteration
         on_start(account.system)

@@ -8,6 +8,10 @@ that slide do not: so no part of a facet is long.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 import basix
 import numpy as np
 
@@ -23,6 +27,18 @@ _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
 # for each facet that a facet faces: means of a smooth pressure scatter by 0.1 % at most, wherever
 # the kinks slide to
 _PARTS = 7
+# where the points of curves lie: "even", or "halved" as in version 0.2, for the runs that it began
+RULE: ContextVar[str] = ContextVar("rule of contact points", default="even")
+
+
+@contextmanager
+def points_by(rule: str) -> Iterator[None]:
+    """Let contact points of curves lie by the ``rule``."""
+    token = RULE.set(rule)
+    try:
+        yield
+    finally:
+        RULE.reset(token)
 
 
 def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
@@ -40,14 +56,28 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
         breaks.append(
             np.concatenate([[0.0], met_here[np.diff(met_here, prepend=0.0) > _SHORTEST], [1.0]])
         )
-    n_faced = met.found.sum() / max(len(np.unique(met.facet[met.found])), 1)
-    n_parts = max(_PARTS * max(round(n_faced), 1), *(len(ends) - 1 for ends in breaks))
-    ends = np.array([_divided(ends, n_parts) for ends in breaks])
-    # exact for a linear pressure against the shape functions of a facet that is hardly curved
-    x, w = np.polynomial.legendre.leggauss(own.degree + 1)
+    n_parts = max(len(ends) - 1 for ends in breaks)
+    if RULE.get() == "halved":
+        ends = np.array([_halved(ends, n_parts) for ends in breaks])
+        n_points = own.degree + 3
+    else:
+        n_faced = met.found.sum() / max(len(np.unique(met.facet[met.found])), 1)
+        n_parts = max(_PARTS * max(round(n_faced), 1), n_parts)
+        ends = np.array([_divided(ends, n_parts) for ends in breaks])
+        # exact for a linear pressure against the shape functions of a facet that is hardly curved
+        n_points = own.degree + 1
+    x, w = np.polynomial.legendre.leggauss(n_points)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
     return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
+
+
+def _halved(ends: Array, n_parts: int) -> Array:
+    """The ``ends`` of segments with the longest one halved until there are ``n_parts``."""
+    while len(ends) <= n_parts:
+        k = int(np.argmax(np.diff(ends)))
+        ends = np.insert(ends, k + 1, (ends[k] + ends[k + 1]) / 2)
+    return ends
 
 
 def _divided(ends: Array, n_parts: int) -> Array:

@@ -2,7 +2,6 @@
 written."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,18 +111,6 @@ def test_another_mesh_is_refused(pressed):
     other = MeshOrder(joint_system(scene(0.16, 3, yield_stress=0.002), MPI.COMM_SELF))
     with pytest.raises(InputError, match=r"run/checkpoint.h5: belongs to another mesh"):
         checkpoint.resume(other, "run/checkpoint.h5", pressed)
-
-
-def test_other_contact_points_are_refused(pressed):
-    """Of version 0.2, which put them elsewhere and did not write their numbers; and of any other
-    rule."""
-    joint = MeshOrder(joint_system(PROBLEM, MPI.COMM_SELF))
-    numbers = pressed.scalars["contact_points"]
-    of_old = {key: value for key, value in pressed.scalars.items() if key != "contact_points"}
-    of_other = of_old | {"contact_points": {name: [n, q + 1] for name, (n, q) in numbers.items()}}
-    for scalars in (of_old, of_other):
-        with pytest.raises(InputError, match=r"run/c.h5: is of an archord whose contact points"):
-            checkpoint.resume(joint, "run/c.h5", replace(pressed, scalars=scalars))
 
 
 def test_whatever_is_damaged_is_refused(pressed, tmp_path):

@@ -18,6 +18,7 @@ from archord.output.run import solve_scene
 from archord.postprocess.run import Run
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
+from archord.solver.contact.quadrature import points_by
 from tests.output.run_files import accepted_steps, same_run
 from tests.solver.solving import SEVERAL, scene
 
@@ -139,6 +140,24 @@ def test_a_restarted_run_equals_the_uninterrupted_one(whole, halted_after, name)
     same_run(whole(problem), halted, 1e-12)
     if name == "cutbacks":
         assert sum(m.cutbacks for m in outcome.steps[step:]) > 0
+
+
+def test_a_run_of_version_0_2_goes_on_with_its_contact_points(tmp_path):
+    """Through two halts. That version did not write by which rule its points lie."""
+    problem = scene(0.2, 4, **PLASTIC, analysis={"friction": 0.3})
+    with points_by("halved"):
+        run(problem, tmp_path / "whole", copies={1: tmp_path / "halted"})
+    file = tmp_path / "halted" / CHECKPOINT
+    old = checkpoint.read(file)
+    del old.scalars["contact_points"]
+    checkpoint.write(file, old)
+    go_on(problem, tmp_path / "halted", crash=3)
+    go_on(problem, tmp_path / "halted")
+    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
+    run(problem, tmp_path / "new")
+    P, new = (read_history(tmp_path / name / "history.csv")["P"] for name in ("halted", "new"))
+    assert pytest.approx(new, rel=0.01) == P
+    assert pytest.approx(new, rel=1e-9) != P
 
 
 def test_a_restarted_run_remembers_the_continuation_in_gamma(tmp_path):
