@@ -26,7 +26,7 @@ _FEWEST = 4  # pieces of a facet with points of the second degree
 _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
 # for each facet that a facet faces: means of a smooth pressure scatter by 0.1 % at most, wherever
 # the kinks slide to
-_PARTS = 7
+_PARTS = 6
 # where the points of curves lie: "even", or "halved" as in version 0.2, for the runs that it began
 RULE: ContextVar[str] = ContextVar("rule of contact points", default="even")
 
