@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -94,7 +93,7 @@ class Elastic(Material):
         E, nu = self.E, self.nu
         return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
-    @cached_property
+    @property
     def moduli(self) -> Array:
         """Moduli ``(n_stress, n_stress)`` of all components of the stress, with engineering shear;
         in plane stress none out of the plane."""
@@ -104,16 +103,12 @@ class Elastic(Material):
         if self.kinematics.is_thin:
             lam = self.E * self.nu / (1 - self.nu**2)
             trace[2] = shear[2] = 0.0
-        moduli = lam * np.outer(trace, trace) + np.diag(shear)
-        moduli.flags.writeable = False
-        return moduli
+        return lam * np.outer(trace, trace) + np.diag(shear)
 
-    @cached_property
+    @property
     def elastic_tangent(self) -> Array:
         """Moduli ``(k, k)`` of the components that do work on the strain."""
-        tangent = self.moduli[np.ix_(self.working, self.working)]
-        tangent.flags.writeable = False
-        return tangent
+        return self.moduli[np.ix_(self.working, self.working)]
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """Hooke's law, with the stress out of the plane."""

@@ -26,7 +26,8 @@ class Position:
 
     ``targets_done`` output targets were reached, the last step being of length ``stride`` in the
     load; ``increment`` is what it changed in the state, None before the first step. ``size`` is the
-    length of the next, in output steps.
+    length of the next, in output steps. A path ``unloads`` from where it turns to where it turns
+    again.
     """
 
     targets_done: int = 0
@@ -34,6 +35,7 @@ class Position:
     stride: float = 0.0
     increment: Array | None = None
     size: float | None = None
+    unloads: bool = False
 
 
 class Companion(Protocol):
@@ -116,12 +118,13 @@ class LoadPath:
         if ratio is None:
             yield self.state, True
             return
-        turns = ratio < 0  # where the path turns, it first goes back elastically
+        # bodies that unload are elastic, or nearly so
+        goes_back = ratio < 0 or self.at.unloads
         if abs(ratio) > _PREDICTOR_LIMIT:
-            yield self.state, turns
+            yield self.state, goes_back
             return
-        yield self.state + self.at.increment * ratio, turns
-        if not turns and not self.equilibrium.bulk.plastic:
+        yield self.state + self.at.increment * ratio, goes_back
+        if not goes_back and not self.equilibrium.bulk.plastic:
             # an extrapolated state has a kink where the contact ended, which fine meshes resolve
             yield self.state, True
 
@@ -143,6 +146,7 @@ class LoadPath:
         at = self.at
         new = self.equilibrium.state()
         if load != at.load:
+            at.unloads ^= (self._ratio(load) or 0.0) < 0
             springs = self.equilibrium.springs
             is_placed = springs is not None and not springs.idle
             began_in_balance = self.equilibrium.problem.from_rest or at.increment is not None
