@@ -35,7 +35,7 @@ class Recovery:
         from afar.
 
         Where springs may have to hold bodies, these come to rest first as if rigid. So do bodies
-        under forces where no guess has found the contact, as it may be if forces are tiny.
+        under forces where no guess has led to equilibrium, as it may be if forces are tiny.
         Collective.
         """
         at = self.equilibrium
@@ -47,7 +47,7 @@ class Recovery:
                 afar = True
             if self._solve_in_stages(guess, afar):
                 return Newton.together(self._solves)
-        if at.springs is None and at.problem.by_force and not at.contact.n_active():
+        if at.springs is None and at.problem.by_force:
             rigid = RigidMotions(at.drives, at.contact)
             self._solve_in_stages(rigid.at_rest(load, guess), afar=True)
         return Newton.together(self._solves)
@@ -126,7 +126,10 @@ class Recovery:
         with _acting(rubbing, "by_secants"):
             if self._solve_holding(guess, line_search=True):
                 return True
-        return holds and self._solve_either_way(guess)
+        near = self.equilibrium.state()
+        return self._solve_holding(near, line_search=True) or (
+            holds and self._solve_either_way(guess)
+        )
 
     def _simplified(
         self, guess: Array, points: list[Points], answer: str, yielding: Sequence[Points] = ()

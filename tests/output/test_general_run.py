@@ -78,8 +78,9 @@ def test_contact_is_told_with_its_place(run):
     assert 0 < h["contact contact length"][0] < h["contact contact length"][2] < np.pi * 10
     moved = np.array(h["press displacement"])
     assert (np.abs(h["contact largest slip"]) < moved).all()
-    slip = run.contact(3)["hole"].slip[run.contact(3)["hole"].raw_pressure > 0]
-    assert np.abs(slip).max() == pytest.approx(h["contact largest slip"][2])
+    sides = run.contact(3).values()
+    largest = max(np.abs(side.slip[side.raw_pressure > 0]).max() for side in sides)
+    assert largest == pytest.approx(h["contact largest slip"][2])
     assert run.history.attrs["units"]["contact largest pressure"] == "MPa"
 
 

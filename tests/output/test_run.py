@@ -195,7 +195,7 @@ def test_a_stopped_run_keeps_its_accepted_steps_and_says_why(tmp_path):
     """Four of ten steps, then no convergence: all four readable; run.json has the residuals and
     active-set changes of every attempt at the fifth."""
     problem = scene(
-        0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0}
+        0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, stepping={"minimum": 1.0}
     )
     assert solve_scene(problem, tmp_path, MPI.COMM_SELF).status == "stopped"
     assert accepted_steps(tmp_path) == 4

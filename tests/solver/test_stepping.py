@@ -43,7 +43,7 @@ def test_a_failed_step_leaves_no_trace():
 def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported
     before."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5})
     joint = joint_system(problem, MPI.COMM_SELF)
     accepted = []
     targets = problem.targets
