@@ -148,7 +148,7 @@ def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     """The reason on stderr, accepted steps on disk."""
     limits = [
         "--set",
-        "analysis.max_iterations=6",
+        "analysis.max_iterations=5",
         "--set",
         "stepping.minimum=1.0",
         "--set",

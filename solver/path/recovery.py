@@ -47,7 +47,8 @@ class Recovery:
                 afar = True
             if self._solve_in_stages(guess, afar):
                 return Newton.together(self._solves)
-        if at.springs is None and at.problem.by_force:
+        touches_in_vain = self._is_singular() and at.contact.n_active() > 0
+        if at.springs is None and at.problem.by_force and not touches_in_vain:
             rigid = RigidMotions(at.drives, at.contact)
             self._solve_in_stages(rigid.at_rest(load, guess), afar=True)
         return Newton.together(self._solves)
@@ -151,10 +152,14 @@ class Recovery:
         for line_search in (not full_steps, full_steps):
             if self._solve_holding(guess, line_search=line_search, goal=goal):
                 return True
-            border = self.equilibrium.linear.border
-            if border and border.singular is not None:
+            if self._is_singular():
                 return False
         return False
+
+    def _is_singular(self) -> bool:
+        """Whether nothing resisted a drive in the last solve."""
+        border = self.equilibrium.linear.border
+        return border is not None and border.singular is not None
 
     def _solve_holding(self, guess: Array, *, line_search: bool, goal: float = 0.0) -> bool:
         """Solve from ``guess``; where that circles, hold points on their facets.
