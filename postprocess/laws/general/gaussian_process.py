@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, solve_triangular
 
 from archord.postprocess.laws.general.joint import Array
 
-_ROWS = 64  # of a matrix at a time, which caches hold
+_BLOCK = 32  # columns of a factor at a time, which caches hold
 _WIDE = 1.0  # prior variance of the linear mean's coefficients over the variance of the rest
 
 
@@ -31,17 +30,21 @@ class Kernel:
 
     def between(self, one: Array, other: Array) -> Array:
         """Covariances ``(n, m)`` of points ``(n, d)`` and ``(m, d)``."""
-        a = one / self.lengths
-        b = other / self.lengths
-        distance = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
-        r = np.sqrt(7 * np.maximum(distance, 0.0))
-        matern = r / 15  # (1 + r (1 + r (0.4 + r/15))) exp(-r), in one array
+        scale = np.sqrt(7) / self.lengths
+        a = one * scale
+        b = other * scale
+        r = (-2 * a) @ b.T  # in place from here on: new memory takes longer than numbers
+        r += (a**2).sum(1)[:, None]
+        r += (b**2).sum(1)
+        np.sqrt(np.maximum(r, 0.0, out=r), out=r)
+        matern = r / 15  # (1 + r (1 + r (0.4 + r/15))) exp(-r)
         matern += 0.4
         for _ in range(2):
             matern *= r
             matern += 1
-        matern *= np.exp(-r)
-        matern += _WIDE * (1 + one @ other.T)
+        matern *= np.exp(np.negative(r, out=r), out=r)
+        matern += one @ (_WIDE * other.T)
+        matern += _WIDE
         return matern
 
     def at(self, points: Array) -> Array:
@@ -54,7 +57,8 @@ class Process:
     of values is nan from some row on.
 
     - ``points`` ``(n, d)``: inputs of the data
-    - ``factor`` ``(n, n)``: Cholesky's upper factor of the covariance; below it is no number of use
+    - ``factor`` ``(n, n)``: Cholesky's lower factor of the covariance
+    - ``inverses``: the inverses ``(block, block)`` of the blocks on its diagonal
     - ``known`` ``(n, outputs)``: whether a value is known, 1 or 0
     - ``weights`` ``(n, outputs)``: the factor's inverse times the values, 0 where unknown
     - ``count`` ``(outputs,)``: how many values are known
@@ -64,15 +68,18 @@ class Process:
     def __init__(self, kernel: Kernel, points: Array, values: Array) -> None:
         self.kernel = kernel
         self.points = points
-        covariance = np.empty((len(points), len(points)))
-        for start in range(0, len(points), _ROWS):  # of the half that Cholesky's factor needs
-            rows = slice(start, start + _ROWS)
-            covariance[rows, : start + _ROWS] = kernel.between(
-                points[rows], points[: start + _ROWS]
-            )
-        covariance[np.diag_indices_from(covariance)] += kernel.noise
-        # The transposed matrix is in LAPACK's order: it is not copied.
-        self.factor, _ = cho_factor(covariance.T, overwrite_a=True, check_finite=False)
+        self.factor = np.zeros((len(points), len(points)))
+        self.inverses: list[Array] = []
+        for start in range(0, len(points), _BLOCK):
+            columns = slice(start, start + _BLOCK)
+            left = kernel.between(points[start:], points[columns])
+            size = left.shape[1]
+            left[np.diag_indices(size)] += kernel.noise
+            left -= self.factor[start:, :start] @ self.factor[columns, :start].T
+            # of an upper triangle, of which LAPACK exchanges no rows
+            inverse = np.linalg.inv(np.linalg.cholesky(left[:size]).T).T
+            self.factor[start:, columns] = left @ inverse.T
+            self.inverses.append(inverse)
         unknown = np.isnan(values)
         self.known = 1.0 - unknown
         self.weights = self._reduced(np.where(unknown, 0.0, values)) * self.known
@@ -80,8 +87,13 @@ class Process:
         self.size = (self.weights**2).sum(0) / np.maximum(self.count, 1)
 
     def _reduced(self, right: Array) -> Array:
-        """The inverse of the factor's transpose times ``right`` ``(n, m)``."""
-        return solve_triangular(self.factor, right, trans=1, check_finite=False)
+        """The inverse of the factor times ``right`` ``(n, m)``."""
+        found = np.empty_like(right)
+        for i, inverse in enumerate(self.inverses):
+            start = i * _BLOCK
+            rows = slice(start, start + _BLOCK)
+            found[rows] = inverse @ (right[rows] - self.factor[rows, :start] @ found[:start])
+        return found
 
     @cached_property
     def likelihood(self) -> float:
@@ -106,11 +118,11 @@ class Process:
         """Errors ``(n, outputs)`` of each point's values as the other points predict them, and the
         standard deviations of these errors (section 5.4.2); nan where unknown."""
         off, deviation = np.full((2, *self.known.shape), np.nan)
+        every = self._reduced(np.eye(len(self.points)))
         for count in np.unique(self.count):
             if count < 2:
                 continue
-            leading = self.factor[:count, :count]
-            inverse = solve_triangular(leading, np.eye(count), trans=1, check_finite=False)
+            inverse = every[:count, :count]
             precision = (inverse**2).sum(0)
             columns = np.flatnonzero(self.count == count)
             off[:count, columns] = -(inverse.T @ self.weights[:count, columns]) / precision[:, None]

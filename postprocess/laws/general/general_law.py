@@ -10,12 +10,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model
 from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent
+from archord.postprocess.laws.general.spline import monotone_slopes
 from archord.postprocess.laws.general.yield_model import (
     ELASTIC_BELOW,
     Loss,
@@ -259,13 +259,13 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None) -> JointCurve:
         back=_from(0.0, base.y),
         dback=_from(0.0, base.slope),
         ratio=ratio,
-        dratio=_slopes(ratio),
+        dratio=monotone_slopes(NODES, ratio),
         toe=_from(0.0, toe),
         touch=_touch(joint, base),
         peak=peak,
-        dpeak=_slopes(peak),
+        dpeak=monotone_slopes(NODES, peak),
         angle=angle,
-        dangle=_slopes(angle),
+        dangle=monotone_slopes(NODES, angle),
         error=_from(error[0], error),
         back_error=back_error,
     )
@@ -284,12 +284,6 @@ def _touch(joint: Elastic, base: ElasticState) -> Array:
 def _from(first: float, values: Array) -> Array:
     """``values`` ``(n,)`` with the ``first`` one, at zero, before them."""
     return np.insert(values, 0, first)
-
-
-def _slopes(values: Array) -> Array:
-    """Slopes at the nodes of cubics that rise and fall where ``values`` ``(nodes,)`` do (Fritsch,
-    Butland 1984)."""
-    return PchipInterpolator(NODES, values)(NODES, 1)
 
 
 def _rising(x: Array, y: Array, dy: Array) -> tuple[Array, Array]:

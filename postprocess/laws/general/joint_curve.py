@@ -260,7 +260,7 @@ class JointCurve:
     def _inverse(self, f: Array, df: Array, y: Array) -> Array:
         """The ``x`` at which the rising curve ``f`` is ``y``; 0 where ``y <= 0``."""
         i = interval(f, y)
-        piece = _Piece.of(self.x, f, df, i)
+        piece = Piece.of(self.x, f, df, i)
         goal = np.clip(y, f[i], f[i + 1])
         low = np.zeros_like(goal)
         high = np.ones_like(goal)
@@ -342,7 +342,7 @@ def bent(a: Array, travel: Array, toe: Array) -> tuple[Array, Array]:
     return share * (a + root - cut), share * (1 + a / root)
 
 
-class _Piece(NamedTuple):
+class Piece(NamedTuple):
     """Cubics between two nodes each, arrays ``(...)``, over t from 0 to 1: ``f + t (first + t
     (second + t third))``."""
 
@@ -353,13 +353,17 @@ class _Piece(NamedTuple):
     third: Array
 
     @classmethod
-    def of(cls, nodes: Array, f: Array, df: Array, i: npt.NDArray[np.intp]) -> _Piece:
+    def of(cls, nodes: Array, f: Array, df: Array, i: npt.NDArray[np.intp]) -> Piece:
         """The pieces from the nodes ``i`` on."""
-        width = nodes[i + 1] - nodes[i]
-        rise = f[i + 1] - f[i]
-        begin = width * df[i]
-        end = width * df[i + 1]
-        return cls(width, f[i], begin, 3 * rise - 2 * begin - end, begin + end - 2 * rise)
+        return cls.between(nodes[i + 1] - nodes[i], f[i], f[i + 1], df[i], df[i + 1])
+
+    @classmethod
+    def between(cls, width: Array, f: Array, last: Array, df: Array, last_df: Array) -> Piece:
+        """The pieces from ``f`` to ``last``, with the slopes ``df`` and ``last_df``."""
+        rise = last - f
+        begin = width * df
+        end = width * last_df
+        return cls(width, f, begin, 3 * rise - 2 * begin - end, begin + end - 2 * rise)
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Values, and slopes by t."""
@@ -372,7 +376,7 @@ def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
     ends straight on."""
     i = interval(nodes, x)
     inside = np.clip(x, nodes[0], nodes[-1])
-    piece = _Piece.of(nodes, f, df, i)
+    piece = Piece.of(nodes, f, df, i)
     value, rise = piece.at((inside - nodes[i]) / piece.width)
     slope = rise / piece.width
     return value + slope * (x - inside), slope

@@ -25,11 +25,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel, elastic_model
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.joint import Array
+from archord.postprocess.laws.general.joint_curve import Piece, interval
+from archord.postprocess.laws.general.spline import spline_slopes
 
 DATA = Path(__file__).parent / "yield_model.npz"
 KERNELS = Path(__file__).parent / "yield_model.json"
@@ -44,6 +45,7 @@ PIN_WEAKER = "strain pin weaker"
 # plane, and the body that yields first
 SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
+_AT = np.log([ELASTIC_BELOW, *MULTIPLES])  # ln u, between which curves are cubic
 # Parts by which the other body is stronger, within which it matters by how much: beyond the last it
 # stays elastic. In plane stress the first is the part for a contact at the largest pressure of
 # plastic flow, 2/sqrt(3) sigY.
@@ -62,6 +64,9 @@ _NINE_IN_TEN = 1.645  # standard deviations
 CURVE_STEP = 1e-4
 _UNKNOWN = -32768
 _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
+
+
+Asked = npt.NDArray[np.bool_] | bool
 
 
 class Yielding(NamedTuple):
@@ -179,32 +184,38 @@ class YieldModel:
             "back": Process(self.kernels["back"], self.back_inputs, self.back - [1, 0, 0, 0]),
         }
 
-    def at(self, inputs: Array, x0: Array, x: Array) -> Loss:
+    def at(self, inputs: Array, x0: Array, x: Array, asked: Asked = True) -> Loss:
         """What yielding does to a joint with these `features` ``(d,)``; ``x0`` ``()`` is about
         first yield, at ``x`` ``(k,)``; of side `PIN_WEAKER` what the block's yielding adds, but for
-        the way back. Of a joint that hardens inputs are ``(k, d)``, x0 ``(k,)``."""
+        the way back. Of a joint that hardens inputs are ``(k, d)``, x0 ``(k,)``. Nothing where it
+        is not ``asked`` ``(k,)``."""
         u = np.log(x / x0)
-        force, deviation = self.processes["force"].predict(np.atleast_2d(inputs))
-        shape = self.processes["shape"].means(np.atleast_2d(inputs))
+        begun = asked & (u > _AT[0])  # the others are not computed, which takes half the time
+        u = u[begun]
+        most = np.broadcast_to(x[-1] / x0, x.shape)[begun]
+        each = np.broadcast_to(inputs, (len(x), inputs.shape[-1]))[begun]
+        rows = each if inputs.ndim > 1 else inputs[None]
+        force, deviation = self.processes["force"].predict(rows)
+        shape = self.processes["shape"].means(rows)
         nodes = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=-1)
-        force, slope, peak, angle, deviation = _between(nodes, u, x[-1] / x0).T
-        deep = np.column_stack([np.broadcast_to(inputs, (len(x), inputs.shape[-1])), u])
-        begun = u > np.log(ELASTIC_BELOW)
-        way = np.zeros((len(x), 4))  # of what has not yielded: not asked, which takes half the time
-        uncertain = np.zeros_like(way)
-        way[begun], uncertain[begun] = self.processes["back"].predict(deep[begun])
+        force, slope, peak, angle, deviation = _between(nodes, u, most).T
+        way, uncertain = self.processes["back"].predict(np.column_stack([each, u]))
         travel, toe, misfit, again = way.T
         errors = [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again]
-        return Loss(
+        told = Loss(
             force=force,
-            slope=slope / x,
+            slope=slope / x[begun],
             deviation=self.spread["force"] * deviation,
             peak=peak,
             angle=angle,
-            travel=1 + travel,
+            travel=travel,
             toe=toe,
             way_error=np.linalg.norm(errors, axis=0),
         )
+        everywhere = np.zeros((len(told), len(x)))
+        everywhere[:, begun] = told
+        found = Loss(*everywhere)
+        return found._replace(travel=1 + found.travel)
 
 
 def loss(
@@ -219,8 +230,9 @@ def loss(
     found: list[Array] = [np.zeros(len(x))] * len(Loss._fields)
     for side in dict.fromkeys(sides):
         models = {name: yield_model(name) for name in needed(side)}
-        told = total_loss(models, model or elastic_model(), joint, yielding, x)
-        found = [np.where(sides == side, *pair) for pair in zip(told, found, strict=True)]
+        own = sides == side
+        told = total_loss(models, model or elastic_model(), joint, yielding, x, own)
+        found = [np.where(own, *pair) for pair in zip(told, found, strict=True)]
     return Loss(*found)
 
 
@@ -235,15 +247,19 @@ def total_loss(
     joint: Elastic,
     yielding: Yielding,
     x: Array,
+    asked: Asked = True,
 ) -> Loss:
-    """The sum of what ``models`` tell at ``x`` ``(k,)``; each begins where its body yields."""
+    """The sum of what ``models`` tell at ``x`` ``(k,)``; each begins where its body yields. The
+    last one tells nothing where it is not ``asked`` ``(k,)``."""
+    *_, last = models
     none = np.zeros(len(x))
     total = Loss(none, none, none, none, none, none + 1, none, none)
     for side, told in models.items():
         x0, lost = onset(side, model, joint, yielding, x, total.peak)
         if (ELASTIC_BELOW * x0 >= x[-1]).all():
             continue
-        own = told.at(features(side, joint, yielding, lost), x0, x)
+        inputs = features(side, joint, yielding, lost)
+        own = told.at(inputs, x0, x, asked if side == last else True)
         begun = np.clip(np.log(x / (ELASTIC_BELOW * x0)) / 0.2, 0.0, 1.0)
         total = Loss(
             force=total.force + own.force,
@@ -263,29 +279,37 @@ def total_loss(
 def _between(nodes: Array, u: Array, most: Array) -> Array:
     """The first of four curves of ``nodes`` ``(1 or k, multiples, 4)`` at ``ln(x/x0) = u``
     ``(k,)``, its slope by u, and the others ``(k, 5)``: smooth between nodes; only nodes up to
-    ``most`` x0 ``()`` or ``(k,)`` and one beyond are known."""
-    known = np.broadcast_to(np.searchsorted(MULTIPLES, most) + 1, u.shape)
+    ``most`` x0 ``(k,)`` and one beyond are known."""
+    known = np.minimum(np.searchsorted(MULTIPLES, most) + 1, len(MULTIPLES))
     found = np.zeros((len(u), 5))
     for count in np.unique(known):
         own = known == count
         rows = nodes if len(nodes) == 1 else nodes[own]
         found[own] = _curves(rows[:, :count], u[own])
-    return np.where(u[:, None] > np.log(ELASTIC_BELOW), found, 0.0)
+    return found
 
 
 def _curves(nodes: Array, u: Array) -> Array:
     """The numbers of `_between` by all ``nodes`` ``(1 or k, known, 4)``."""
-    at = np.log([ELASTIC_BELOW, *MULTIPLES[: nodes.shape[1]]])
-    values = np.insert(np.moveaxis(nodes, 1, 0), 0, 0.0, axis=0)
-    spline = CubicSpline(at, values, bc_type=((1, np.zeros(values.shape[1:])), "not-a-knot"))
-    each = np.arange(len(u))
-    row = each if len(nodes) > 1 else 0 * each
-    force, peak, angle, _ = spline(u)[each, row].T
-    slope = spline(u, 1)[each, row, 0]
-    i = np.clip(np.searchsorted(at, u) - 1, 0, len(at) - 2)
-    share = np.clip((u - at[i]) / (at[i + 1] - at[i]), 0.0, 1.0)
-    deviation = (1 - share) * values[i, row, 3] + share * values[i + 1, row, 3]
-    return np.stack([force, slope, peak, angle, deviation], axis=1)
+    values = np.insert(nodes, 0, 0.0, axis=1)
+    at = _AT[: values.shape[1]]
+    slopes = _spline(len(at)) @ values
+    i = interval(at, u)
+    row = np.arange(len(u)) if len(nodes) > 1 else 0
+    width = (at[i + 1] - at[i])[:, None]
+    t = (u - at[i])[:, None] / width
+    first = values[row, i]
+    last = values[row, i + 1]
+    piece = Piece.between(width, first, last, slopes[row, i], slopes[row, i + 1])
+    curves, rises = piece.at(t)
+    deviation = first + np.clip(t, 0.0, 1.0) * (last - first)
+    return np.column_stack([curves[:, 0], rises[:, :1] / width, curves[:, 1:3], deviation[:, 3]])
+
+
+@cache
+def _spline(n: int) -> Array:
+    """The matrix ``(n, n)`` from values at the first nodes of curves to slopes."""
+    return spline_slopes(_AT[:n], np.eye(n), flat=True)
 
 
 @dataclass(frozen=True)
@@ -375,7 +399,9 @@ def _alike(pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.NDArray[np.bool_]:
 def _numbers(compact: Mapping[str, Array]) -> dict[str, Array]:
     found = {name: values.astype(float) for name, values in compact.items()}
     for name in _CURVES:
-        found[name] = np.where(found[name] == _UNKNOWN, np.nan, found[name] * CURVE_STEP)
+        curves = found[name]
+        curves[curves == _UNKNOWN] = np.nan
+        curves *= CURVE_STEP
     return found
 
 

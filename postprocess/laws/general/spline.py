@@ -1,0 +1,61 @@
+"""Slopes at the nodes of cubics through given values: of the smoothest ones, and of cubics that
+rise and fall where the values do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.postprocess.laws.general.joint import Array
+
+
+def spline_slopes(at: Array, values: Array, flat: bool = False) -> Array:
+    """Slopes ``(n, ...)`` of the cubic spline through ``values`` ``(n, ...)`` at ``at`` ``(n,)``
+    (de Boor 1978, chapter IV). The first two cubics are one, unless the spline begins ``flat``, and
+    so are the last two, which takes four nodes, or three; of two the end has the chord's slope."""
+    n = len(at)
+    width = np.diff(at)
+    # (matrix) slopes = (right) secants
+    matrix = np.eye(n)
+    right = np.zeros((n, n - 1))
+    right[0, 0] = not flat
+    right[-1, -1] = 1
+    i = np.arange(1, n - 1)
+    matrix[i, i - 1] = width[i]
+    matrix[i, i] = 2 * (width[i - 1] + width[i])
+    matrix[i, i + 1] = width[i - 1]
+    right[i, i - 1] = 3 * width[i]
+    right[i, i] = 3 * width[i - 1]
+    if n > 2:
+        _one_cubic(matrix[::-1, ::-1], right[::-1, ::-1], width[::-1])
+    if n > 2 and not flat:
+        _one_cubic(matrix, right, width)
+    secants = (np.diff(values, axis=0).T / width).T
+    return np.linalg.solve(matrix, right @ secants)
+
+
+def _one_cubic(matrix: Array, right: Array, width: Array) -> None:
+    """Set the first rows of `spline_slopes` such that the first two cubics are one."""
+    first, second = width[:2]
+    both = first + second
+    matrix[0, :2] = second, both
+    right[0, :2] = (2 * both + first) * second / both, first**2 / both
+
+
+def monotone_slopes(at: Array, values: Array) -> Array:
+    """Slopes ``(..., n)`` of cubics that rise and fall where ``values`` ``(..., n)`` at ``at``
+    ``(n,)`` do (Fritsch and Butland 1984)."""
+    width = np.diff(at)
+    secants = np.diff(values) / width
+    before = secants[..., :-1]
+    after = secants[..., 1:]
+    one = width[:-1] + 2 * width[1:]
+    other = 2 * width[:-1] + width[1:]
+    slopes = np.zeros(values.shape)
+    mean = (one + other) * before * after
+    np.divide(mean, one * after + other * before, out=slopes[..., 1:-1], where=before * after > 0)
+    for end, beside in ((0, 1), (-1, -2)):
+        own = secants[..., end]
+        bend = (own - secants[..., beside]) * width[end] / (width[end] + width[beside])
+        most = 3 * own
+        slopes[..., end] = np.clip(own + bend, np.minimum(most, 0.0), np.maximum(most, 0.0))
+    return slopes
