@@ -22,19 +22,17 @@ from archord.postprocess.laws.general.elastic_model import Elastic, elastic_mode
 from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
     BODIES,
-    STEEPEST,
     TABLE,
     TERMS,
     At,
+    Flow,
     Flows,
     Strains,
-    feedback,
+    flow_and_rise,
     flows,
     kind,
     mean_flows,
     representative,
-    rise,
-    slope_at,
     terms,
     unsure,
 )
@@ -60,7 +58,8 @@ _SCATTER = 0.01  # of ln P of a joint, against which that counts
 _PARTS = 5  # of the joints, each of which the other parts predict
 _ITERATIONS = 6
 _AGAIN = 2  # of a fit that begins with another one
-_SMALL = 1e-2
+_SMALL = 1e-2  # of a difference quotient
+_STEEPEST = 0.7  # slope of ln(eps_rep) by itself through s_eff
 _LITTLE = 1e-3  # change of P below which yielding does not matter
 _WITHIN = 0.93  # share of errors that the expected error is to contain
 
@@ -116,12 +115,25 @@ class Hardened:
             higher[i] *= 1 + _SMALL
             of_s = (loss(self.numbers, Yielding(*higher), self.x).force - lost.force) / _SMALL
             strain = found.strain[i]
-            at = At(self.x, found.s[i], rise(mean, strain), found.s[1 - i])
+            _, rise = flow_and_rise(mean, strain)
+            at = At(self.x, found.s[i], rise, found.s[1 - i])
             slope = slope_at(mean, strain, found.s[i])
             back = slope * feedback(model[f"{self.plane} {body}"], self.numbers, body, at)
-            part = of_s * slope / (1 - np.minimum(back, STEEPEST))
+            part = of_s * slope / (1 - np.minimum(back, _STEEPEST))
             columns[i] = part * terms(self.numbers, body, at)
         return columns.reshape(-1, len(self.x)).T
+
+
+def slope_at(mean: Flow, strain: Array, s: Array) -> Array:
+    """d(ln s)/d(ln strain) of a `mean_flow`, which is ``s`` at ``strain`` (all ``(k,)``)."""
+    return np.log(mean((1 + _SMALL) * strain) / s) / np.log1p(_SMALL)
+
+
+def feedback(of: Array, numbers: Sequence[float], body: str, at: At) -> Array:
+    """d(ln eps_rep)/d(ln s) ``(k,)`` with the coefficients ``of`` all `TERMS`; see `terms`."""
+    higher = at._replace(own=at.own * (1 + _SMALL))
+    change = terms(numbers, body, higher) - terms(numbers, body, at)
+    return of @ change / np.log1p(_SMALL)
 
 
 def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, Array]:

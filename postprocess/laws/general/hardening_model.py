@@ -13,15 +13,16 @@ it. p0, eps and the way back follow the same s_eff.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.spline import spline_slopes
 from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss
 
 TABLE = Path(__file__).parent / "hardening_model.json"
@@ -31,13 +32,19 @@ TERMS = (
     *("1", "x", "s", "x x", "x s", "s s"),
     *("share", "soft", "weaker", "apart", "clearance", "rise", "gain"),
 )
+_FACTORS = [names.split() for names in TERMS]
 SPREAD = {"strain": 0.0, "stress": 1.0}  # half the range of strains over eps_rep
+# Gauss's rules of 5 points and of one, from -1 to 1, of a mean
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-_ITERATIONS = 60  # at most, of Newton's method
-_CLOSE = 1e-13
+_GAUSS = (_PLACES, _WEIGHTS / 2)
+_MIDDLE = (np.zeros(1), np.ones(1))
+_ITERATIONS = 40  # at most, of Newton's method
+_CLOSE = 1e-10  # step in ln(eps_rep) after which it is known to round-off
 _FARTHEST = 1.0  # of an iteration, in ln(eps_rep)
-_SMALL = 1e-2  # of a difference quotient
-STEEPEST = 0.7  # slope of ln(eps_rep) by itself through s_eff
+_FLATTEST = 0.3  # slope of what is missed by ln(eps_rep)
+_SMALL = 1e-6  # of a difference quotient
+# factors on the strains of pin and block ``(2, 3, 1)``: none, one on the pin's, one on the block's
+_SHIFTS = 1 + _SMALL * np.array([[[0.0], [1.0], [0.0]], [[0.0], [0.0], [1.0]]])
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
@@ -68,12 +75,12 @@ def flows(joint: LawJoint) -> Flows:
 
 
 def mean_flow(flow: Flow, spread: float) -> Flow:
-    """The mean s ``(k,)`` by strains ``(k,)``, as far below and above each as ``spread`` of it."""
-    parts = 1 + spread * _PLACES
+    """The mean s by strains (any shape), as far below and above each as ``spread`` of it."""
+    places, weights = _GAUSS if spread else _MIDDLE
 
     def mean(strain: Array) -> Array:
-        asked = strain[:, None] * parts
-        return np.broadcast_to(flow(asked), asked.shape) @ (_WEIGHTS / 2)
+        asked = strain[..., None] * (1 + spread * places)
+        return np.broadcast_to(flow(asked), asked.shape) @ weights
 
     return mean
 
@@ -85,19 +92,16 @@ def mean_flows(strain: float, given: Flows) -> dict[int, Flow]:
     return {i: mean_flow(flow, spread) for i, flow in enumerate(given) if flow is not None}
 
 
-def slope_at(mean: Flow, strain: Array, s: Array) -> Array:
-    """d(ln s)/d(ln strain) of a `mean_flow`, which is ``s`` at ``strain`` (all ``(k,)``)."""
-    return np.log(mean((1 + _SMALL) * strain) / s) / np.log1p(_SMALL)
-
-
-def rise(mean: Flow, strain: Array) -> Array:
-    """The same ``(k,)`` on average, from a part of ``strain`` ``(k,)`` to a multiple, `WIDE`."""
-    return np.log(mean(WIDE * strain) / mean(strain / WIDE)) / (2 * np.log(WIDE))
+def flow_and_rise(mean: Flow, strain: Array) -> tuple[Array, Array]:
+    """A `mean_flow` at ``strain`` (any shape), and its d(ln s)/d(ln strain) on average, from a part
+    of the strain to a multiple, `WIDE`."""
+    below, s, above = mean(np.stack([strain / WIDE, strain, WIDE * strain]))
+    return s, np.log(above / below) / (2 * np.log(WIDE))
 
 
 class At(NamedTuple):
-    """Where eps_rep of a body is asked for, each ``(k,)``: x, the body's s and `rise`, and the
-    other body's s."""
+    """Where eps_rep of a body is asked for, each ``(..., k)``: x, the body's s and its rise (see
+    `flow_and_rise`), and the other body's s."""
 
     x: Array
     own: Array
@@ -106,7 +110,7 @@ class At(NamedTuple):
 
 
 def terms(numbers: Sequence[float], body: str, at: At) -> Array:
-    """All `TERMS` ``(terms, k)`` of a ``body`` of the joint with these ``numbers`` (see
+    """All `TERMS` ``(terms, ..., k)`` of a ``body`` of the joint with these ``numbers`` (see
     `joint_numbers`)."""
     _, p, m, n, clearance, *first = numbers
     share, soft = (p, p * m) if body == "pin" else (1 - p, (1 - p) * n)
@@ -124,18 +128,10 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
         "rise": at.rise,
         "gain": np.minimum(ls - np.log(first[BODIES.index(body)]), _LARGEST_GAIN),
     }
-    products: Array = np.ones((len(TERMS), len(at.x)))
-    for product, names in zip(products, TERMS, strict=True):
-        for name in names.split():
-            product *= inputs[name]
+    products = np.empty((len(TERMS), *ls.shape))
+    for k, names in enumerate(_FACTORS):
+        products[k] = math.prod(inputs[name] for name in names)
     return products
-
-
-def feedback(of: Array, numbers: Sequence[float], body: str, at: At) -> Array:
-    """d(ln eps_rep)/d(ln s) ``(k,)`` with the coefficients ``of`` all `TERMS`; see `terms`."""
-    higher = at._replace(own=at.own * (1 + _SMALL))
-    change = terms(numbers, body, higher) - terms(numbers, body, at)
-    return of @ change / np.log1p(_SMALL)
 
 
 def representative(
@@ -143,32 +139,49 @@ def representative(
 ) -> Strains:
     """s_eff and eps_rep at ``x`` ``(k,)`` of the joint with these ``numbers``, whose bodies harden
     as ``given``; ``model`` has the coefficients by plane and body. Newton's method in ln(eps_rep)
-    of each body, with the other body's s_eff of the last iteration."""
+    of both bodies, with difference quotients."""
     plane = "strain" if numbers[0] else "stress"
-    s = np.repeat(np.array(numbers[5:])[:, None], len(x), axis=1)
-    strain = np.zeros_like(s)
+    s = np.empty((2, 3, len(x)))
+    s[:] = np.reshape(numbers[5:], (2, 1, 1))
+    strain = np.zeros((2, len(x)))
     means = mean_flows(numbers[0], given)
     hardens = [i for i in means if np.isfinite(numbers[5 + i])]
+
+    def predicted(i: int, at: At) -> Array:
+        return np.tensordot(model[f"{plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
+
     for i in hardens:
-        of = model[f"{plane} {BODIES[i]}"]
-        start = At(x, s[i], np.zeros(len(x)), s[1 - i])
-        strain[i] = numbers[4] * np.exp(of @ terms(numbers, BODIES[i], start))
+        strain[i] = numbers[4] * np.exp(predicted(i, At(x, s[i, 0], np.zeros(len(x)), s[1 - i, 0])))
+    # of a body that does not harden nothing is missed: its row of the Jacobian is the identity's
+    miss = np.log(_SHIFTS) + np.zeros_like(s)
+    rises = np.zeros_like(s)
+    step: Array = np.zeros_like(strain)
     for _ in range(_ITERATIONS):
-        moved = 0.0
-        before = s.copy()
+        shifted = strain[:, None] * _SHIFTS
         for i in hardens:
-            mean = means[i]
-            of = model[f"{plane} {BODIES[i]}"]
-            s[i] = mean(strain[i])
-            at = At(x, s[i], rise(mean, strain[i]), before[1 - i])
-            miss = np.log(strain[i] / numbers[4]) - of @ terms(numbers, BODIES[i], at)
-            back = slope_at(mean, strain[i], s[i]) * feedback(of, numbers, BODIES[i], at)
-            step = np.clip(miss / (1 - np.minimum(back, STEEPEST)), -_FARTHEST, _FARTHEST)
-            strain[i] *= np.exp(-step)
-            moved = max(moved, float(np.abs(step).max()), float(np.abs(s[i] / before[i] - 1).max()))
-        if moved <= _CLOSE:
+            s[i], rises[i] = flow_and_rise(means[i], shifted[i])
+        for i in hardens:
+            at = At(x, s[i], rises[i], s[1 - i])
+            miss[i] = np.log(shifted[i] / numbers[4]) - predicted(i, at)
+        step = _step(miss, step)
+        strain *= np.exp(-step)
+        if np.abs(step).max() <= _CLOSE:
             break
-    return Strains(s, strain)
+    for i in hardens:
+        s[i] = means[i](strain[i])
+    return Strains(s[:, 0], strain)
+
+
+def _step(miss: Array, last: Array) -> Array:
+    """Newton's step ``(2, k)`` by what is missed ``(2, 3, k)`` at the `_SHIFTS`, at most half of
+    the ``last`` one where it turns back, which ends cycles around kinks of curves."""
+    (a, b), (c, d) = (miss[:, 1:] - miss[:, :1]) / np.log1p(_SMALL)
+    a = np.maximum(a, _FLATTEST)
+    d = np.maximum(d, _FLATTEST)
+    pin, block = miss[:, 0]
+    step = np.stack([d * pin - b * block, a * block - c * pin]) / (a * d - b * c)
+    farthest = np.where(step * last < 0, np.abs(last) / 2, _FARTHEST)
+    return np.clip(step, -farthest, farthest)
 
 
 def gains(numbers: Sequence[float], given: Flows, x: float) -> Array:
@@ -184,7 +197,7 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     table = hardening_model()
     found = representative(table["strain"], numbers, given, x)
     lost = loss(numbers, Yielding(*found.s), x)
-    slope: Array = CubicSpline(np.log(x), lost.force)(np.log(x), 1) / x
+    slope = spline_slopes(np.log(x), lost.force) / x
     wrong = table["error"][kind(numbers)] * unsure(numbers[0], given, found, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
     return lost._replace(slope=slope, deviation=error)
@@ -205,7 +218,8 @@ def unsure(strain: float, given: Flows, found: Strains, lost: Loss) -> Array:
     ``lost`` to yielding, and less before."""
     squares: Array = np.full(len(lost.force), _LEAST**2)
     for i, mean in mean_flows(strain, given).items():
-        squares += (2 * np.log(WIDE) * rise(mean, found.strain[i])) ** 2
+        _, rise = flow_and_rise(mean, found.strain[i])
+        squares += (2 * np.log(WIDE) * rise) ** 2
     return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)
 
 

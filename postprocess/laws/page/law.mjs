@@ -451,7 +451,8 @@ const GAUSS = [
     [0.5384693101056831, 0.47862867049936647],
     [0.906179845938664, 0.23692688505618908],
 ]; // points and weights from -1 to 1
-const SMALL = 1e-2; // of a difference quotient
+const BODIES = ["pin", "block"];
+const LITTLE = 1e-6; // of a difference quotient
 const WIDE = 3; // factor on a strain, up and down
 const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
@@ -486,35 +487,44 @@ function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, o
 /** s_eff of both bodies at each x, with their representative strains, by Newton's method; `flows` are means. */
 function representative(model, strain, elastic, begin, flows, x) {
     const plane = strain ? "strain" : "stress";
-    const bodies = ["pin", "block"].filter((body) => flows[body]);
+    const hardens = BODIES.map((body) => Boolean(flows[body]));
+    const first = BODIES.map((body) => begin[body]);
     return x.map((place) => {
-        const s = { ...begin };
-        const eps = { pin: 0, block: 0 };
-        const ln = (body, own, rise, other) => {
-            const coefficients = model.strain[`${plane} ${body}`];
-            return lnStrain(model, coefficients, elastic, body, begin[body], place, own, rise, other);
+        const ln = (i, s, rise) => {
+            const coefficients = model.strain[`${plane} ${BODIES[i]}`];
+            return lnStrain(model, coefficients, elastic, BODIES[i], first[i], place, s[i], rise, s[1 - i]);
         };
-        const otherOf = (body) => (body === "pin" ? "block" : "pin");
-        for (const body of bodies) eps[body] = elastic.clearance * Math.exp(ln(body, s[body], 0, s[otherOf(body)]));
-        for (let k = 0; k < 60; k++) {
-            const before = { ...s };
-            let moved = 0;
-            for (const body of bodies) {
-                const other = before[otherOf(body)];
-                const own = flows[body](eps[body]);
-                const rise = riseOf(flows[body], eps[body]);
-                const level = ln(body, own, rise, other);
-                const feedback = (ln(body, own * (1 + SMALL), rise, other) - level) / Math.log1p(SMALL);
-                const slope = Math.log(flows[body]((1 + SMALL) * eps[body]) / own) / Math.log1p(SMALL);
-                const miss = Math.log(eps[body] / elastic.clearance) - level;
-                const step = clip(miss / (1 - Math.min(slope * feedback, 0.7)), -1, 1);
-                s[body] = own;
-                eps[body] *= Math.exp(-step);
-                moved = Math.max(moved, Math.abs(step), Math.abs(own / before[body] - 1));
-            }
-            if (moved <= 1e-13) break;
+        const flowsAt = (eps) => first.map((own, i) => (hardens[i] ? flows[BODIES[i]](eps[i]) : own));
+        const missAt = (eps) => {
+            const s = flowsAt(eps);
+            const missed = (i) => Math.log(eps[i] / elastic.clearance) - ln(i, s, riseOf(flows[BODIES[i]], eps[i]));
+            return hardens.map((own, i) => (own ? missed(i) : 0));
+        };
+        let eps = hardens.map((own, i) => (own ? elastic.clearance * Math.exp(ln(i, first, 0)) : 0));
+        let step = [0, 0];
+        for (let k = 0; k < 40; k++) {
+            const miss = missAt(eps);
+            const slopesBy = (j) => {
+                const shifted = missAt(eps.map((own, i) => (i === j ? own * (1 + LITTLE) : own)));
+                return shifted.map((own, i) => (own - miss[i]) / Math.log1p(LITTLE));
+            };
+            step = newtonStep(slopesBy(0), slopesBy(1), hardens, miss, step);
+            eps = eps.map((own, i) => own * Math.exp(-step[i]));
+            if (Math.max(...step.map(Math.abs)) <= 1e-10) break;
         }
-        return { ...s, strain: eps };
+        const [pin, block] = flowsAt(eps);
+        return { pin, block, strain: { pin: eps[0], block: eps[1] } };
+    });
+}
+
+/** Newton's step in ln(eps_rep) by slopes by each, at most half of the `last` one where it turns back. */
+function newtonStep(byPin, byBlock, hardens, miss, last) {
+    const [a, d] = [byPin[0], byBlock[1]].map((own, i) => (hardens[i] ? Math.max(own, 0.3) : 1));
+    const [b, c] = [byBlock[0], byPin[1]];
+    const full = [d * miss[0] - b * miss[1], a * miss[1] - c * miss[0]].map((own) => own / (a * d - b * c));
+    return full.map((own, i) => {
+        const farthest = own * last[i] < 0 ? Math.abs(last[i]) / 2 : 1;
+        return clip(own, -farthest, farthest);
     });
 }
 
@@ -530,16 +540,16 @@ function requireGain(most, { pin, block }, begin, flows) {
 function hardenedLoss(data, strain, elastic, begin, given, x) {
     const spread = data.hardening.spread[strain ? "strain" : "stress"];
     const flows = {};
-    for (const body of ["pin", "block"]) flows[body] = given[body] && meanFlow(given[body], spread);
+    for (const body of BODIES) flows[body] = given[body] && meanFlow(given[body], spread);
     const found = representative(data.hardening, strain, elastic, begin, flows, x);
     requireGain(data.range.gain, found[found.length - 1], begin, flows);
     const lost = lossOf(data, strain, elastic, found, x);
     const logs = x.map(Math.log);
     const slopes = splineSlopes(logs, lost.map((state) => state.force), false);
-    const alone = ["pin", "block"].filter((body) => Number.isFinite(begin[body]));
+    const alone = BODIES.filter((body) => Number.isFinite(begin[body]));
     const kind = `${strain ? "strain" : "stress"} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
-        const hardens = ["pin", "block"].filter((body) => flows[body]);
+        const hardens = BODIES.filter((body) => flows[body]);
         const rises = hardens.map((body) => 2 * Math.log(WIDE) * riseOf(flows[body], found[i].strain[body]));
         const yielded = Math.min(Math.max((1 - Math.exp(state.force)) / 0.02, 0), 1);
         const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded;
@@ -654,7 +664,7 @@ export function generalLaw(data, joint) {
     const limited = (s) => (ELASTIC_BELOW * begins(s) >= NODES[NODES.length - 1] ? Infinity : s);
     const stresses = { pin: limited(numbers.pin), block: limited(numbers.block) };
     const flows = {};
-    for (const body of ["pin", "block"]) {
+    for (const body of BODIES) {
         const points = joint[`${body}_hardening`];
         const yields = stresses[body] < Infinity;
         flows[body] = points && yields ? (peeq) => flowStress(points, peeq) / numbers.unit : null;

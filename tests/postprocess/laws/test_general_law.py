@@ -4,6 +4,8 @@ refuses."""
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -253,3 +255,47 @@ def test_elastic_law_is_a_table_of_few_numbers() -> None:
     # like bodies, nu = 0.3, dR/R = 0.5 %, plane strain: GetFEM and the solver of this project
     # (README)
     assert state.y[1] * 0.005 == pytest.approx(0.01278, rel=2e-3)
+
+
+@given(
+    joints(yields=("both", "pin", "block", "pin weaker", "block weaker")),
+    some.sampled_from(sorted(metals())),
+    some.sampled_from(sorted(metals())),
+)
+@settings(max_examples=60, deadline=None)
+def test_few_evaluations_of_the_curves_make_a_law(pin: LawJoint, one: str, other: str) -> None:
+    """Newton's method takes at most 12 steps at all displacements together; another evaluation
+    gives the flow stress, and one more the expected error."""
+    asked = [0, 0]
+
+    def counted(body: int, name: str, first: float):
+        peeq, stress = np.array(metals()[name]["hardening"]).T
+
+        def flow(strain: np.ndarray) -> np.ndarray:
+            asked[body] += 1
+            return np.interp(strain, peeq, stress * (first / stress[0]))
+
+        return flow
+
+    numbers = joint_numbers(pin)
+    pairs = zip((one, other), numbers[5:], strict=True)
+    given = tuple(
+        counted(body, name, s) if np.isfinite(s) else None for body, (name, s) in enumerate(pairs)
+    )
+    law_of_numbers(numbers, given)
+    assert max(asked) <= 14
+
+
+def test_a_law_needs_numpy_alone() -> None:
+    """SciPy takes longer to import than the first law takes."""
+    program = (
+        "import sys\n"
+        "from archord.postprocess.laws.general.general_law import general_law\n"
+        "from archord.postprocess.laws.general.joint import LawJoint\n"
+        "law = general_law(LawJoint(10.0, 0.05, 115e3, 300.0, 300.0, plane='stress', nu=0.3))\n"
+        "assert law.yields\n"
+        "print(*(name for name in ('scipy', 'pydantic', 'dolfinx') if name in sys.modules))\n"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
