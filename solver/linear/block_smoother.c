@@ -25,9 +25,11 @@ static inline void add_product(int d, const float *B, const float *x, float *y)
         for (int i = 0; i < d; i++) y[i] += B[d * j + i] * x[j];
 }
 
-static inline void row_times(const BlockRows *A, int d, int32_t from, int32_t to, const float *x, float *y)
+/* y += the blocks of row i times x */
+static inline void row_times(const BlockPart *part, int d, int32_t i, const float *x, float *y)
 {
-    for (int32_t k = from; k < to; k++) add_product(d, A->block + k * (int64_t)(d * d), x + d * A->column[k], y);
+    for (int32_t k = part->start[i]; k < part->start[i + 1]; k++)
+        add_product(d, part->block + k * (int64_t)(d * d), x + d * part->column[k], y);
 }
 
 static void invert(int d, const float *B, float *inverse)
@@ -60,44 +62,52 @@ static int is_zero(int size, const double *block)
     return 1;
 }
 
-static void put(BlockRows *A, int32_t at, int32_t column, const double *block)
+/* Append a block to the last row. */
+static void put(BlockPart *part, int32_t *at, int size, int32_t column, const double *block)
 {
-    const int size = A->d * A->d;
-    A->column[at] = column;
-    for (int k = 0; k < size; k++) A->block[(int64_t)size * at + k] = (float)block[k];
+    if (is_zero(size, block)) return;
+    for (int k = 0; k < size; k++) part->block[(int64_t)size * *at + k] = (float)block[k];
+    part->column[(*at)++] = column;
 }
 
-/* Add a part of the sizes of the entries of ghosts to the diagonal. */
-static void stiffen(BlockRows *A, int32_t i, int32_t end)
+/* Add a part of the sizes of the entries of ghosts to the diagonal block. */
+static void stiffen(BlockRows *A, int32_t i, int32_t end, float *diagonal)
 {
     const int d = A->d;
-    float *added = A->added + d * i, *middle = A->block + (int64_t)d * d * A->middle[i];
+    float *added = A->added + d * i;
     for (int r = 0; r < d; r++) {
         added[r] = 0;
-        for (int64_t k = (int64_t)d * A->border[i]; k < (int64_t)d * end; k++) added[r] += PART * fabsf(A->block[d * k + r]);
-        middle[(d + 1) * r] += added[r];
+        for (int64_t k = (int64_t)d * A->ghosts->start[i]; k < (int64_t)d * end; k++)
+            added[r] += PART * fabsf(A->ghosts->block[d * k + r]);
+        diagonal[(d + 1) * r] += added[r];
     }
 }
 
 void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values,
                  const int32_t *other_offsets, const int32_t *other_columns, const double *other_values)
 {
-    const int64_t size = A->d * A->d;
-    int32_t at = 0;
+    const int size = A->d * A->d;
+    int32_t at_lower = 0, at_upper = 0, at_ghosts = 0;
     for (int32_t i = 0; i < A->n; i++) {
-        A->start[i] = at;
-        for (int32_t k = offsets[i]; k < offsets[i + 1]; k++) {
-            const int is_middle = columns[k] == i;
-            if (is_middle) A->middle[i] = at;
-            if (is_middle || !is_zero(size, values + size * k)) put(A, at++, columns[k], values + size * k);
+        float diagonal[9] = {0};
+        A->lower->start[i] = at_lower;
+        A->upper->start[i] = at_upper;
+        A->ghosts->start[i] = at_ghosts;
+        for (int64_t k = offsets[i]; k < offsets[i + 1]; k++) {
+            const double *block = values + size * k;
+            if (columns[k] < i) put(A->lower, &at_lower, size, columns[k], block);
+            if (columns[k] > i) put(A->upper, &at_upper, size, columns[k], block);
+            if (columns[k] == i)
+                for (int n = 0; n < size; n++) diagonal[n] = (float)block[n];
         }
-        A->border[i] = at;
-        for (int32_t k = other_offsets[i]; k < other_offsets[i + 1]; k++)
-            if (!is_zero(size, other_values + size * k)) put(A, at++, A->n + other_columns[k], other_values + size * k);
-        stiffen(A, i, at);
-        invert(A->d, A->block + size * A->middle[i], A->inverse + size * i);
+        for (int64_t k = other_offsets[i]; k < other_offsets[i + 1]; k++)
+            put(A->ghosts, &at_ghosts, size, A->n + other_columns[k], other_values + size * k);
+        stiffen(A, i, at_ghosts, diagonal);
+        invert(A->d, diagonal, A->inverse + (int64_t)size * i);
     }
-    A->start[A->n] = at;
+    A->lower->start[A->n] = at_lower;
+    A->upper->start[A->n] = at_upper;
+    A->ghosts->start[A->n] = at_ghosts;
 }
 
 static inline void from_zero(const BlockRows *A, const int d, const double *b, float *x, float *change, double *residual)
@@ -105,21 +115,21 @@ static inline void from_zero(const BlockRows *A, const int d, const double *b, f
     const int32_t n = A->n;
     for (int32_t i = 0; i < n; i++) {
         float sum[4] = {0}, found[4] = {0};
-        row_times(A, d, A->start[i], A->middle[i], x, sum);
+        row_times(A->lower, d, i, x, sum);
         for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] - sum[r];
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         memcpy(x + d * i, found, d * sizeof(float));
     }
     for (int32_t i = n - 1; i >= 0; i--) { /* the diagonal block times x is b without the lower part */
         float sum[4] = {0}, found[4] = {0};
-        row_times(A, d, A->middle[i] + 1, A->border[i], x, sum);
+        row_times(A->upper, d, i, x, sum);
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         for (int r = 0; r < d; r++) x[d * i + r] -= found[r];
         memcpy(change + d * i, found, d * sizeof(float));
     }
     for (int32_t i = 0; i < n; i++) {
         float sum[4] = {0};
-        row_times(A, d, A->start[i], A->middle[i], change, sum);
+        row_times(A->lower, d, i, change, sum);
         for (int r = 0; r < d; r++) residual[d * i + r] = sum[r] + A->added[d * i + r] * x[d * i + r];
     }
 }
@@ -137,7 +147,7 @@ void subtract_ghosts(const BlockRows *A, const float *x, double *residual)
     const int d = A->d;
     for (int32_t i = 0; i < A->n; i++) {
         float sum[4] = {0};
-        row_times(A, d, A->border[i], A->start[i + 1], x, sum);
+        row_times(A->ghosts, d, i, x, sum);
         for (int r = 0; r < d; r++) residual[d * i + r] -= sum[r];
     }
 }
@@ -148,15 +158,16 @@ static inline void both_ways(const BlockRows *A, const int d, const double *b, f
     memcpy(change, x, (size_t)n * d * sizeof(float));
     for (int32_t i = 0; i < n; i++) {
         float sum[4] = {0}, found[4] = {0};
-        row_times(A, d, A->start[i], A->middle[i], x, sum);
-        row_times(A, d, A->middle[i] + 1, A->start[i + 1], x, sum);
+        row_times(A->lower, d, i, x, sum);
+        row_times(A->upper, d, i, x, sum);
+        row_times(A->ghosts, d, i, x, sum);
         for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] + A->added[d * i + r] * x[d * i + r] - sum[r];
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         memcpy(x + d * i, found, d * sizeof(float));
     }
     for (int32_t i = n - 1; i >= 0; i--) { /* only the upper part has changed */
         float sum[4] = {0}, found[4] = {0};
-        row_times(A, d, A->middle[i] + 1, A->border[i], change, sum);
+        row_times(A->upper, d, i, change, sum);
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         for (int r = 0; r < d; r++) {
             x[d * i + r] += found[r];

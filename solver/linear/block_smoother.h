@@ -1,16 +1,19 @@
 #include <stdint.h>
 
-/* Block rows of the owned nodes of a rank in single precision, of d by d blocks by columns. Columns from n on are ghosts.
- * A row has its lower blocks from start, the diagonal block at middle, then upper ones, and ghosts from border. */
+/* Blocks in single precision, row by row. */
+typedef struct {
+    int32_t *start;  /* (n + 1) */
+    int32_t *column; /* (k) */
+    float *block;    /* (k d d + 1) each by columns */
+} BlockPart;
+
+/* Block rows of the owned nodes of a rank. A sweep reads the parts left and right of the diagonal one after the other, so
+ * each part lies together. Columns of ghosts count from n on. */
 typedef struct {
     int32_t n, d;
-    int32_t *start;  /* (n + 1) */
-    int32_t *middle; /* (n) */
-    int32_t *border; /* (n) */
-    int32_t *column; /* (k) */
-    float *block;    /* (k d d + 1) */
-    float *added;    /* (n, d) part of the sizes of the ghosts' entries, which the diagonal blocks have more */
-    float *inverse;  /* (n d d) of the diagonal blocks, by columns */
+    BlockPart *lower, *upper, *ghosts;
+    float *added;   /* (n, d) part of the sizes of the ghosts' entries, which the diagonal blocks have more */
+    float *inverse; /* (n d d) of the diagonal blocks, by columns */
 } BlockRows;
 
 /* Fill A from blocks in double precision, but those that are zero: in the rank's own columns, and in others (ghosts). */

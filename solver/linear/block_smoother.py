@@ -40,25 +40,28 @@ class BlockSmoother:
         """Take the values of the matrix, in the rank's ``own`` columns and those of ``ghosts``."""
         n_blocks = len(own.columns) + len(others.columns)
         if n_blocks != self._n_blocks:
-            self._allocate(n_blocks, ghosts)
+            self._allocate(own, others, ghosts)
             self._n_blocks = n_blocks
         arrays = [pointer(array) for part in (own, others) for array in part]
         library(_SOURCE).pack_blocks(self._rows, *arrays)
 
-    def _allocate(self, n_blocks: int, ghosts: np.ndarray) -> None:
+    def _allocate(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
         d = self._d
         n = self._n
         self.ghosts = ghosts
         self.x = np.zeros((n + len(self.ghosts), d), dtype=np.float32)
         self._work = np.zeros((n, d), dtype=np.float32)
+        row = np.repeat(np.arange(n, dtype=np.int32), np.diff(own.offsets))
+        n_lower = int((own.columns < row).sum())
+        n_upper = int((own.columns > row).sum())
+        self._parts = [self._part(k) for k in (n_lower, n_upper, len(others.columns))]
+        lower, upper, beyond = (structure(_SOURCE, "BlockPart", part) for part in self._parts)
         self._members = {
             "n": n,
             "d": d,
-            "start": np.zeros(n + 1, dtype=np.int32),
-            "middle": np.zeros(n, dtype=np.int32),
-            "border": np.zeros(n, dtype=np.int32),
-            "column": np.zeros(n_blocks, dtype=np.int32),
-            "block": np.zeros(n_blocks * d**2 + 1, dtype=np.float32),
+            "lower": lower,
+            "upper": upper,
+            "ghosts": beyond,
             "added": np.zeros((n, d), dtype=np.float32),
             "inverse": np.zeros(n * d**2 + 1, dtype=np.float32),
         }
@@ -69,6 +72,14 @@ class BlockSmoother:
         wanted = PETSc.IS().createGeneral(places.ravel(), comm=PETSc.COMM_SELF)
         self._exchange = PETSc.Scatter().create(whole, wanted, self._ghosted, None)
         self._whole = whole
+
+    def _part(self, k: int) -> dict[str, np.ndarray]:
+        """Room for ``k`` blocks."""
+        return {
+            "start": np.zeros(self._n + 1, dtype=np.int32),
+            "column": np.zeros(k, dtype=np.int32),
+            "block": np.zeros(k * self._d**2 + 1, dtype=np.float32),
+        }
 
     def from_zero(self, b: Array) -> Array:
         """Smooth from zero for a right-hand side ``b`` ``(n d,)``; returns the residual."""
