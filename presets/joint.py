@@ -32,7 +32,6 @@ from archord.solver.problem import (
 _RATIO = 3.0  # element size over the size of the next finer mesh
 _COARSEST = 0.2  # element size over R
 _STEEPEST = 1.0  # growth of the element size
-_COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 
 
 def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
@@ -112,7 +111,4 @@ def _coarser(scene: Scene) -> Scene:
         "relative_element_size": None,
         "growth": max(g.growth, min(_RATIO * g.growth, _STEEPEST)),
     }
-    analysis = scene.analysis.model_copy(
-        update={"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)}
-    )
-    return scene.model_copy(update={"joint": g.model_copy(update=sizes), "analysis": analysis})
+    return scene.model_copy(update={"joint": g.model_copy(update=sizes)})

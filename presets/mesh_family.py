@@ -3,7 +3,7 @@
 Of a joint, lengths are in the size of the contact that is to be expected: a small contact in a
 large pin is resolved as a wide one is, by elements that are as much smaller as it is and grow as
 fast. Of a general scene, a shape gets smaller elements, and of a file the cells are cut
-in four, in space in eight.
+in four, in space in eight. A coarser mesh is for guesses.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ _FEWEST_FACETS = 3.0  # in contact: of a contact of fewer facets nothing can be 
 _OF_FILES = 2.0  # ratio of the element sizes of a file
 _FIRST_OF_SHAPE = 2.0  # first element size of a shape over the size in its scene
 _MOST_DOFS = 1_500_000
+_COARSER = 3.0  # element size of a mesh for guesses over the size of the mesh itself
+_COARSEST_GUESS = 0.3  # element size over R
 
 
 class MeshFamily:
@@ -111,13 +113,7 @@ class ProblemFamily:
         changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _FIRST_OF_SHAPE / self.ratio**level
-            sizes: dict[str, Any] = {
-                "element_size": rounded(factor * self.shape.h),
-                "growth": rounded(factor * self.shape.growth),
-            }
-            if hasattr(self.shape, "relative_element_size"):
-                sizes["relative_element_size"] = None  # the other way to give the size
-            changes = {"shape": self.shape.model_copy(update=sizes)}
+            changes = {"shape": resized(self.shape, factor * self.shape.h, factor)}
         mesh = self.scene.mesh.model_copy(update=changes)
         return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
 
@@ -139,6 +135,30 @@ class ProblemFamily:
     def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
         """Whether something is in contact at the end, if anything is to be."""
         return steps[-1].contact_area > 0 or not self.scene.interaction
+
+
+def coarser(scene: ProblemScene) -> ProblemScene | None:
+    """The ``scene`` on larger elements, for guesses; None where they would be hardly larger, and
+    for a mesh from a file."""
+    shape = scene.mesh.shape
+    if shape is None:
+        return None
+    size = min(_COARSER * shape.h, _COARSEST_GUESS * shape.radius)
+    if size < RATIO * shape.h:
+        return None
+    mesh = scene.mesh.model_copy(update={"shape": resized(shape, size, size / shape.h)})
+    return scene.model_copy(update={"mesh": mesh})
+
+
+def resized(shape: Any, size: float, steeper: float) -> Any:
+    """The ``shape`` with elements of another ``size``, which grow by a factor ``steeper``."""
+    sizes: dict[str, Any] = {
+        "element_size": rounded(size),
+        "growth": rounded(steeper * shape.growth),
+    }
+    if hasattr(shape, "relative_element_size"):
+        sizes["relative_element_size"] = None  # the other way to give the size
+    return shape.model_copy(update=sizes)
 
 
 def expected_angle(scene: Scene) -> float:

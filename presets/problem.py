@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from pkgutil import resolve_name
@@ -16,6 +18,7 @@ from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.formats.source import CHANGES, Mesh, circles_in
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.kinematics import kinematics
+from archord.presets.mesh_family import coarser
 from archord.report.errors import InputError
 from archord.scene import parts
 from archord.scene.problem import ProblemScene
@@ -31,7 +34,12 @@ def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
     `InputError` for a file that is no mesh, and for parts that were given from Python."""
     with as_input_error(mesh_name(scene)):
         mesh = scene_mesh(scene, comm)
-        return problem_of(placed(scene, mesh), mesh)
+        in_place = placed(scene, mesh)
+        problem = problem_of(in_place, mesh)
+    larger = coarser(in_place) if in_place.in_space else None
+    if larger is None:
+        return problem
+    return replace(problem, coarser=partial(general_problem, larger, comm))
 
 
 def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:

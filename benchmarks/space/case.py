@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
+from archord.solver.path.coarse_start import coarse_start
 from archord.solver.path.load_path import Position
 from archord.solver.path.stepping import Step, march
 from archord.solver.path.system import System
@@ -15,6 +17,7 @@ from archord.solver.problem import Problem
 E = 210e3
 NU = 0.3
 PRESS = "press"
+_COARSER = 3.0  # element size of the mesh for guesses over the size of the mesh itself
 Quantity = Callable[[System], float]
 
 
@@ -78,9 +81,10 @@ def solved(case: Case, size: float = 0.0) -> Solved:
     Collective."""
     begun = perf_counter()
     result = Solved(case, size or case.size)
-    system = System(case.problem(result.size))
+    coarser = partial(case.problem, _COARSER * result.size)
+    system = System(replace(case.problem(result.size), coarser=coarser))
     result.n_dofs = system.n_dofs
-    path = system.load_path()
+    path = system.load_path(coarse=coarse_start(system))
 
     def note(step: Step, position: Position) -> None:
         result.newton += step.iterations

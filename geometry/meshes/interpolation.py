@@ -14,16 +14,28 @@ from dolfinx.geometry import (
 from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
-from archord.geometry.basis import QUADRILATERAL, TRIANGLE, Array, order_of, tabulate
+from archord.geometry.basis import (
+    HEXAHEDRON,
+    QUADRILATERAL,
+    TETRAHEDRON,
+    TRIANGLE,
+    Array,
+    element_of,
+)
 
 _NEWTON = 8  # iterations for the reference point: the cells are nearly straight
 _STRAIGHT = 1e-9  # last step in a reference cell
-# corners of the straight triangles that make up a cell, in basix' order
-_TRIANGLES = {TRIANGLE: np.array([[0, 1, 2]]), QUADRILATERAL: np.array([[0, 1, 2], [3, 2, 1]])}
+# corners of the straight triangles or tetrahedra that make up a cell, in basix' order
+_SIMPLICES = {
+    TRIANGLE: np.array([[0, 1, 2]]),
+    QUADRILATERAL: np.array([[0, 1, 2], [3, 2, 1]]),
+    TETRAHEDRON: np.array([[0, 1, 2, 3]]),
+    HEXAHEDRON: np.array([[0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4], [1, 2, 4, 7]]),
+}
 
 
 class Interpolation:
-    """From the nodes ``x`` ``(n, 2)`` of ``cells`` ``(m, a)`` to points ``to`` ``(k, 2)``.
+    """From the nodes ``x`` ``(n, d)`` of ``cells`` ``(m, a)`` to points ``to`` ``(k, d)``.
 
     A point outside of all cells, as between a curved edge and its coarser image, gets the
     continuation of a cell next to it. Per point it keeps
@@ -33,23 +45,23 @@ class Interpolation:
     """
 
     def __init__(self, kind: basix.CellType, x: Array, cells: np.ndarray, to: Array) -> None:
-        order = order_of(kind, cells.shape[1])
-        halves = _TRIANGLES[kind]
-        triangle, within = _located(x, cells[:, halves].reshape(-1, 3), to)
-        cell, half = np.divmod(triangle, len(halves))
+        self._element = element_of(kind, cells.shape[1])
+        parts = _SIMPLICES[kind]
+        simplex, within = _located(x, cells[:, parts].reshape(-1, parts.shape[1]), to)
+        cell, part = np.divmod(simplex, len(parts))
         self._nodes = cells[cell]
-        barycentric = np.column_stack([1 - within.sum(axis=1), within])  # (k, 3)
-        corners = basix.geometry(kind)[halves[half]]  # (k, 3, 2), in the reference cell
+        barycentric = np.column_stack([1 - within.sum(axis=1), within])  # (k, d + 1)
+        corners = basix.geometry(kind)[parts[part]]  # (k, d + 1, d), in the reference cell
         X = np.einsum("ki,kij->kj", barycentric, corners)
-        if kind == QUADRILATERAL or order > 1:
-            self._improve(kind, order, X, x, to)
-        self._weights = tabulate(kind, order, X)[0]
+        if cells.shape[1] > parts.shape[1]:  # not linear
+            self._improve(X, x, to)
+        self._weights = self._element.tabulate(0, X)[0, ..., 0]
 
-    def _improve(self, kind: basix.CellType, order: int, X: Array, x: Array, to: Array) -> None:
-        """Move the reference points ``X`` ``(k, 2)`` to where the curved cells have ``to``."""
+    def _improve(self, X: Array, x: Array, to: Array) -> None:
+        """Move the reference points ``X`` ``(k, d)`` to where the curved cells have ``to``."""
         moving = np.arange(len(to))
         for _ in range(_NEWTON):
-            shape, *slopes = tabulate(kind, order, X[moving])
+            shape, *slopes = self._element.tabulate(1, X[moving])[..., 0]
             nodes = x[self._nodes[moving]]
             misfit = to[moving] - np.einsum("na,nai->ni", shape, nodes)
             jacobian = np.einsum("jna,nai->nij", slopes, nodes)
@@ -62,35 +74,37 @@ class Interpolation:
         return np.einsum("ka,kac->kc", self._weights, values[self._nodes])
 
 
-def _located(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, Array]:
-    """The number of a straight triangle ``(m, 3)`` with vertices ``x`` ``(n, 2)`` around each point
-    of ``to`` ``(k, 2)``, or next to it, and the point's reference coordinates ``(k, 2)`` there."""
-    point, cell = _candidates(x, triangles, to)
-    corners = x[triangles[cell]]
+def _located(x: Array, simplices: np.ndarray, to: Array) -> tuple[np.ndarray, Array]:
+    """The number of a straight triangle or tetrahedron ``(m, d + 1)`` with vertices ``x``
+    ``(n, d)`` around each point of ``to`` ``(k, d)``, or next to it, and the point's reference
+    coordinates ``(k, d)`` there."""
+    point, cell = _candidates(x, simplices, to)
+    corners = x[simplices[cell]]
     edges = corners[:, 1:] - corners[:, :1]
     ray = to[point] - corners[:, 0]
     X = np.linalg.solve(np.swapaxes(edges, 1, 2), ray[..., None])[..., 0]
     smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
-    order = np.lexsort((-smallest, point))  # by point, the best triangle first
+    order = np.lexsort((-smallest, point))  # by point, the best simplex first
     _, first = np.unique(point[order], return_index=True)
     best = order[first]
     return cell[best], X[best]
 
 
-def _candidates(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs ``(p,)`` of a point of ``to`` and a triangle whose bounding box it is in, or the
-    nearest triangle."""
-    straight = basix.ufl.element("P", "triangle", 1, shape=(2,))
-    cells = triangles.astype(np.int64, order="C")
+def _candidates(x: Array, simplices: np.ndarray, to: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs ``(p,)`` of a point of ``to`` and a simplex whose bounding box it is in, or the
+    nearest simplex."""
+    d = x.shape[1]
+    straight = basix.ufl.element("P", "triangle" if d == 2 else "tetrahedron", 1, shape=(d,))
+    cells = simplices.astype(np.int64, order="C")
     mesh = create_mesh(MPI.COMM_SELF, cells=cells, x=np.ascontiguousarray(x), e=straight)
-    places = np.pad(to, ((0, 0), (0, 1)))
+    places = np.pad(to, ((0, 0), (0, 3 - d)))
     tree = bb_tree(mesh, mesh.topology.dim)
     found = compute_collisions_points(tree, places)
     point = np.repeat(np.arange(len(to)), np.diff(found.offsets))
     cell = found.array
     lost = np.setdiff1d(np.arange(len(to)), point)
     if len(lost):
-        every = np.arange(len(triangles), dtype=np.int32)
+        every = np.arange(len(simplices), dtype=np.int32)
         middles = create_midpoint_tree(mesh, mesh.topology.dim, every)
         nearest = compute_closest_entity(tree, middles, mesh, places[lost])
         point = np.append(point, lost)

@@ -7,6 +7,8 @@ by less than a coarse element.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from archord.geometry.basis import Array
@@ -18,6 +20,8 @@ from archord.solver.path.system import System
 _FEWEST_DOFS = 8_000  # of a problem that is worth a coarse start
 # of one that yields in plane stress, where flow localises and Newton's method is slow
 _FEWEST_STRESS = 4_000
+_FEWEST_IN_SPACE = 40_000  # where coarse meshes find less of the contact for their time
+_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing can be learnt
 
 
@@ -29,13 +33,16 @@ def coarse_start(system: System) -> CoarseStart | None:
         return None
     with system.timer("coarse start"):
         try:
-            coarse = System(problem.coarser())
+            rough = max(problem.tolerance, _TOLERANCE)
+            coarse = System(replace(problem.coarser(), tolerance=rough))
         except ProjectionError:  # on all ranks: too coarse for the contact to be found
             return None
         return CoarseStart(system, coarse) if 2 * coarse.n_dofs < system.n_dofs else None
 
 
 def _fewest_dofs(system: System) -> int:
+    if system.problem.kinematics.dimension == 3:
+        return _FEWEST_IN_SPACE
     localises = system.bulk.plastic and system.problem.kinematics.is_thin
     return _FEWEST_STRESS if localises else _FEWEST_DOFS
 
