@@ -22,7 +22,8 @@ from archord.solver.linear.multigrid import forcing_term
 from archord.solver.linear.strategy import krylov_iterations
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
-CIRCLING = 4  # the same where the active set stands still
+CIRCLING = 4  # the same where the active set stands still, but for a few points:
+FEW = 2  # which open and close as they jump between two facets
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
 _R = PETSc.SNES.ConvergedReason
 _REASONS = {
@@ -320,7 +321,7 @@ class NewtonSolver:
     def _stagnates(self) -> bool:
         """Whether the residual has not halved in as many iterations as it is given, neither itself
         nor over the reaction, which falls with it where a body only turns."""
-        has_changes = any(self._result.active_set_changes[-CIRCLING:])
+        has_changes = max(self._result.active_set_changes[-CIRCLING:]) > FEW
         patience = _PATIENCE if has_changes else CIRCLING
         for residuals in (self._result.residuals, self._norms):
             earlier = residuals[:-patience]

@@ -12,7 +12,7 @@ from archord.geometry.basis import Array
 from archord.materials.material import Points
 from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.equilibrium.rigid_motions import RigidMotions
-from archord.solver.path.newton import CIRCLING, Newton, NewtonSolver
+from archord.solver.path.newton import CIRCLING, FEW, Newton, NewtonSolver
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
@@ -164,8 +164,8 @@ class Recovery:
     def _solve_holding(self, guess: Array, *, line_search: bool, goal: float = 0.0) -> bool:
         """Solve from ``guess``; where that circles, hold points on their facets.
 
-        Where the residual circles though no point opens or closes, points jump between two facets
-        that meet at an angle. Each facet is continued beyond its ends then.
+        Where the residual circles though hardly any point opens or closes, points jump between two
+        facets that meet at an angle. Each facet is continued beyond its ends then.
         """
         result = self._solve_carried(guess, line_search=line_search, goal=goal)
         pairs = self.equilibrium.contact.pairs
@@ -191,9 +191,9 @@ class Recovery:
 
 
 def _circles(result: Newton) -> bool:
-    """Whether the active set stood still in the last iterations."""
+    """Whether the active set stood still in the last iterations, but for a few points."""
     changes = result.active_set_changes
-    return len(changes) > CIRCLING and not any(changes[-CIRCLING:])
+    return len(changes) > CIRCLING and max(changes[-CIRCLING:]) <= FEW
 
 
 @contextmanager
