@@ -134,7 +134,7 @@ def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) 
     """Basis of the given ``degree`` at the reference points ``X`` ``(q, d)`` of ``cells``, or ``(n,
     q, d)`` of each."""
     geometry = tabulate(mesh.basix_cell(), cell_degree(mesh), X)
-    table = _tabulate(displacement_element(mesh.basix_cell(), degree), X)
+    table = table_of(displacement_element(mesh.basix_cell(), degree), X)
     nodes = mesh.geometry.x[cell_nodes(mesh)[cells], : X.shape[-1]]
     at = "qa" if X.ndim == 2 else "nqa"
     point = np.einsum(f"{at},nai->nqi", geometry[0], nodes)
@@ -165,10 +165,12 @@ def _inverse(J: Array) -> tuple[Array, Array]:
 
 def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
     """Values and derivatives ``(1 + d, ..., a)`` of the Lagrange basis at ``X`` ``(..., d)``."""
-    return _tabulate(lagrange_element(cell, degree), X)
+    return table_of(lagrange_element(cell, degree), X)
 
 
-def _tabulate(element: basix.finite_element.FiniteElement, X: Array) -> Array:
+def table_of(element: basix.finite_element.FiniteElement, X: Array) -> Array:
+    """Values and derivatives ``(1 + d, ..., a)`` of the basis of an ``element`` at ``X``
+    ``(..., d)``."""
     d = X.shape[-1]
     if not X.size:  # basix ends the process
         return np.zeros((1 + d, *X.shape[:-1], element.dim))

@@ -21,6 +21,7 @@ from archord.geometry.basis import (
     TRIANGLE,
     Array,
     element_of,
+    table_of,
 )
 
 _NEWTON = 8  # iterations for the reference point: the cells are nearly straight
@@ -55,13 +56,13 @@ class Interpolation:
         X = np.einsum("ki,kij->kj", barycentric, corners)
         if cells.shape[1] > parts.shape[1]:  # not linear
             self._improve(X, x, to)
-        self._weights = self._element.tabulate(0, X)[0, ..., 0]
+        self._weights = table_of(self._element, X)[0]
 
     def _improve(self, X: Array, x: Array, to: Array) -> None:
         """Move the reference points ``X`` ``(k, d)`` to where the curved cells have ``to``."""
         moving = np.arange(len(to))
         for _ in range(_NEWTON):
-            shape, *slopes = self._element.tabulate(1, X[moving])[..., 0]
+            shape, *slopes = table_of(self._element, X[moving])
             nodes = x[self._nodes[moving]]
             misfit = to[moving] - np.einsum("na,nai->ni", shape, nodes)
             jacobian = np.einsum("jna,nai->nij", slopes, nodes)

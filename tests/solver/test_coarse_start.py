@@ -1,6 +1,8 @@
 """A coarse start is a guess: it changes the way to the solution and nothing else."""
 
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from archord.benchmarks.case import paper_joint
 from archord.geometry.curve import ProjectionError
 from archord.output.run import solve_scene
 from archord.presets import joint as preset
+from archord.presets import mesh_family
+from archord.scene.file import parse_any
 from archord.scene.sections.analysis import Stepping
 from archord.solver.path import coarse_start
 from tests.solver.solving import SEVERAL, joint_system
@@ -62,6 +66,27 @@ def test_the_solution_is_that_without_it(name, tmp_path, monkeypatch):
             largest = max(abs(m[quantity]) for m in plain)
             assert b[quantity] == pytest.approx(a[quantity], abs=1e-8 * largest + 1e-300)
     assert sum(m.iterations for m in guessed) < sum(m.iterations for m in plain)
+
+
+@pytest.mark.parametrize(("name", "force"), [("joint", "P"), ("bushing", "pull force")])
+def test_joints_in_space_have_one(name, force, tmp_path, monkeypatch):
+    """Of tetrahedra, and of a shape with sleeves: the same forces in fewer iterations."""
+    given = tomllib.loads(Path(f"scenes/{name}_in_space.toml").read_text(encoding="utf-8"))
+    given["load"] |= {"steps": 2}
+    if name == "joint":
+        given["block"].pop("yield_stress")
+        given["joint"] |= {"relative_element_size": 0.1}
+    scene = parse_any(given)
+    forces, iterations = [], []
+    for fewest in (10**9, 0):
+        monkeypatch.setattr(coarse_start, "_FEWEST_IN_SPACE", fewest)
+        monkeypatch.setattr(mesh_family, "_COARSEST_GUESS", 1.0)
+        steps, report = run(scene, tmp_path / str(fewest))
+        assert (sum(s["coarse_iterations"] for s in report["steps"]) > 0) == (fewest == 0)
+        forces.append([m[force] for m in steps])
+        iterations.append(sum(m.iterations for m in steps))
+    assert forces[1] == pytest.approx(forces[0], rel=1e-7)
+    assert iterations[1] < iterations[0]
 
 
 def test_iterations_hardly_grow_with_the_mesh(tmp_path):

@@ -1,10 +1,11 @@
-"""Interpolation between meshes of curved triangles."""
+"""Interpolation between meshes of curved cells."""
 
+import basix
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.basis import TRIANGLE
+from archord.geometry.basis import HEXAHEDRON, TETRAHEDRON, TRIANGLE, element_of
 from archord.geometry.meshes.interpolation import Interpolation
 from archord.geometry.shapes.pin_in_block import quarter_joint
 from tests.geometry.shapes.measures import Cells
@@ -34,3 +35,18 @@ def test_linear_fields_are_kept_everywhere_and_curved_ones_to_the_order_of_the_m
         errors.append(np.sqrt(np.mean((f(wave(y)) - wave(to))[near] ** 2)))
     assert errors[1] < errors[0] / 2**degree
     assert errors[1] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("kind", "nodes"), [(TETRAHEDRON, 4), (TETRAHEDRON, 10), (HEXAHEDRON, 20), (HEXAHEDRON, 27)]
+)
+def test_linear_fields_are_kept_in_a_distorted_cell_in_space(kind, nodes):
+    """Within it, and a little outside."""
+    X = element_of(kind, nodes).points
+    bent = X + 0.05 * X[:, [1, 2, 0]] * X[:, [2, 0, 1]]
+    inside = basix.create_lattice(kind, 4, basix.LatticeType.equispaced, exterior=True)
+    to = np.append(bent.mean(axis=0) + 0.9 * (inside - inside.mean(axis=0)), [[-0.1, 0.2, 0.1]], 0)
+    interpolate = Interpolation(kind, bent, np.arange(nodes)[None], to)
+    assert interpolate(bent) == pytest.approx(to, abs=1e-10)
+    constant = np.ones((nodes, 1))
+    assert interpolate(constant) == pytest.approx(1.0, abs=1e-12)
