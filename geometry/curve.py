@@ -30,6 +30,8 @@ _SAMPLES = 4  # points a facet, among which the nearest facet is searched
 _ROUND = (
     1e-3  # over an arc's size, how far points may be off its circle; size over radius of a line
 )
+# Gauss rule on [-1, 1] for arc lengths
+_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class ProjectionError(RuntimeError):
@@ -163,10 +165,9 @@ class Curve:
         each facet."""
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
         ends = np.concatenate([xi, np.ones((self.n_facets, 1))], axis=1)
-        q, w = np.polynomial.legendre.leggauss(8)
-        _, slope = self.shapes(ends[..., None] * (q + 1) / 2)
+        _, slope = self.shapes(ends[..., None] * (_PLACES + 1) / 2)
         tangent = np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope)
-        lengths = (np.linalg.norm(tangent, axis=-1) @ w) * ends / 2
+        lengths = (np.linalg.norm(tangent, axis=-1) @ _WEIGHTS) * ends / 2
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
         for first in self._first:
             start[first:] -= start[first]

@@ -5,6 +5,7 @@ Around an axis they are integrals over the whole ring.
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,22 @@ class Loads:
 
     def integral(self, form: Any) -> float:
         """The ``form`` without arguments, over all ranks."""
-        return self.V.mesh.comm.allreduce(fem.assemble_scalar(fem.form(form)))
+        return self._sum(fem.form(form))
+
+    def _sum(self, compiled: fem.Form) -> float:
+        """The same of a ``compiled`` form, with what its constants are now."""
+        return self.V.mesh.comm.allreduce(fem.assemble_scalar(compiled))
+
+    def _first_moments(self, x: Any, ds: Any) -> Array:
+        """Integrals ``(d,)`` of the components of ``x``."""
+        d = self.kinematics.dimension
+        along = fem.Constant(self.V.mesh, np.zeros(d))
+        moment = fem.form(ufl.inner(along, x) * ds)
+        moments = np.zeros(d)
+        for i in range(d):
+            along.value = np.eye(d)[i]
+            moments[i] = self._sum(moment)
+        return moments
 
     def _vector(self, form: Any) -> Array:
         """The linear ``form`` at the nodes ``(n_owned, d)``."""
@@ -92,7 +108,7 @@ class Loads:
                 raise ValueError(f"the mean {mean.name!r} is a rotation, which no ring has")
             return self._vector(self.swept(v[mean.axis]) * ds) / length
         x = ufl.SpatialCoordinate(mesh)
-        centre = np.array([self.integral(x[i] * ds) for i in range(d)]) / length
+        centre = self._first_moments(x, ds) / length
         arm = x - fem.Constant(mesh, centre)
         lever = np.zeros(d) if mean.point is None else np.array(mean.point) - centre
         by_rotations = self._by_rotations(mean.axis, lever, self._inertia(arm, ds))
@@ -108,8 +124,14 @@ class Loads:
         if len(turns) == 1:
             return np.array([[self.integral(ufl.inner(arm, arm) * ds)]])
         d = self.kinematics.dimension
-        axes = range(d)
-        second = np.array([[self.integral(arm[i] * arm[j] * ds) for j in axes] for i in axes])
+        one = fem.Constant(self.V.mesh, np.zeros(d))
+        other = fem.Constant(self.V.mesh, np.zeros(d))
+        moment = fem.form(ufl.inner(one, arm) * ufl.inner(other, arm) * ds)
+        second = np.zeros((d, d))
+        for i, j in combinations_with_replacement(range(d), 2):
+            one.value = np.eye(d)[i]
+            other.value = np.eye(d)[j]
+            second[i, j] = second[j, i] = self._sum(moment)
         return float(np.trace(second)) * np.eye(d) - second
 
     def _by_rotations(self, axis: int, lever: Array, inertia: Array) -> Array:

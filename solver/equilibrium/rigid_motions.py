@@ -75,6 +75,8 @@ class RigidMotions:
         self.levels[:, drives.unknown[moving]] = free[k:].T * drives.weight[moving]
         parts = np.abs(free[:k]).reshape(len(bodies), -1).max(axis=1, initial=0.0)
         self.loose = [body for body, part in zip(bodies, parts, strict=True) if part > _LOOSE]
+        lengths = [surface.facet_lengths().mean() for surface in contact.surfaces]
+        self._facet = min(lengths, default=np.inf)
         self._links = [self._linked(interface.interaction) for interface in contact.interfaces]
 
     def _linked(self, interaction: Interaction) -> set[str]:
@@ -194,12 +196,11 @@ class RigidMotions:
 
     def _shortened(self, step: Array, openings: list[Array]) -> Array:
         """The ``step``, in which no gap changes by more than a facet."""
-        facet = min(surface.facet_lengths().mean() for surface in self.contact.surfaces)
         farthest = 0.0
         for opening in openings:
             farthest = max(farthest, float(np.abs(opening @ step).max(initial=0.0)))
         farthest = self.comm.allreduce(farthest, op=MPI.MAX)
-        return step if farthest <= facet else step * (facet / farthest)
+        return step if farthest <= self._facet else step * (self._facet / farthest)
 
     def _push(self, u: Array, levels: Array, load: float) -> _Push:
         """What contact does at these displacements and levels. Raises `ProjectionError`."""
