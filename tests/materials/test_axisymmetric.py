@@ -144,13 +144,13 @@ def test_cauchys_stress_is_nominal_stress_over_the_deformed_area(plane):
 @pytest.mark.parametrize("name", ["linear hardening", "back stresses"])
 def test_the_work_of_large_strains_is_stored_or_dissipated(name, plane):
     """Confined compression of a soft metal, whose volume shrinks by a fifth and more: plastic work
-    is that of Kirchhoff's stress. The balance holds to the second order of the step."""
+    is that of Kirchhoff's stress. What the balance lacks is proportional to the step: 3e-4."""
     material = MATERIALS[name]
     soft = type(material)(E, NU, plane, LinearHardening(0.04 * E, 0.05 * E))
     if name == "back stresses":
         soft = type(material)(E, NU, plane, LinearHardening(0.04 * E), ((0.2 * E, 5.0),))
     m = LargeStrain(soft)
-    n = 1500
+    n = 100
     k = 5 if plane == "axisymmetric" else 4
     end = np.zeros((1, k))
     end[0, :2] = -0.3, 0.05
@@ -164,4 +164,4 @@ def test_the_work_of_large_strains_is_stored_or_dissipated(name, plane):
     stored = m.stored(end, stress, state)[0]
     dissipated = m.dissipation(state)[0]
     assert dissipated > 0.1 * stored
-    assert stored + dissipated == pytest.approx(work, rel=2e-3 if plane != "stress" else 1e-2)
+    assert stored + dissipated == pytest.approx(work, rel=4e-4)

@@ -215,15 +215,15 @@ def test_simple_shear_of_hencky(plane, g):
 
 @pytest.mark.parametrize("name", ["linear hardening", "back stresses"])
 def test_the_work_of_large_strains_is_stored_or_dissipated(name):
-    """Compression of a soft metal while it is sheared in all planes: plastic work is Kirchhoff's
-    stress's."""
+    """Compression of a soft metal while it is sheared in all planes: plastic work is the work of
+    Kirchhoff's stress, to 2e-4 in steps of this length."""
     soft = J2Material(E, NU, hardening=LinearHardening(0.04 * E, 0.05 * E))
     if name == "back stresses":
         back = ((0.2 * E, 5.0),)
         soft = KinematicMaterial(E, NU, hardening=LinearHardening(0.04 * E), back_stresses=back)
     m = in_space(soft)
     end = np.array([[-0.3, 0.05, -0.1, 0.1, 0.0, -0.1, 0.05, 0.0, 0.1]])
-    n = 1500
+    n = 100
     state = m.state(1)
     work = 0.0
     last = np.zeros((1, 9))
@@ -234,7 +234,7 @@ def test_the_work_of_large_strains_is_stored_or_dissipated(name):
     stored = m.stored(end, stress, state)[0]
     dissipated = m.dissipation(state)[0]
     assert dissipated > 0.1 * stored
-    assert stored + dissipated == pytest.approx(work, rel=2e-3)
+    assert stored + dissipated == pytest.approx(work, rel=4e-4)
 
 
 def test_pure_stretches_add_up_as_logarithms():

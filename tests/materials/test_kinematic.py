@@ -221,7 +221,7 @@ def test_energy_balance(plane, rng):
                 before = stress
         return np.abs(work - m.energy(stress) - m.dissipation(state)).sum() / work.sum()
 
-    errors = [missing(n) for n in (20, 80, 320)]
+    errors = [missing(n) for n in (10, 40, 160)]
     assert errors[-1] < 2e-4
     assert errors[1] < errors[0] / 3.5
     assert errors[2] < errors[1] / 3.5
