@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -93,18 +94,38 @@ def files_of(room: str) -> list[Path]:
     return sorted((ROOT / room.replace(".", "/")).glob("*.py"))
 
 
+@cache
+def tree_of(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+@cache
+def imports_in(file: Path) -> list[ast.Import | ast.ImportFrom]:
+    """The imports, wherever in the file."""
+    nodes = ast.walk(tree_of(file))
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
+def for_type_checking(file: Path) -> set[ast.AST]:
+    """The statements of a file that only type checkers read."""
+    checks = (
+        node
+        for node in tree_of(file).body
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+    )
+    return {statement for check in checks for statement in check.body}
+
+
 def imported(file: Path) -> set[str]:
     """The rooms that a file imports from, wherever in the file but for type checking; ``import
     archord`` alone, for the version, is none."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            node.body = []
     names = []
-    for node in ast.walk(tree):
+    for node in imports_in(file):
+        if node in for_type_checking(file):
+            continue
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
+        elif node.module:
             names += [f"{node.module}.{alias.name}" for alias in node.names]
     return {room_of(name.removeprefix("archord.")) for name in names if name.startswith("archord.")}
 
@@ -119,7 +140,7 @@ def test_a_room_imports_only_from_those_below_it(room):
 @pytest.mark.parametrize("room", BANNED)
 def test_a_room_imports_nothing_that_it_must_do_without(room):
     for file in files_of(room):
-        nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+        nodes = imports_in(file)
         names = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
         names |= {
             alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
@@ -134,7 +155,7 @@ def test_rooms_that_use_dolfinx_import_what_must_come_before_it():
     """PyPI's dolfinx finds no MPI unless the package that `archord.kernels.compat` imports came
     first."""
     for room in ROOMS[:-1]:
-        trees = [ast.parse(file.read_text(encoding="utf-8")) for file in files_of(room)]
+        trees = [tree_of(file) for file in files_of(room)]
         at_top = [node for tree in trees for node in tree.body]
         names = {node.module for node in at_top if isinstance(node, ast.ImportFrom) and node.module}
         if room != "kernels" and {name.partition(".")[0] for name in names} & {
@@ -156,11 +177,7 @@ def test_no_imports_at_the_top_of_files_make_a_circle():
     }
     graph = {}
     for name in known:
-        tree = ast.parse(
-            (ROOT / f"{name.removeprefix('archord.').replace('.', '/')}.py").read_text(
-                encoding="utf-8"
-            )
-        )
+        tree = tree_of(ROOT / f"{name.removeprefix('archord.').replace('.', '/')}.py")
         froms = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
         graph[name] = {f"{f.module}.{a.name}" for f in froms for a in f.names} | {
             f.module for f in froms
@@ -233,10 +250,7 @@ def test_the_requirements_name_all_that_is_imported():
     rooms = [
         room for room in ROOMS if not room.startswith("benchmarks")
     ]  # peers have environments of their own
-    trees = [
-        ast.parse(file.read_text(encoding="utf-8")) for room in rooms for file in files_of(room)
-    ]
-    nodes = [node for tree in trees for node in ast.walk(tree)]
+    nodes = [node for room in rooms for file in files_of(room) for node in imports_in(file)]
     names = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
     names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     used = {name.partition(".")[0] for name in names} - sys.stdlib_module_names - {"archord"}
