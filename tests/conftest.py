@@ -14,7 +14,7 @@ settings.load_profile("same")
 
 
 def pytest_addoption(parser):
-    parser.addoption("--kills", type=int, default=12, help="how often test_kill.py kills runs (12)")
+    parser.addoption("--kills", type=int, default=8, help="how often test_kill.py kills runs (8)")
     parser.addoption("--cases", type=int, default=12, help="how many scenes tests/fuzz solves (12)")
 
 

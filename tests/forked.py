@@ -22,8 +22,15 @@ _FORKS.set_forkserver_preload(
         "archord.cli",
         "archord.materials.j2",
         "archord.commands.progress",
+        "archord.commands.solve_commands",
+        "archord.geometry.meshes.check",
+        "archord.output.fields",
         "archord.output.restart",
         "archord.output.run",
+        "archord.presets.general",
+        "archord.presets.held",
+        "archord.presets.joint_measures",
+        "archord.studies.accuracy",
     ]
 )
 
