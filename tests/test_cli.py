@@ -49,6 +49,19 @@ def archord(
     return result
 
 
+def run_on_two_ranks(commands: list[list[str]], cwd: Path) -> subprocess.CompletedProcess:
+    """All ``commands`` one after another under one launcher, whose exit code is 2 if all ended so,
+    or with 0 on the ranks that had nothing to do."""
+    code = (
+        f"import sys; from archord.cli import run; ends = {{*map(run, {commands})}}; "
+        "sys.exit(ends.pop() if ends in ({0}, {2}) else 1)"
+    )
+    command = ["mpirun", "-n", "2", sys.executable, "-c", code]
+    return subprocess.run(
+        command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_a_help_page(capsys, command):
     """Found in its file by its name; what arguments and options are stands beside them."""

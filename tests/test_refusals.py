@@ -9,7 +9,7 @@ import pytest
 from archord.postprocess.run import _NEEDED, Run
 from archord.report.errors import InputError
 from tests.output.run_files import rewrite_report
-from tests.test_cli import SCENE, archord
+from tests.test_cli import SCENE, archord, run_on_two_ranks
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
 RUN = "{coarse}"
@@ -114,28 +114,55 @@ def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, argumen
     assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
 
 
-@pytest.mark.parametrize(
-    ("ranks", "arguments", "said"),
-    [
-        (0, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
-        (0, ["slove", "--help"], "No such command 'slove'. Did you mean solve?"),
-        (0, ["benchmark", "stabilty"], "No such command 'stabilty'. Did you mean stability?"),
-        (2, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
-        (2, ["solve", "--bogus", "nowhere.toml"], "No such option"),
-        (2, ["scene", "--bogus"], "No such option"),
-        (2, ["fit", "nowhere"], "nowhere: is not a run folder"),
-        (2, ["reproduce", "fig6"], "fig6: is not a figure of the paper"),
-        (2, ["sweep", "bad.sweep.toml"], "pin.E = -1.0 must be greater than 0."),
-    ],
-)
-def test_a_process_tells_bad_input_once(tmp_path, ranks, arguments, said):
-    """Exit code 2 for the whole launcher, nothing written, for commands of one rank and of all."""
+RADIUS = "bad.toml: joint.radius = -10.0 must be greater than 0."
+REFUSED_BY_ALL_RANKS = [
+    (["solve", "bad.toml"], RADIUS),
+    (["solve", "--bogus", "nowhere.toml"], "No such option: --bogus"),
+    (["reproduce", "fig6"], "fig6: is not a figure of the paper"),
+    (["sweep", "bad.sweep.toml"], "pin.E = -1.0 must be greater than 0."),
+]
+REFUSED_BY_ONE_RANK = [
+    (["scene", "--bogus"], "No such option: --bogus"),
+    (["fit", "nowhere"], "nowhere: is not a run folder"),
+]
+
+
+@pytest.fixture
+def bad_files(tmp_path):
+    """A folder with a scene and a sweep that are refused, in which nothing else may be written."""
     scene = Path(SCENE).read_text()
     (tmp_path / "bad.toml").write_text(scene.replace("radius = 10.0", "radius = -10.0"))
     (tmp_path / "bad.sweep.toml").write_text(f'base = "{SCENE}"\n[grid]\npin.E = [-1.0]\n')
-    result = archord(*arguments, cwd=tmp_path, ranks=ranks, code=2)
-    assert result.stderr.count(said) == 1
+    yield tmp_path
     assert {path.name for path in tmp_path.iterdir()} == {"bad.toml", "bad.sweep.toml"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["solve", "bad.toml"], RADIUS),
+        (["slove", "--help"], "No such command 'slove'. Did you mean solve?"),
+        (["benchmark", "stabilty"], "No such command 'stabilty'. Did you mean stability?"),
+    ],
+)
+def test_a_process_tells_bad_input_once(bad_files, arguments, said):
+    result = archord(*arguments, cwd=bad_files, code=2)
+    assert result.stderr.count(said) == 1
+
+
+def test_a_launcher_tells_bad_input_once(bad_files):
+    """Its exit code is 2."""
+    result = archord("solve", "bad.toml", cwd=bad_files, ranks=2, code=2)
+    assert result.stderr.count(RADIUS) == 1
+
+
+@pytest.mark.parametrize("refused_commands", [REFUSED_BY_ALL_RANKS, REFUSED_BY_ONE_RANK])
+def test_ranks_tell_bad_input_once(bad_files, refused_commands):
+    """Several commands under one launcher."""
+    result = run_on_two_ranks([arguments for arguments, _ in refused_commands], bad_files)
+    assert result.returncode == 2
+    assert all(result.stderr.count(said) == 1 for _, said in refused_commands)
+    assert "Traceback" not in result.stderr
 
 
 FIELDS = "run/fields.h5: cannot be read as the fields of a run at step 6."

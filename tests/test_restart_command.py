@@ -15,7 +15,7 @@ from archord.output.folder import occupied
 from archord.output.history import read_history
 from archord.report.errors import InputError
 from tests.output.run_files import accepted_steps, same_run
-from tests.test_cli import ENVIRONMENT, SCENE, archord, kill_after
+from tests.test_cli import ENVIRONMENT, SCENE, archord, kill_after, run_on_two_ranks
 
 COARSE = ["--set", "joint.relative_element_size=0.25", "--set", "load.steps=8"]
 
@@ -87,14 +87,7 @@ def test_what_cannot_be_continued_is_refused_once(tmp_path, whole):
     (tmp_path / "run").symlink_to(whole)
     before = {path.name: path.stat().st_mtime_ns for path in whole.iterdir()}
     lists = [["solve", *arguments] for arguments, _ in REFUSED]
-    code = (
-        f"import sys; from archord.cli import run; sys.exit(2 if {{*map(run, {lists})}} == {{2}} "
-        "else 1)"
-    )
-    command = ["mpirun", "-n", "2", sys.executable, "-c", code]
-    result = subprocess.run(
-        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
-    )
+    result = run_on_two_ranks(lists, tmp_path)
     assert result.returncode == 2
     assert [result.stderr.count(said) for _, said in REFUSED] == [1] * len(REFUSED)
     assert "Traceback" not in result.stderr
