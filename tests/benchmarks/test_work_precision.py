@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from archord.benchmarks.cost import work_precision
 from archord.benchmarks.cost import work_precision_codes as codes
 from archord.benchmarks.cost.work_precision import (
     Line,
@@ -23,6 +24,7 @@ from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, DATA, Po
 from archord.benchmarks.timing import Process, Run, Timing, time_all
 from archord.benchmarks.work_precision_picture import cases, front, short_table
 from archord.cli import run
+from tests.benchmarks.once import timed_once
 
 
 def line(code, size, seconds, P, failure="", case="elastic", **found):
@@ -216,8 +218,9 @@ def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
     assert failed.failure == "diverged"
 
 
-def test_a_quick_run_through_the_command(tmp_path, capsys):
+def test_a_quick_run_through_the_command(tmp_path, capsys, monkeypatch):
     """The coarsest mesh: CSV with every error, table, diagram, exit code 0."""
+    monkeypatch.setattr(work_precision, "time_all", timed_once)
     options = [
         "--only",
         "plastic: archord, growth 0.25, 0.16 R",
