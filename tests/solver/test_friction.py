@@ -253,7 +253,7 @@ def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
     supports, drives = lid("x", "y", x=[0, 0, *(MU * P * q for q in shares)], y=[0, *4 * [-P]])
     contact = Interaction("contact", ("arc", "lower top"), friction=MU, slide=a)
     bodies = [Body(name, STEEL) for name in ("upper", "lower")]
-    mesh = cylinder_on_block(MPI.COMM_WORLD, R, a / 16, 1.2 * a)
+    mesh = cylinder_on_block(MPI.COMM_WORLD, R, a / 12, 1.2 * a)
     problem = Problem(
         mesh, bodies, [contact], [*held("base"), *supports], drives=drives, stabilise=True
     )

@@ -318,9 +318,9 @@ def test_a_fold_between_corners_and_nodes_is_found():
     for kind, order in ((TRIANGLE, 2), (TRIANGLE, 3), (QUADRILATERAL, 2), (QUADRILATERAL, 3)):
         inside = X[X.sum(axis=1) <= 1 + 1e-12] if kind == TRIANGLE else X
         nodes = lagrange_element(kind, order).points
-        x = nodes + rng.uniform(-0.35, 0.35, (300, *nodes.shape)) / order
+        x = nodes + rng.uniform(-0.35, 0.35, (150, *nodes.shape)) / order
         made = MeshArrays.of_sets(
-            kind, x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {}
+            kind, x.reshape(-1, 2), np.arange(x.size // 2).reshape(150, -1), {}, {}, {}
         )
         table = tabulate(kind, order, inside)[1:]
         sampled = np.linalg.det(np.einsum("jqa,nai->nqij", table, x)).min(axis=1)

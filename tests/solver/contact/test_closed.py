@@ -149,7 +149,7 @@ def test_forces_do_not_depend_on_where_the_seam_lies(edges):
     nor on rounding, which might choose between two facets where vertices face each other."""
     forces = []
     seams = []
-    for angle in np.radians([0, 70, 145, 210, 328]):
+    for angle in np.radians([0, 145, 328]):
         system, force = press(turned(rings(MPI.COMM_SELF, 4, edges=edges), angle), angle)
         forces.append(force)
         x = system.sides["hole"].curve.X[0]
