@@ -9,6 +9,8 @@ import pytest
 from hypothesis import settings
 from mpi4py import MPI
 
+from archord.geometry.meshes import mesh_cache
+
 settings.register_profile("same", derandomize=True)  # the same examples in each run
 settings.load_profile("same")
 
@@ -31,10 +33,19 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Leave what the imports made out of the collections below: they take a tenth of a second
-    otherwise."""
+    """Leave what the imports made out of the collections below, which take a tenth of a second
+    otherwise, and collect more seldom."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _keep_all_meshes():
+    """The suite has more meshes than a user's cache."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mesh_cache, "_MOST", 1000)
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -8,6 +8,7 @@ import importlib.util
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from archord.geometry.meshes.mesh_arrays import MeshArrays
@@ -27,11 +28,7 @@ def kept_mesh(key: tuple, make: Callable[[], MeshArrays]) -> MeshArrays:
     """
     if os.environ.get("ARCHORD_KEEP_MESHES") == "0":
         return make()
-    gmsh = importlib.util.find_spec("gmsh")
-    library = Path(gmsh.origin).stat().st_mtime_ns if gmsh and gmsh.origin else 0
-    digest = hashlib.sha256(repr((key, library)).encode())
-    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(source.read_bytes())
+    digest = hashlib.sha256(repr(key).encode() + _makers())
     folder = cache_folder() / "meshes"
     path = folder / f"{digest.hexdigest()[:32]}.mesh"
     with suppress(Exception):  # whatever a damaged file makes of it
@@ -44,6 +41,17 @@ def kept_mesh(key: tuple, make: Callable[[], MeshArrays]) -> MeshArrays:
         with suppress(OSError):
             _keep(mesh, path)
     return mesh
+
+
+@cache
+def _makers() -> bytes:
+    """A digest of gmsh and of the code that meshes."""
+    gmsh = importlib.util.find_spec("gmsh")
+    library = Path(gmsh.origin).stat().st_mtime_ns if gmsh and gmsh.origin else 0
+    digest = hashlib.sha256(repr(library).encode())
+    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.digest()
 
 
 def _keep(mesh: MeshArrays, path: Path) -> None:

@@ -101,7 +101,7 @@ def test_laws_of_nature(pin: LawJoint, deepest: float) -> None:
 
 
 @given(joints(yields=("both", "pin", "block", "pin weaker", "block weaker")), some.floats(0.3, 1.5))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_a_cycle_loses_energy_and_a_deeper_one_more(pin: LawJoint, deepest: float) -> None:
     """The work lost between first loading and way back is not negative, and grows with the deepest
     displacement, but for what the law states as the error of its way back."""
