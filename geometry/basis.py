@@ -43,6 +43,7 @@ def dimension_of(cell: basix.CellType) -> int:
     return len(basix.topology(cell)) - 1
 
 
+@cache
 def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.FiniteElement:
     """Lagrange element on the reference ``cell``, with equispaced nodes as in gmsh's curved
     meshes."""

@@ -37,12 +37,15 @@ class Reach:
         length = pair.surface.facet_lengths().sum() / self._n_opposite
         self._rings = min(_MARGIN + int(slide / length), _WIDEST)
         self.keys = np.zeros(0, dtype=np.int64)
+        self._last = self.keys  # of the points at the last call
         self.extend()
 
     def extend(self) -> bool:
         """Make room for the pairs of the last evaluation and their neighbours; True if any rank had
         to. Collective."""
-        new = np.setdiff1d(self.point_keys(), self.keys)
+        keys = self.point_keys()
+        new = keys[:0] if np.array_equal(keys, self._last) else np.setdiff1d(keys, self.keys)
+        self._last = keys
         if not self._comm.allreduce(len(new) > 0, op=MPI.LOR):
             return False
         own, met = np.divmod(new, self._n_opposite)

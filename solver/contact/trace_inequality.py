@@ -42,7 +42,7 @@ def trace_constants(
     of_strain = np.stack([normal, *shears])
     strain, weight = on_facet
     of_nodes = np.einsum("inqk,nqka->inqa", of_strain @ moduli, strain.matrix())
-    traces = np.einsum("nq,inqa,inqb->inab", weight, of_nodes, of_nodes)
+    traces = np.swapaxes(of_nodes, 2, 3) @ (weight[..., None] * of_nodes)
 
     value, vector = np.linalg.eigh(energy)
     rigid = kinematics.n_rigid
