@@ -211,9 +211,9 @@ def kill_after(steps: int, command: list[str], kill: int, folder: Path) -> tuple
         command, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     ) as process:
         deadline = time.monotonic() + 120
-        while time.monotonic() < deadline and not (
-            history.exists() and len(history.read_text().splitlines()) > steps
-        ):
+        while process.poll() is None and time.monotonic() < deadline:
+            if history.exists() and len(history.read_text().splitlines()) > steps:
+                break
             time.sleep(0.01)
         process.send_signal(kill)
         errors = process.communicate(timeout=60)[1]
