@@ -56,6 +56,7 @@ def solve_cases(
     signal.signal(
         signal.SIGPIPE, signal.SIG_IGN
     )  # PETSc would end the batch where its reader has seen enough
+    frozen_before = gc.get_freeze_count()
     gc.collect()
     gc.freeze()  # what the imports made need not be searched after every case
     try:
@@ -70,7 +71,8 @@ def solve_cases(
             arrived_before(comm)  # asleep: those that are done leave their cores to the others
             return max(comm.allgather(_interrupt.received))
     finally:
-        gc.unfreeze()
+        if not frozen_before:  # else every later collection would search what the caller froze, too
+            gc.unfreeze()
 
 
 def _share(
