@@ -34,7 +34,7 @@ from archord.studies.law_design import (
 )
 
 # how many joints of each kind of law_design.py
-_KINDS = {"both": 28, "block": 18, "pin": 12, "block weaker": 12, "pin weaker": 14}
+_KINDS = {"both": 84, "block": 54, "pin": 42, "block weaker": 42, "pin weaker": 42}
 JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
 CURVES = ("line", "Swift", "Voce", "plateau", "metal")
 _LATEST = 1.8  # x0 beyond which yielding says little of hardening

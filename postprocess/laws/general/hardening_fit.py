@@ -106,7 +106,7 @@ class Hardened:
         """d(ln P)/d(coefficients) ``(k, 2 terms)`` of pin and block, as if the s of the other body
         were constant."""
         columns = np.zeros((2, len(TERMS), len(self.x)))
-        means = mean_flows(self.numbers[0], self.given)
+        means = mean_flows(self.given)
         for i, mean in means.items():
             if np.isinf(self.numbers[5 + i]):
                 continue
@@ -181,7 +181,7 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
         told = [
             lost.force - joint.force,
             lost.deviation,
-            unsure(joint.numbers[0], joint.given, found, lost),
+            unsure(joint.given, found, lost),
         ]
         by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])
     factors = {}

@@ -1,11 +1,11 @@
 """Hardening by a representative strain (Tabor 1951): a body that hardens acts on the joint as a
-perfectly plastic one does whose yield stress is the flow stress at a strain ``eps_rep``, and in
-plane stress, where strains differ more, the mean flow stress of strains up to twice ``eps_rep``.
+perfectly plastic one does whose yield stress is the mean flow stress of strains about ``eps_rep``,
+whose logarithms are distributed normally.
 
     P(x) = P_pp(x; s_eff),   s_eff = s at eps_rep(x, s_eff),   s = sigY R/(E* dR)
 
 P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x and ln s_eff, of
-what the two bodies are, and in plane stress of how the curve s(PEEQ) rises. hardening_model.json
+what the two bodies are, and of how the curve s(PEEQ) rises. hardening_model.json
 has its coefficients by plane and body, and factors of the expected error: hardening_fit.py makes
 it. p0, eps and the way back follow the same s_eff.
 """
@@ -33,11 +33,10 @@ TERMS = (
     *("share", "soft", "weaker", "apart", "clearance", "rise", "gain"),
 )
 _FACTORS = [names.split() for names in TERMS]
-SPREAD = {"strain": 0.0, "stress": 1.0}  # half the range of strains over eps_rep
-# Gauss's rules of 5 points and of one, from -1 to 1, of a mean
-_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-_GAUSS = (_PLACES, _WEIGHTS / 2)
-_MIDDLE = (np.zeros(1), np.ones(1))
+_WIDTH = 0.7  # standard deviation of ln(strain)
+_PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
+STRAINS = np.exp(_WIDTH * _PLACES)  # over eps_rep
+SHARES = _WEIGHTS / _WEIGHTS.sum()  # of the flow stress at each, in the mean
 _ITERATIONS = 40  # at most, of Newton's method
 _CLOSE = 1e-10  # step in ln(eps_rep) after which it is known to round-off
 _FARTHEST = 1.0  # of an iteration, in ln(eps_rep)
@@ -74,22 +73,19 @@ def flows(joint: LawJoint) -> Flows:
     return flow(joint.pin_hardening), flow(joint.block_hardening)
 
 
-def mean_flow(flow: Flow, spread: float) -> Flow:
-    """The mean s by strains (any shape), as far below and above each as ``spread`` of it."""
-    places, weights = _GAUSS if spread else _MIDDLE
+def mean_flow(flow: Flow) -> Flow:
+    """The mean s of `STRAINS` about strains (any shape)."""
 
     def mean(strain: Array) -> Array:
-        asked = strain[..., None] * (1 + spread * places)
-        return np.broadcast_to(flow(asked), asked.shape) @ weights
+        asked = strain[..., None] * STRAINS
+        return np.broadcast_to(flow(asked), asked.shape) @ SHARES
 
     return mean
 
 
-def mean_flows(strain: float, given: Flows) -> dict[int, Flow]:
-    """`mean_flow` of the bodies that harden, by their places in `BODIES`, in plane ``strain`` or
-    stress (0)."""
-    spread = SPREAD["strain" if strain else "stress"]
-    return {i: mean_flow(flow, spread) for i, flow in enumerate(given) if flow is not None}
+def mean_flows(given: Flows) -> dict[int, Flow]:
+    """`mean_flow` of the bodies that harden, by their places in `BODIES`."""
+    return {i: mean_flow(flow) for i, flow in enumerate(given) if flow is not None}
 
 
 def flow_and_rise(mean: Flow, strain: Array) -> tuple[Array, Array]:
@@ -144,7 +140,7 @@ def representative(
     s = np.empty((2, 3, len(x)))
     s[:] = np.reshape(numbers[5:], (2, 1, 1))
     strain = np.zeros((2, len(x)))
-    means = mean_flows(numbers[0], given)
+    means = mean_flows(given)
     hardens = [i for i in means if np.isfinite(numbers[5 + i])]
 
     def predicted(i: int, at: At) -> Array:
@@ -198,9 +194,10 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     found = representative(table["strain"], numbers, given, x)
     lost = loss(numbers, Yielding(*found.s), x)
     slope = spline_slopes(np.log(x), lost.force) / x
-    wrong = table["error"][kind(numbers)] * unsure(numbers[0], given, found, lost)
+    wrong = table["error"][kind(numbers)] * unsure(given, found, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
-    return lost._replace(slope=slope, deviation=error)
+    way_error = np.hypot(lost.way_error, wrong)  # of the travel, too
+    return lost._replace(slope=slope, deviation=error, way_error=way_error)
 
 
 def kind(numbers: Sequence[float]) -> str:
@@ -212,12 +209,12 @@ def kind(numbers: Sequence[float]) -> str:
     return f"{'strain' if strain else 'stress'} {body}"
 
 
-def unsure(strain: float, given: Flows, found: Strains, lost: Loss) -> Array:
+def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
     """By how much P ``(k,)`` would change, roughly and relatively, if eps_rep were `WIDE` times as
     large: ln of the rise of the curves, at least `_LEAST`, where `_YIELDED` of P and more is
     ``lost`` to yielding, and less before."""
     squares: Array = np.full(len(lost.force), _LEAST**2)
-    for i, mean in mean_flows(strain, given).items():
+    for i, mean in mean_flows(given).items():
         _, rise = flow_and_rise(mean, found.strain[i])
         squares += (2 * np.log(WIDE) * rise) ** 2
     return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)

@@ -444,22 +444,15 @@ function lossOf(data, strain, elastic, stresses, x) {
 /** The yield stress at a PEEQ: straight between points, constant beyond the last. */
 const flowStress = (points, peeq) => straight(peeq, points.map((point) => point[0]), points.map((point) => point[1]));
 
-const GAUSS = [
-    [-0.906179845938664, 0.23692688505618908],
-    [-0.5384693101056831, 0.47862867049936647],
-    [0, 0.5688888888888889],
-    [0.5384693101056831, 0.47862867049936647],
-    [0.906179845938664, 0.23692688505618908],
-]; // points and weights from -1 to 1
 const BODIES = ["pin", "block"];
 const LITTLE = 1e-6; // of a difference quotient
 const WIDE = 3; // factor on a strain, up and down
 const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
 
-/** The mean s by a strain, as far below and above it as `spread` of it. */
-const meanFlow = (flow, spread) => (strain) =>
-    GAUSS.reduce((sum, [place, weight]) => sum + (weight / 2) * flow(strain * (1 + spread * place)), 0);
+/** The mean s by a strain, of strains about it. */
+const meanFlow = (flow, { strains, shares }) => (strain) =>
+    strains.reduce((sum, part, i) => sum + shares[i] * flow(strain * part), 0);
 
 /** d(ln s)/d(ln strain) of the mean flow, from a third of a strain to three times it. */
 const riseOf = (mean, strain) => Math.log(mean(WIDE * strain) / mean(strain / WIDE)) / (2 * Math.log(WIDE));
@@ -538,9 +531,8 @@ function requireGain(most, { pin, block }, begin, flows) {
 
 /** What yielding does at x to a joint whose bodies harden: as perfectly plastic ones with s_eff. */
 function hardenedLoss(data, strain, elastic, begin, given, x) {
-    const spread = data.hardening.spread[strain ? "strain" : "stress"];
     const flows = {};
-    for (const body of BODIES) flows[body] = given[body] && meanFlow(given[body], spread);
+    for (const body of BODIES) flows[body] = given[body] && meanFlow(given[body], data.hardening);
     const found = representative(data.hardening, strain, elastic, begin, flows, x);
     requireGain(data.range.gain, found[found.length - 1], begin, flows);
     const lost = lossOf(data, strain, elastic, found, x);
@@ -553,7 +545,9 @@ function hardenedLoss(data, strain, elastic, begin, given, x) {
         const rises = hardens.map((body) => 2 * Math.log(WIDE) * riseOf(flows[body], found[i].strain[body]));
         const yielded = Math.min(Math.max((1 - Math.exp(state.force)) / 0.02, 0), 1);
         const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded;
-        return { ...state, slope: slopes[i] / x[i], deviation: Math.hypot(state.deviation, wrong) };
+        const deviation = Math.hypot(state.deviation, wrong);
+        const wayError = Math.hypot(state.wayError, wrong);
+        return { ...state, slope: slopes[i] / x[i], deviation, wayError };
     });
 }
 

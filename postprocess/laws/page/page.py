@@ -87,7 +87,11 @@ def law_data() -> tuple[str, bytes]:
         "elastic": _json(elastic_model.TABLE),
         "kernels": _json(yield_model.KERNELS),
         "hardening": _json(hardening_model.TABLE)
-        | {"terms": hardening_model.TERMS, "spread": hardening_model.SPREAD},
+        | {
+            "terms": hardening_model.TERMS,
+            "strains": hardening_model.STRAINS.tolist(),
+            "shares": hardening_model.SHARES.tolist(),
+        },
         "mesh": yield_model.MESH_ERROR,
         "range": _range(),
         "metals": metals(),
