@@ -16,7 +16,7 @@ from archord.geometry.basis import Array
 from archord.geometry.patches import PatchProjection
 from archord.kernels.compiled import library, pointer, structure
 from archord.solver.contact.pair import Answers, Pair
-from archord.solver.contact.sparsity import Reach
+from archord.solver.contact.sparsity import Meetings, Reach
 from archord.solver.contact.surface import Surface
 
 _PLACES = Path(__file__).with_name("places.c")
@@ -46,8 +46,7 @@ class ContactTangent:
         self._block_size = block_size
         self._kernels = library(_SOURCES[block_size])
         meetings = [reach.meetings() for reach in reaches]
-        places = [np.broadcast_arrays(m.rows[:, :, None], m.columns[:, None, :]) for m in meetings]
-        self.rows, self.columns, slots = _numbered(places)
+        self.rows, self.columns, slots = _numbered(meetings)
         self._keys = [m.keys for m in meetings]
         self._slots = slots
 
@@ -85,27 +84,36 @@ class ContactTangent:
 
 
 def _numbered(
-    places: Sequence[Sequence[np.ndarray]],
+    meetings: Sequence[Meetings],
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Rows and columns ``(n,)`` of the different ones of several arrays of ``places``, sorted, and
-    for each array the numbers of its places among them."""
-    nothing = np.zeros(0, dtype=np.int32)
-    rows, columns = (
-        np.concatenate([nothing, *(place[axis].astype(np.int32).ravel() for place in places)])
-        for axis in (0, 1)
+    """Rows and columns ``(n,)`` of the different places that ``meetings`` fill, sorted, and for
+    each of the meetings the numbers ``(p (k + o) (a + o),)`` of their places among them."""
+    parts: list[list[np.ndarray]] = [[np.zeros(0, dtype=np.int64)] for _ in range(4)]
+    rows, begins, widths, columns = parts
+    before = 0
+    for m in meetings:
+        p, n_rows = m.rows.shape
+        width = m.columns.shape[1]
+        rows.append(m.rows.ravel())
+        begins.append(before + np.repeat(width * np.arange(p), n_rows))
+        widths.append(np.full(p * n_rows, width))
+        columns.append(m.columns.ravel())
+        before += m.columns.size
+    row, begin, width_of, column = (
+        np.concatenate(of_meetings).astype(np.int32) for of_meetings in parts
     )
-    slot, unique_rows, unique_columns = np.empty((3, len(rows)), dtype=np.int32)
+    sizes = [m.rows.size * m.columns.shape[1] for m in meetings]
+    slot, unique_rows, unique_columns = (np.empty(sum(sizes), dtype=np.int32) for _ in range(3))
     n = library(_PLACES).number_places(
-        len(rows),
-        *map(pointer, (rows, columns)),
-        rows.max(initial=-1) + 1,
-        columns.max(initial=-1) + 1,
+        len(row),
+        *map(pointer, (row, begin, width_of, column)),
+        row.max(initial=-1) + 1,
+        column.max(initial=-1) + 1,
         *map(pointer, (slot, unique_rows, unique_columns)),
     )
     if n < 0:
         raise MemoryError
-    ends = np.cumsum([place[0].size for place in places], dtype=int)
-    slots = np.split(slot, ends[:-1]) if places else []
+    slots = np.split(slot, np.cumsum(sizes, dtype=int)[:-1]) if sizes else []
     return unique_rows[:n].astype(np.int64), unique_columns[:n].astype(np.int64), slots
 
 

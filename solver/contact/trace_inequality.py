@@ -15,6 +15,8 @@ from archord.geometry.basis import Array
 from archord.geometry.strain import PointStrain
 from archord.materials.kinematics import Kinematics
 
+_TOGETHER = 500  # cells: products of all at once would need more memory than anything else
+
 
 def trace_constants(
     moduli: Array,
@@ -30,9 +32,7 @@ def trace_constants(
     Strains come with the weights ``(n, q)`` of their points; ``outward`` ``(n, q, d)`` are the
     normals on the facet.
     """
-    strain, weight = in_cell
-    B = strain.matrix()
-    energy = np.einsum("nq,nqia,ij,nqjb->nab", weight, B, moduli, B, optimize=True)
+    energy = _energies(moduli, *in_cell)
 
     force = np.moveaxis(kinematics.traction(outward), 2, 0)  # (d, n, q, k)
     n = np.moveaxis(outward, -1, 0)[..., None]
@@ -51,3 +51,16 @@ def trace_constants(
     ratios = np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ traces @ scaled)
     of_normal, of_shear = ratios[..., -1]
     return of_normal, of_shear
+
+
+def _energies(moduli: Array, strain: PointStrain, weight: Array) -> Array:
+    """The elastic energies ``(n, b, b)`` of the cells as quadratic forms."""
+    B = strain.matrix()
+    parts = range(0, len(B), _TOGETHER)
+    together = [slice(first, first + _TOGETHER) for first in parts]
+    return np.concatenate(
+        [
+            np.einsum("nq,nqia,ij,nqjb->nab", weight[some], B[some], moduli, B[some], optimize=True)
+            for some in together
+        ]
+    )
