@@ -84,6 +84,12 @@ class Contact:
         for pair in self.pairs:
             pair.start = "anywhere"
 
+    def follow(self, partners: bool) -> None:
+        """Whether the tangent knows that ``partners`` and normals move. Where bodies go far through
+        each other the tractions are so large that this would make it indefinite."""
+        for pair in self.pairs:
+            pair.follows = partners
+
     def use_gamma_factor(self, factor: float) -> None:
         """Limit the gamma factor of all interactions to ``factor``, for the time being."""
         for interface in self.interfaces:

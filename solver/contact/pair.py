@@ -69,6 +69,7 @@ class Pair:
         self.law = law
         self.share = share
         self.moves = moves
+        self.follows = True  # see `Contact.follow`
         self.counts_slip = law.counts_slip or law.has_friction
         self.start: Start = "anywhere"
         self.offset = 0.0

@@ -144,7 +144,7 @@ def _side(pair: Pair, answers: Answers) -> Any:
     partners = pair.projection
     n, q, a = surface.shape.shape
     members = {
-        "moves": int(pair.moves),
+        "moves": int(pair.moves and pair.follows),
         "n": n,
         "q": q,
         "a": a,

@@ -197,6 +197,7 @@ class NewtonSolver:
         ones without ``line_search``.
         """
         self._begin(goal)
+        self._from_afar = guess is not None and not line_search
         if guess is not None:
             self._start_from(guess)
         snes = self._solvers[line_search]
@@ -220,6 +221,7 @@ class NewtonSolver:
         self._failure = ""
         self._raised = None
         self._renewed = True  # the last factorisation is of another matrix
+        self._from_afar = False
         self._reuse = False
         if self._system.border:
             self._system.border.singular = None
@@ -281,6 +283,8 @@ class NewtonSolver:
             self._ksp.getIterationNumber(), result.active_set_changes[-1], renewed=self._renewed
         )
         self._reuse = not factorise
+        is_afar = self._from_afar and len(result.residuals) == 1
+        self.equilibrium.contact.follow(not is_afar)
         before = self._system.tangent.factorisations
         self._system.update(factorise=factorise)
         result.factorisations += self._system.tangent.factorisations - before

@@ -26,3 +26,10 @@ def test_the_whole_load_of_a_block_that_yields_is_one_step():
     result = solved(case, COARSE)
     assert result.cutbacks == 0
     assert result.newton <= 15
+
+
+def test_a_pin_that_goes_far_through_a_fine_edge_takes_few_iterations():
+    """At first it is where it would be without the block, with tractions as large as its moduli."""
+    result = solved(CASES["longer"])
+    assert result.newton <= 10
+    assert result.krylov <= 20 * result.newton
