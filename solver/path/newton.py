@@ -22,8 +22,8 @@ from archord.solver.linear.multigrid import forcing_term
 from archord.solver.linear.strategy import krylov_iterations
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
-CIRCLING = 4  # the same where the active set stands still, but for a few points:
-FEW = 2  # which open and close as they jump between two facets
+CIRCLING = 4  # the same where the active set stands still, but for a few points
+_FEW = 1e-4  # part of all points, which open and close as they jump between two facets
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
 _R = PETSc.SNES.ConvergedReason
 _REASONS = {
@@ -82,7 +82,7 @@ class NewtonSolver:
     problem allows.
 
     ``watch(load, result)`` is called on every rank after each residual, with what the solve did so
-    far.
+    far. ``few`` contact points may jump between two facets in every iteration.
     """
 
     watch: Callable[[float, Newton], None] = staticmethod(lambda load, result: None)
@@ -103,6 +103,8 @@ class NewtonSolver:
         self._ahead_rests = rests_while_bodies_yield(self._system.facts)
         for sums in _RANDOM_SUMS:
             PETSc.Options()[sums] = False
+        n_points = sum(len(pair.active) for pair in equilibrium.contact.pairs)
+        self.few = int(_FEW * equilibrium.comm.allreduce(n_points))
         self._x = equilibrium.unknowns.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
@@ -325,7 +327,7 @@ class NewtonSolver:
     def _stagnates(self) -> bool:
         """Whether the residual has not halved in as many iterations as it is given, neither itself
         nor over the reaction, which falls with it where a body only turns."""
-        has_changes = max(self._result.active_set_changes[-CIRCLING:]) > FEW
+        has_changes = max(self._result.active_set_changes[-CIRCLING:]) > self.few
         patience = _PATIENCE if has_changes else CIRCLING
         for residuals in (self._result.residuals, self._norms):
             earlier = residuals[:-patience]

@@ -12,7 +12,7 @@ from archord.geometry.basis import Array
 from archord.materials.material import Points
 from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.equilibrium.rigid_motions import RigidMotions
-from archord.solver.path.newton import CIRCLING, FEW, Newton, NewtonSolver
+from archord.solver.path.newton import CIRCLING, Newton, NewtonSolver
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
@@ -50,7 +50,12 @@ class Recovery:
         touches_in_vain = self._is_singular() and at.contact.n_active() > 0
         if at.springs is None and at.problem.by_force and not touches_in_vain:
             rigid = RigidMotions(at.drives, at.contact)
-            self._solve_in_stages(rigid.at_rest(load, guess), afar=True)
+            before = self._solves
+            self._solves = []
+            if not self._solve_in_stages(rigid.at_rest(load, guess), afar=True):
+                self._solves += before  # which tell why
+            else:
+                self._solves = before + self._solves
         return Newton.together(self._solves)
 
     def _at_rest(self, load: float, guess: Array) -> Array:
@@ -170,13 +175,18 @@ class Recovery:
         result = self._solve_carried(guess, line_search=line_search, goal=goal)
         pairs = self.equilibrium.contact.pairs
         can_jump = any(pair.moves for pair in pairs)
-        if result.converged or result.floating or not can_jump or not _circles(result):
+        if result.converged or result.floating or not can_jump or not self._circles(result):
             return result.converged
         for pair in pairs:
             pair.start = "held"
         result = self._solve_carried(None, line_search=line_search, goal=goal)
         result.held = True
         return result.converged
+
+    def _circles(self, result: Newton) -> bool:
+        """Whether the active set stood still in the last iterations, but for a few points."""
+        changes = result.active_set_changes
+        return len(changes) > CIRCLING and max(changes[-CIRCLING:]) <= self.newton.few
 
     def _solve_carried(self, guess: Array | None, *, line_search: bool, goal: float) -> Newton:
         """Solve from ``guess``. What is found does not count if springs carry what pushes a body:
@@ -188,12 +198,6 @@ class Recovery:
             result.floating = springs.held(self.equilibrium.load)
             result.converged = not result.floating
         return result
-
-
-def _circles(result: Newton) -> bool:
-    """Whether the active set stood still in the last iterations, but for a few points."""
-    changes = result.active_set_changes
-    return len(changes) > CIRCLING and max(changes[-CIRCLING:]) <= FEW
 
 
 @contextmanager
