@@ -118,8 +118,8 @@ class LoadPath:
         if ratio is None:
             yield self.state, True
             return
-        # bodies that unload are elastic, or nearly so
-        goes_back = ratio < 0 or self.at.unloads
+        # bodies that can yield unload elastically, or nearly so
+        goes_back = ratio < 0 or (self.at.unloads and self.equilibrium.bulk.plastic)
         if abs(ratio) > _PREDICTOR_LIMIT:
             yield self.state, goes_back
             return
