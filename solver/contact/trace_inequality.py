@@ -56,7 +56,7 @@ def trace_constants(
 def _energies(moduli: Array, strain: PointStrain, weight: Array) -> Array:
     """The elastic energies ``(n, b, b)`` of the cells as quadratic forms."""
     B = strain.matrix()
-    parts = range(0, len(B), _TOGETHER)
+    parts = range(0, max(len(B), 1), _TOGETHER)  # ranks may have no cells
     together = [slice(first, first + _TOGETHER) for first in parts]
     return np.concatenate(
         [
