@@ -1,7 +1,8 @@
 """Joints in space against other codes, as a table: ``python3 -m archord.benchmarks.space``.
 
 Names of cases choose among them, numbers are sizes of elements at the contact: ``python3 -m
-archord.benchmarks.space elastic A 1.5 0.9``. Seconds are of the mesh and the solve.
+archord.benchmarks.space elastic A 1.5 0.9``. Seconds are of the mesh and the solve, MB the most
+memory of this process so far.
 
 With ``--calculix`` CalculiX solves them on the same meshes, where the image target peers is there:
 ``ARCHORD_TARGET=peers docker/run python3 -m archord.benchmarks.space --calculix elastic 3``. Its
@@ -18,18 +19,25 @@ from mpi4py import MPI
 from archord.benchmarks.space.calculix import solved_by_calculix
 from archord.benchmarks.space.case import Solved, solved
 from archord.benchmarks.space.joints import CASES
+from archord.output.run_json import peak_memory
 from archord.report.table import Table
 
 _HEADINGS = ("case", "quantity", "at", "reference", "+-")
 _OTHER = "--calculix"
-_COST = ("error [%]", "dofs", "Newton", "GMRES", "s")
+_COST = ("error [%]", "dofs", "Newton", "GMRES", "s", "MB")
 
 
 def rows(result: Solved) -> Iterator[tuple[str, ...]]:
     """The rows of a table for a ``result``."""
     newton = f"{result.newton / result.case.steps:.1f}"
     krylov = f"{result.krylov / max(result.newton, 1):.1f}"
-    cost = (str(result.n_dofs), newton, krylov, f"{result.seconds:.1f}")
+    cost = (
+        str(result.n_dofs),
+        newton,
+        krylov,
+        f"{result.seconds:.1f}",
+        f"{peak_memory() / 1e6:.0f}",
+    )
     for reference, value in result.compared:
         yield (
             result.case.name,

@@ -35,7 +35,8 @@ def coarse_start(system: System) -> CoarseStart | None:
         try:
             rough = max(problem.tolerance, _TOLERANCE)
             coarse = System(replace(problem.coarser(), tolerance=rough))
-        except ProjectionError:  # on all ranks: too coarse for the contact to be found
+        except (ProjectionError, ValueError):
+            # on all ranks: too coarse for the contact to be found, or to be drawn
             return None
         return CoarseStart(system, coarse) if 2 * coarse.n_dofs < system.n_dofs else None
 

@@ -146,7 +146,9 @@ class LoadPath:
         at = self.at
         new = self.equilibrium.state()
         if load != at.load:
-            at.unloads ^= (self._ratio(load) or 0.0) < 0
+            ratio = self._ratio(load)
+            turned = ratio is not None and ratio < 0
+            at.unloads ^= turned
             springs = self.equilibrium.springs
             is_placed = springs is not None and not springs.idle
             began_in_balance = self.equilibrium.problem.from_rest or at.increment is not None

@@ -52,10 +52,9 @@ class Recovery:
             rigid = RigidMotions(at.drives, at.contact)
             before = self._solves
             self._solves = []
-            if not self._solve_in_stages(rigid.at_rest(load, guess), afar=True):
-                self._solves += before  # which tell why
-            else:
-                self._solves = before + self._solves
+            found = self._solve_in_stages(rigid.at_rest(load, guess), afar=True)
+            # the last one tells why there is none
+            self._solves = before + self._solves if found else self._solves + before
         return Newton.together(self._solves)
 
     def _at_rest(self, load: float, guess: Array) -> Array:

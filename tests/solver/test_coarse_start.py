@@ -117,14 +117,15 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
     )
 
 
-def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):
+@pytest.mark.parametrize("fault", [ProjectionError("no closest point"), ValueError("no mesh")])
+def test_a_mesh_too_coarse_for_the_contact_is_gone_without(fault, monkeypatch, always):
     """The fine joint is solved as if there were none."""
     joint = joint_system(SCENES["elastic"], MPI.COMM_SELF)
     asked = []
 
     def too_coarse(problem):
         asked.append(problem.mesh.mesh.topology.index_map(2).size_global)
-        raise ProjectionError("no closest point")
+        raise fault
 
     monkeypatch.setattr(coarse_start, "System", too_coarse)
     assert coarse_start.coarse_start(joint) is None

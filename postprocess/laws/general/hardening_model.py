@@ -39,6 +39,7 @@ STRAINS = np.exp(_WIDTH * _PLACES)  # over eps_rep
 SHARES = _WEIGHTS / _WEIGHTS.sum()  # of the flow stress at each, in the mean
 _ITERATIONS = 40  # at most, of Newton's method
 _CLOSE = 1e-10  # step in ln(eps_rep) after which it is known to round-off
+_FOUND = 1e-4  # the same, of which P hardly knows
 _FARTHEST = 1.0  # of an iteration, in ln(eps_rep)
 _FLATTEST = 0.3  # slope of what is missed by ln(eps_rep)
 _SMALL = 1e-6  # of a difference quotient
@@ -57,10 +58,12 @@ Flows = tuple[Flow | None, Flow | None]  # of pin and block; None: does not hard
 
 class Strains(NamedTuple):
     """What a joint that hardens is at ``x`` ``(k,)``: s_eff and eps_rep of pin and block, each
-    ``(2, k)``; of a body that is elastic infinite and 0."""
+    ``(2, k)``; of a body that is elastic infinite and 0. ``step`` ``(k,)`` is the size of the last
+    step in ln(eps_rep): eps_rep is not found where it is large."""
 
     s: Array
     strain: Array
+    step: Array
 
 
 def flows(joint: LawJoint) -> Flows:
@@ -165,7 +168,7 @@ def representative(
             break
     for i in hardens:
         s[i] = means[i](strain[i])
-    return Strains(s[:, 0], strain)
+    return Strains(s[:, 0], strain, np.abs(step).max(axis=0))
 
 
 def _step(miss: Array, last: Array) -> Array:
@@ -189,9 +192,15 @@ def gains(numbers: Sequence[float], given: Flows, x: float) -> Array:
 
 def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     """What yielding does at ``x`` ``(k,)`` to the joint with these ``numbers``, whose bodies harden
-    as ``given``."""
+    as ``given``. Raises ValueError where no eps_rep is found."""
     table = hardening_model()
     found = representative(table["strain"], numbers, given, x)
+    if found.step.max() > _FOUND:
+        at = x[found.step.argmax()]
+        raise ValueError(
+            f"archord: the law finds no representative strain at {at:g} dR, as the curves rise in "
+            "steep steps; solve this joint instead."
+        )
     lost = loss(numbers, Yielding(*found.s), x)
     slope = spline_slopes(np.log(x), lost.force) / x
     wrong = table["error"][kind(numbers)] * unsure(given, found, lost)

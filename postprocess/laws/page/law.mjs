@@ -505,6 +505,10 @@ function representative(model, strain, elastic, begin, flows, x) {
             eps = eps.map((own, i) => own * Math.exp(-step[i]));
             if (Math.max(...step.map(Math.abs)) <= 1e-10) break;
         }
+        if (Math.max(...step.map(Math.abs)) > 1e-4) {
+            const said = "as the curves rise in steep steps; solve this joint instead";
+            throw new RangeError(`archord: the law finds no representative strain at ${inDigits(place)} dR, ${said}.`);
+        }
         const [pin, block] = flowsAt(eps);
         return { pin, block, strain: { pin: eps[0], block: eps[1] } };
     });

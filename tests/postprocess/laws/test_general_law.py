@@ -299,3 +299,27 @@ def test_a_law_needs_numpy_alone() -> None:
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def test_curves_that_rise_in_steep_steps_are_refused() -> None:
+    """Newton's method circles between two of their points."""
+    pin = ((0.0, 0.0021), (0.00064, 0.0021), (0.00066, 0.00268), (0.00946, 0.00373))
+    block = (
+        *((0.0, 0.0018), (0.00013, 0.0018), (0.00109, 0.00185)),
+        *((0.0026, 0.00185), (0.01054, 0.00248), (0.01683, 0.00256)),
+    )
+    joint = LawJoint(
+        1.0,
+        0.01,
+        1.0,
+        plane="strain",
+        pin_share=0.65,
+        nu=0.3,
+        pin_nu=0.3,
+        pin_yield=0.0021,
+        block_yield=0.0018,
+        pin_hardening=TabularHardening(pin),
+        block_hardening=TabularHardening(block),
+    )
+    with pytest.raises(ValueError, match=r"no representative strain at .* dR, as the curves rise"):
+        general_law(joint)
