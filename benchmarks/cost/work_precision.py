@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, Point, points
+from archord.benchmarks.cost.work_precision_codes import CASES, Point, points, profile_error
 from archord.benchmarks.timing import Said, Timing, time_all
 from archord.benchmarks.work_precision_picture import STEM, cases, draw, short_table
-from archord.geometry.basis import Array
 from archord.report.files import replacing, write_rows
 
 NAMES = ("P", "p0", "eps", "profile", "dissipation")
@@ -35,14 +34,16 @@ class Line:
     def errors(self) -> dict[str, float]:
         """Relative errors by quantity against the reference of the code's kinematics."""
         case = CASES[self.point.case]
-        exact = case[self.found.get("kinematics", "current")]
+        kinematics = self.found.get("kinematics", "current")
+        exact = case[kinematics]
         errors = {
             name: abs(value / exact[name][0] - 1)
             for name, value in self.found.items()
             if name in exact
         }
         if "profile" in self.found:
-            errors["profile"] = profile_error(self.found["profile"], np.array(case["profile"]))
+            known = np.array(case["profile"][kinematics])
+            errors["profile"] = profile_error(self.found["profile"], known)
         return errors
 
 
@@ -52,13 +53,6 @@ def run(folder: Path, only: Sequence[str], repeats: int, limit: float, said: Sai
     chosen = points(only)
     timings = time_all([point.process(folder, limit) for point in chosen], repeats, said)
     return [Line(*pair) for pair in zip(chosen, timings, strict=True)]
-
-
-def profile_error(pressure: Array, reference: Array) -> float:
-    """Relative L2 difference over the arc, ``sqrt(int (p - p_ref)^2 / int p_ref^2)``; both
-    ``(401,)`` at `ANGLES`."""
-    difference = np.trapezoid((pressure - reference) ** 2, ANGLES)
-    return float(np.sqrt(difference / np.trapezoid(reference**2, ANGLES)))
 
 
 def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:

@@ -1,7 +1,8 @@
 """The points of the work-precision benchmark: archord, CalculiX and peers on series of meshes, as
 timed processes.
 
-What is solved is in work_precision.toml. The result of a process is a dict of what the code found
+What is solved is in work_precision.toml, what errors are measured against also in references.json,
+which references.py makes. The result of a process is a dict of what the code found
 at the last step: "P" (over E* R, of a lug in N/mm), "p0" (over E*), "eps" [rad], "dissipation"
 (over E* R^2), "profile" (pressure over E* at `ANGLES`), "dofs", "iterations", "factorisations", and
 "kinematics" where the pairs are fixed; without what it does not tell.
@@ -35,7 +36,11 @@ from archord.scene.file import AnyScene, parse_any, resolved
 from archord.scene.sections.bodies import Pin
 
 DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
-CASES: dict[str, dict[str, Any]] = DATA["cases"]
+REFERENCES = Path(__file__).with_name("references.json")
+_KNOWN: dict[str, dict[str, Any]] = json.loads(REFERENCES.read_text(encoding="utf-8"))
+CASES: dict[str, dict[str, Any]] = {
+    case: given | _KNOWN.get(case, {}) for case, given in DATA["cases"].items()
+}
 OURS = "archord"
 CALCULIX = "CalculiX"
 ANGLES = np.linspace(0.0, np.pi / 2, 401)  # of pressure profiles, from the contact axis
@@ -140,6 +145,22 @@ def profile(angle: Array, pressure: Array) -> Array:
     return np.interp(ANGLES, angle[order], pressure[order])
 
 
+def profile_error(pressure: Array, reference: Array) -> float:
+    """Relative L2 difference over the arc, ``sqrt(int (p - p_ref)^2 / int p_ref^2)``; both
+    ``(401,)`` at `ANGLES`."""
+    difference = np.trapezoid((pressure - reference) ** 2, ANGLES)
+    return float(np.sqrt(difference / np.trapezoid(reference**2, ANGLES)))
+
+
+def quantities_of(run: Run) -> dict[str, Any]:
+    """What a ``run`` of the paper's joint found at its last step."""
+    found: dict[str, Any] = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
+    # the unbiased contact integrates one half of the pressure on either side
+    arcs = run.contact().values()
+    sides = [profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in arcs]
+    return found | {"profile": np.mean(sides, axis=0), "dofs": run.summary["mesh"]["dofs"]}
+
+
 def _pin_of(scene: AnyScene) -> Pin | None:
     """The pin of the paper's joint, None of a general scene."""
     return getattr(scene, "pin", None)
@@ -153,11 +174,7 @@ def _archord(scene: AnyScene, folder: Path) -> Process:
         if _pin_of(scene) is None:
             found = {"P": run.columns["pull force"][-1]}
         else:
-            found = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
-            # the unbiased contact integrates one half of the pressure on either side
-            arcs = run.contact().values()
-            sides = [profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in arcs]
-            found["profile"] = np.mean(sides, axis=0)
+            found = quantities_of(run)
         return found | {
             "dofs": run.summary["mesh"]["dofs"],
             "iterations": round(sum(run.columns["iterations"])),
