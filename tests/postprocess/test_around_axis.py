@@ -88,3 +88,15 @@ def test_a_cosine_pressure_has_the_line_load_of_the_handbook():
     fine = line_load([profile], [1.0], axis)
     assert len(fine.load) == 40
     np.testing.assert_allclose(np.diff(fine.along) @ fine.load, force, rtol=1e-12)
+
+
+def test_the_largest_pressure_is_the_mean_of_a_facet():
+    """A point where pressures scatter does not count as a facet; the place is the facet's middle."""
+    profile = cylinder(lambda angle, along: 3.0 + along + np.cos(angle - 0.3))
+    spike = int(profile.facet_pressure.argmin())
+    profile.pressure[spike] = 100.0
+    profile.raw_pressure[spike] = 100.0
+    value, place = profile.largest
+    assert value == profile.facet_pressure.max()
+    most = profile.facet == profile.facet[profile.facet_pressure.argmax()]
+    np.testing.assert_allclose(place, profile.X[most].mean(axis=(0, 1)), atol=1e-12)
