@@ -91,7 +91,7 @@ def test_a_cosine_pressure_has_the_line_load_of_the_handbook():
 
 
 def test_the_largest_pressure_is_the_mean_of_a_facet():
-    """A point where pressures scatter does not count as a facet; the place is the facet's middle."""
+    """Pressures that scatter at a point do not count; the place is the middle of the facet."""
     profile = cylinder(lambda angle, along: 3.0 + along + np.cos(angle - 0.3))
     spike = int(profile.facet_pressure.argmin())
     profile.pressure[spike] = 100.0
