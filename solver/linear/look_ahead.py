@@ -24,8 +24,10 @@ from archord.solver.linear.strategy import Facts
 MOST_REVISIONS = 2  # of the points in one solve: more cost as much as the iterations they save
 _DIMENSION_WHERE_BODIES_YIELD = 3  # from which on it pays there without friction
 _TOLERANCE = 1e-3  # residual of a system over its right-hand side
-# with the factorisation, for one revision: nearly incompressible bodies need most
+# preconditioned solves for one revision, with a factorisation or with multigrid: nearly
+# incompressible bodies need most
 _MOST_SOLVES = 40
+_MOST_SOLVES_OF_MULTIGRID = 200
 # where bodies yield: what the linearised system says holds less far there
 _MOST_SOLVES_YIELDING = 10
 
@@ -73,14 +75,17 @@ class LookAhead:
 
     ``revise(increment)`` goes over to the points that touch and stick after an ``increment`` of
     this rank's unknowns ``(n,)``, and returns the matrix for them with what they add to the
-    residual ``(n,)``; None for no change. Whether bodies may yield is ``yields``. It has
-    ``given_up``, until that is set again, where a changed system could not be solved.
+    residual ``(n,)``; None for no change. Whether bodies may yield is ``yields``, and whether
+    multigrid preconditions, not a factorisation, is ``by_multigrid``. It has ``given_up``, until
+    that is set again, where a changed system could not be solved.
     """
 
-    def __init__(self, revise: Revise, *, yields: bool) -> None:
+    def __init__(self, revise: Revise, *, yields: bool, by_multigrid: bool) -> None:
         self._revise = revise
         self.given_up = False
-        self._most_solves = _MOST_SOLVES_YIELDING if yields else _MOST_SOLVES
+        self._most_solves = _MOST_SOLVES_OF_MULTIGRID if by_multigrid else _MOST_SOLVES
+        if yields:
+            self._most_solves = _MOST_SOLVES_YIELDING
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` precondition."""

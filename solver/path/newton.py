@@ -99,7 +99,11 @@ class NewtonSolver:
         self._lagged = Lagged() if choice.uses("lagged") else None
         self._ahead: LookAhead | None = None
         if choice.uses("look_ahead"):
-            self._ahead = LookAhead(self._system.revise, yields=equilibrium.bulk.plastic)
+            self._ahead = LookAhead(
+                self._system.revise,
+                yields=equilibrium.bulk.plastic,
+                by_multigrid=choice.uses("multigrid"),
+            )
         self._ahead_rests = rests_while_bodies_yield(self._system.facts)
         for sums in _RANDOM_SUMS:
             PETSc.Options()[sums] = False
