@@ -114,9 +114,7 @@ def _unsound(mesh: MeshArrays) -> Iterator[str]:
     smallest, largest = smallest_determinants(mesh)
     size = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1) ** mesh.dimension
     flat = largest <= _FLAT * size
-    lowest = -_DISTORTED * largest if mesh.order > 1 else 0.0
-    folded = (smallest < lowest) | _turned_at_points(mesh)
-    bad = np.flatnonzero(flat | folded)
+    bad = np.flatnonzero(flat | is_folded(mesh, smallest, largest))
     if not len(bad):
         return
     worst = bad[np.argmin((smallest / size)[bad])]
@@ -126,6 +124,12 @@ def _unsound(mesh: MeshArrays) -> Iterator[str]:
         how = f"{_falls(smallest[worst] / largest[worst])}; move the nodes on its sides"
     at = _place_of(mesh, worst)
     yield f"{len(bad)} cells are folded or have no {measure}, the worst at {at}: {how}"
+
+
+def is_folded(mesh: MeshArrays, smallest: Array, largest: Array) -> np.ndarray:
+    """Whether cells ``(n,)`` are folded, by their `smallest_determinants` and the largest ones."""
+    lowest = -_DISTORTED * largest if mesh.order > 1 else 0.0
+    return (smallest < lowest) | _turned_at_points(mesh)
 
 
 def _turned_at_points(mesh: MeshArrays) -> np.ndarray:

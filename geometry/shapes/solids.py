@@ -14,7 +14,9 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import gathered, gmsh_to_mesh
+from archord.geometry.meshes.jacobian import smallest_determinants
+from archord.geometry.meshes.quality import is_folded
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.sketch import Sketch, around
 
@@ -22,6 +24,7 @@ MIDDLE = "mid-plane"  # the set of facets at z = 0
 FACES = "faces"  # the set of the other flat facets across z
 RIM = "rim"  # the set of the chamfers and fillets
 _SAME = 1e-6  # distance of places that are one, in radii of the pin
+_OF_FILLET = 0.75  # largest element at a fillet over its radius
 _OPTIONS = {"ElementOrder": 2, "HighOrderOptimize": 0}
 
 
@@ -90,13 +93,26 @@ def mesh_solids(
 
     Facets over the lines of a set are the set, with a name of the slab's own where it has one.
     Further sets are "mid-plane" (z = 0), "faces" (the other flat ends), and "rim", the chamfers or
-    fillets, which belong to their bore's set, too. Collective; rank 0 meshes.
+    fillets, which belong to their bore's set, too. Collective; rank 0 meshes. Raises ValueError
+    where elements are so large that some are folded.
     """
     build = partial(draw_solids, sketch, slabs, rims)
     key = (*vars(sketch).items(), tuple(slabs), rims)
     made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key)
     made.mesh.geometry.x[:] *= radius
+    _require_sound(made)
     return made
+
+
+def _require_sound(made: TaggedMesh) -> None:
+    mesh = gathered(made)
+    n_folded = 0
+    if mesh is not None:
+        n_folded = int(is_folded(mesh, *smallest_determinants(mesh)).sum())
+    if n_folded := made.mesh.comm.bcast(n_folded):
+        raise ValueError(
+            f"{n_folded} of the elements that were drawn are folded; choose a smaller element size"
+        )
 
 
 def lines_of(sketch: Sketch, profile: str) -> list[_Line]:
@@ -257,14 +273,15 @@ class _Drawing:
 
     def rim_sizes(self, slabs: Sequence[Slab]) -> list[int]:
         """Fields of element sizes that grow from where bores end."""
-        if self.rims.ratio == 1:
+        if self.rims.ratio == 1 and not self.rims.fillet:
             return []
+        largest = _OF_FILLET * self.rims.fillet or np.inf  # coarser cells are folded
         fields = []
         for bore, slab in product(self.sketch.bores, slabs):
             if bore.facets != bore_of(self.sketch, slab.profile):
                 continue
             circle = self.sketch.circles[bore.facets]
-            smallest = self.rims.ratio * bore.size
+            smallest = min(self.rims.ratio * bore.size, largest)
             for height in slab.rims:
                 off = (
                     f"Sqrt(({around(circle.centre[0])} - {circle.radius!r})^2 + (z - {height!r})^2)"

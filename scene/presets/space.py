@@ -22,8 +22,8 @@ class Depth(Section):
         default=0.0,
     )
     fillet: NotNegative = key(
-        "radius of the rounded rims of these holes, instead of a chamfer; some cells there are "
-        "nearly flat, so solves take longer",
+        "radius of the rounded rims of these holes, instead of a chamfer; elements there are no "
+        "larger than the radius, so that a small one takes many",
         "length",
         default=0.0,
     )

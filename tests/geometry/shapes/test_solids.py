@@ -9,6 +9,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.quality import measures
+from archord.geometry.shapes import solids
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
@@ -97,6 +98,24 @@ def test_cells_are_sound(shape):
     """No cell is nearly folded, however coarse."""
     smallest, largest = smallest_determinants(gathered(made(shape, *SHAPES[shape])))
     assert (smallest / largest).min() > 0.2
+
+
+@pytest.mark.parametrize("fillet", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_cells_at_fillets_are_not_folded(shape, fillet):
+    """However small they are beside the other elements; where a fillet ends it is tangent to a
+    face, so that the corners of cells are flat there, and no more than flat."""
+    mesh = gathered(made(shape, *SHAPES[shape], chamfer=0.0, fillet=fillet))
+    smallest, largest = smallest_determinants(mesh)
+    assert (smallest / largest).min() > -0.01
+
+
+def test_folded_elements_are_refused(monkeypatch):
+    """The elements at a fillet, were they as large as the others."""
+    monkeypatch.setenv("ARCHORD_KEEP_MESHES", "0")
+    monkeypatch.setattr(solids, "_OF_FILLET", 100.0)
+    with pytest.raises(ValueError, match="are folded; choose a smaller element size"):
+        made(lug, *LUG, chamfer=0.0, fillet=0.1)
 
 
 def test_elements_shrink_toward_the_rim():
