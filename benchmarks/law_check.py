@@ -68,8 +68,10 @@ class Off:
 def off(joint: LawJoint, runs: list[NodeRun]) -> Off:
     """The errors of the law on ``joint``, solved in ``runs``."""
     numbers = joint_numbers(joint)
-    law = law_of_numbers(numbers, flows(joint))
-    kind = f"{kind_of(numbers)}{', hardens' if joint.hardens else ''}"
+    law = law_of_numbers(numbers, flows(joint), joint.friction)
+    kind = kind_of(numbers)
+    kind += ", hardens" if joint.hardens else ""
+    kind += ", friction" if joint.friction else ""
     nodes = first_loading(runs)
     x, y, peak, angle = nodes[nodes[:, 0] <= _END].T
     told = law.at(x)
@@ -149,7 +151,8 @@ def table_of(found: list[Off]) -> Table:
         plane = one.kind.split()[0]
         soft = ", soft pin" if "soft" in one.kind else ""
         hardens = ", hardens" if "hardens" in one.kind else ""
-        together = f"{plane} yielding{soft}{hardens}, all"
+        friction = ", friction" if "friction" in one.kind else ""
+        together = f"{plane} yielding{soft}{hardens}{friction}, all"
         if "elastic" in one.kind:
             together = one.kind
         for kind in {one.kind, together, "all"}:

@@ -207,7 +207,7 @@ class Law:
             said.append(
                 "of perfect plasticity; of bodies that harden its P is too low beyond yield"
             )
-        if joint.friction:
+        if joint.friction and not self.solved:
             said.append(
                 f"without friction; with the coefficient {joint.friction:g} P is higher: in the "
                 "paper's elastic joint at 2 dR by 3.5 % with 0.1, by 10.5 % with 0.3"

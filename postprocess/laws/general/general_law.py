@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model
+from archord.postprocess.laws.general.friction_model import LARGEST, Gain, Rubbing, gain
 from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent
-from archord.postprocess.laws.general.spline import monotone_slopes
+from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
     ELASTIC_BELOW,
     Loss,
@@ -78,7 +79,7 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
     if reason and not extrapolate:
         raise ValueError(f"archord: {reason}.")
-    law = law_of_numbers(joint_numbers(joint), flows(joint))
+    law = law_of_numbers(joint_numbers(joint), flows(joint), joint.friction)
     about = {
         "title": f"a pin joint in plane {joint.plane}, by archord's law of solved joints",
         "archord": VERSION,
@@ -116,24 +117,42 @@ def _error_in_words(law: JointCurve) -> str:
     return said
 
 
-def law_of_numbers(numbers: Sequence[float], given: Flows = (None, None)) -> JointCurve:
-    """The law of a joint with these seven ``numbers`` (see `joint_numbers`) in units of dR, E* dR
-    and E* dR/R, whose bodies harden as ``given``; a body that yields beyond the range is
-    elastic."""
+def law_of_numbers(
+    numbers: Sequence[float], given: Flows = (None, None), friction: float = 0.0
+) -> JointCurve:
+    """The law of a joint with these seven ``numbers`` (see `joint_numbers`) and this coefficient of
+    ``friction`` in units of dR, E* dR and E* dR/R, whose bodies harden as ``given``; a body that
+    yields beyond the range is elastic."""
     strain, *of_bodies, pin, block = numbers
     joint = Elastic(*of_bodies)
     stresses = np.array([pin, block])
     begins = first_yield(elastic_model(), bool(strain), joint, stresses)
     stresses[ELASTIC_BELOW * begins >= NODES[-1]] = np.inf
-    if np.isinf(stresses).all():
-        return reduce_joint(joint)
+    lost = None
+    if np.isfinite(stresses).any():
+        lost = _lost(numbers, stresses, given)
+    added = _added(bool(strain), joint, lost, friction) if friction else None
+    return reduce_joint(joint, lost, added)
+
+
+def _lost(numbers: Sequence[float], stresses: Array, given: Flows) -> Loss:
+    """What yielding at the ``stresses`` takes from a joint at the nodes."""
     x = NODES[1:]
     hardens = [flow is not None and np.isfinite(s) for flow, s in zip(given, stresses, strict=True)]
     if any(hardens):
-        lost = hardened_loss([strain, *of_bodies, *stresses], given, x)
-    else:
-        lost = loss(numbers, Yielding(*stresses), x)
-    return reduce_joint(joint, lost)
+        return hardened_loss([*numbers[:5], *stresses], given, x)
+    return loss(numbers, Yielding(*stresses), x)
+
+
+def _added(strain: bool, joint: Elastic, lost: Loss | None, friction: float) -> Gain:
+    """What ``friction`` adds to a joint at the nodes."""
+    x = NODES[1:]
+    angle = elastic_model().at(joint, x).angle
+    fallen = np.zeros_like(x)
+    if lost is not None:
+        angle = angle * np.exp(lost.angle)
+        fallen = lost.force
+    return gain(Rubbing(strain, friction, joint, x, angle, fallen), NODES[1])
 
 
 def outside(joint: LawJoint) -> str:
@@ -181,6 +200,7 @@ def outside(joint: LawJoint) -> str:
         ("dR/R", clearance, *CLEARANCES),
         ("E(pin)/E(block)", stiffness, softest, stiffest),
         ("sigY R/(E* dR)", min(stresses), weakest, math.inf),
+        ("friction", joint.friction, 0.0, LARGEST),
     ]
     for name, value, low, high in checks:
         if not low * (1 - _LAST_DIGITS) <= value <= high * (1 + _LAST_DIGITS):
@@ -219,9 +239,9 @@ def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
     return tuple(numbers)
 
 
-def reduce_joint(joint: Elastic, lost: Loss | None = None) -> JointCurve:
-    """The law of ``joint`` in units of dR, E* dR and E* dR/R, with what is ``lost`` to yielding at
-    the nodes above zero (None: elastic)."""
+def reduce_joint(joint: Elastic, lost: Loss | None = None, added: Gain | None = None) -> JointCurve:
+    """The law of ``joint`` in units of dR, E* dR and E* dR/R, with what is ``lost`` to yielding
+    (None: elastic) and what friction has ``added`` (None: no friction) at the nodes above zero."""
     x = NODES[1:]
     base = elastic_model().at(joint, x)
     y = base.y
@@ -230,6 +250,7 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None) -> JointCurve:
     angle = base.angle
     error = np.full_like(y, ELASTIC_ERROR)
     ratio = np.ones_like(y)
+    travel = x
     toe = np.zeros_like(y)
     back_error: Array = np.zeros(len(NODES))
     if lost is None:
@@ -245,8 +266,16 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None) -> JointCurve:
         travel = np.clip(lost.travel * unit, 1e-3 * x, x)
         travel = x - np.maximum.accumulate(x - travel)
         toe = np.clip(lost.toe * unit, 0.0, x - travel)
-        ratio = _ratio(x, base.y, base.slope, y, travel)
         back_error = _from(0.0, np.hypot(error, lost.way_error))
+    if added is not None:
+        dy = (dy / y + spline_slopes(np.log(x), added.force) / x) * y * np.exp(added.force)
+        y, dy = _rising(x, y * np.exp(added.force), dy)
+        peak = peak * np.exp(added.peak)
+        angle = angle * np.exp(added.angle)
+        error = np.hypot(error, added.deviation)
+        back_error = np.hypot(back_error, _from(0.0, added.way_error))
+    if lost is not None or added is not None:
+        ratio = _ratio(x, base.y, base.slope, y, travel)
     root = np.sqrt(y)
     ratio = _from(1.0, ratio)
     peak = _from(peak[0] / root[0], peak / root)

@@ -65,7 +65,7 @@ class LawJoint:
     whole : bool
         Whether the pin is whole, not cut at the pressed diameter.
     friction : float
-        The coefficient of friction, which no law knows.
+        The coefficient of friction, which the law of solved joints alone knows.
     large_strain : bool
         Whether strain is large, which no law knows.
     fixed_pairs : bool

@@ -116,6 +116,38 @@ def test_a_cycle_loses_energy_and_a_deeper_one_more(pin: LawJoint, deepest: floa
         lost = now
 
 
+@given(joints(), some.floats(0.02, 0.3), some.floats(0.3, 3.0))
+@settings(max_examples=40, deadline=None)
+def test_friction_adds_to_the_force(pin: LawJoint, friction: float, deepest: float) -> None:
+    """Hardly anything if there is hardly any, and to the error; P rises, and a way back begins on
+    it, lies below it and ends."""
+    plain = general_law(pin)
+    rubbing = general_law(replace(pin, friction=friction))
+    little = general_law(replace(pin, friction=1e-9))
+    x = X[X >= 0.1] * pin.clearance
+    np.testing.assert_allclose(little.at(x).load, plain.at(x).load, rtol=1e-8)
+    assert (rubbing.at(x).error >= plain.at(x).error).all()
+    everywhere = X * pin.clearance
+    first = rubbing.at(everywhere)
+    assert (np.diff(first.load) >= 0).all()
+    depth = deepest * pin.clearance
+    back = rubbing.at(everywhere, depth)
+    assert (back.load <= first.load).all()
+    before, there = rubbing.at([depth * (1 - 1e-9), depth], depth).load
+    assert before == pytest.approx(there, rel=1e-6)
+    assert 0 <= float(rubbing.residual([depth])[0]) < depth
+
+
+def test_friction_in_the_papers_joint() -> None:
+    """Elastic, at 2 dR, by GetFEM (README.md), within what the law expects; more of it is
+    refused."""
+    pin = LawJoint(1.0, 0.005, 1.0, plane="strain", nu=0.3, friction=0.1)
+    state = general_law(pin).at(0.01)
+    assert abs(state.load - 0.0132327) < state.error
+    with pytest.raises(ValueError, match=r"friction = 0.4 is outside 0 to 0.3"):
+        general_law(replace(pin, friction=0.4))
+
+
 @given(joints(yields=("none",)), some.floats(3.0, 9.0))
 @settings(max_examples=40, deadline=None)
 def test_yielding_beyond_the_range_is_none(pin: LawJoint, s: float) -> None:

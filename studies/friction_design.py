@@ -1,0 +1,99 @@
+"""Sweep files of joints with friction, each solved without friction, too: those that the law's
+factor is fitted to, and fresh ones to check it on.
+
+    python3 -m archord.studies.friction_design > friction.sweep.toml
+    python3 -m archord.studies.friction_design --fresh 60 --seed 1 > fresh.sweep.toml
+
+Joints are drawn as in law_design.py, half of those that yield with hardening curves as in
+hardening_design.py. A third of them comes back.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator
+from itertools import cycle
+
+import numpy as np
+
+from archord.postprocess.laws.general.friction_model import LARGEST
+from archord.postprocess.laws.general.joint import Array
+from archord.studies.hardening_design import hardened
+from archord.studies.law_design import (
+    ELEMENT_SIZE,
+    END,
+    Drawn,
+    Row,
+    checking,
+    joints,
+    steady_nodes,
+    sweep_file,
+)
+
+# how many joints of each kind of law_design.py
+_KINDS = {
+    "both": 50,
+    "block": 30,
+    "pin": 25,
+    "block weaker": 25,
+    "pin weaker": 25,
+    "elastic": 45,
+}
+JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
+_SMALLEST = 0.03  # coefficient of friction
+_SEED = 7200
+_FIRST = 0.05  # x
+_NEXT = 1.3  # x of a node over the last one's
+_BACK = 3  # of so many joints one comes back
+_WAY = np.array([0.97, 0.92, 0.85, 0.75, 0.6, 0.45, 0.3])  # x over the deepest, on the way back
+
+
+def nodes(joint: Drawn) -> Array:
+    """The x at which a joint is solved, to 3 dR."""
+    if np.isinf(joint.first):
+        count = round(np.log(END / _FIRST) / np.log(_NEXT))
+        return np.geomspace(_FIRST, END, count + 1)
+    yielding = steady_nodes(joint, _NEXT)
+    before = _FIRST * _NEXT ** np.arange(30)
+    return np.concatenate([before[before < 0.85 * yielding[0]], yielding])
+
+
+def drawn(share: float, seed: int) -> Iterator[tuple[Drawn, float]]:
+    """A ``share`` of `JOINTS`, and their coefficients of friction."""
+    random = np.random.default_rng(seed)
+    for kind, count in JOINTS.items():
+        seed += 1
+        for joint in joints(kind, max(round(count * share), 1), seed):
+            friction = float(random.uniform(_SMALLEST, LARGEST))
+            yields = bool(np.isfinite(joint.first))
+            hardens = yields and random.random() < 0.5
+            yield (hardened(joint, random) if hardens else joint), friction
+
+
+def rows(given: Iterable[tuple[Drawn, float]]) -> Iterator[Row]:
+    """The scenes of the ``given`` joints, without friction and with."""
+    for (joint, friction), turn in zip(given, cycle(range(_BACK)), strict=False):
+        x = nodes(joint)
+        if turn == 0:
+            x = np.concatenate([x, x[-1] * _WAY])
+        row = joint.own | {"load.displacement": [*x]}
+        yield row
+        yield row | {"analysis.friction": friction}
+
+
+def main() -> None:
+    """Print a sweep file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--element-size", type=float, default=ELEMENT_SIZE, help="of fresh ones")
+    given = parser.parse_args()
+    text = sweep_file(rows(drawn(1.0, _SEED)))
+    if given.fresh:
+        chosen = drawn(given.fresh / sum(JOINTS.values()), 1000 * given.seed)
+        text = checking(sweep_file(rows(chosen)), given.element_size)
+    print(text, end="")
+
+
+if __name__ == "__main__":
+    main()
