@@ -68,10 +68,11 @@ class Off:
 def off(joint: LawJoint, runs: list[NodeRun]) -> Off:
     """The errors of the law on ``joint``, solved in ``runs``."""
     numbers = joint_numbers(joint)
-    law = law_of_numbers(numbers, flows(joint), joint.friction)
+    law = law_of_numbers(numbers, flows(joint), joint.friction, large_strain=joint.large_strain)
     kind = kind_of(numbers)
     kind += ", hardens" if joint.hardens else ""
     kind += ", friction" if joint.friction else ""
+    kind += ", large strain" if joint.large_strain else ""
     nodes = first_loading(runs)
     x, y, peak, angle = nodes[nodes[:, 0] <= _END].T
     told = law.at(x)
@@ -152,7 +153,8 @@ def table_of(found: list[Off]) -> Table:
         soft = ", soft pin" if "soft" in one.kind else ""
         hardens = ", hardens" if "hardens" in one.kind else ""
         friction = ", friction" if "friction" in one.kind else ""
-        together = f"{plane} yielding{soft}{hardens}{friction}, all"
+        large = ", large strain" if "large strain" in one.kind else ""
+        together = f"{plane} yielding{soft}{hardens}{friction}{large}, all"
         if "elastic" in one.kind:
             together = one.kind
         for kind in {one.kind, together, "all"}:

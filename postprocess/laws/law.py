@@ -212,7 +212,7 @@ class Law:
                 f"without friction; with the coefficient {joint.friction:g} P is higher: in the "
                 "paper's elastic joint at 2 dR by 3.5 % with 0.1, by 10.5 % with 0.3"
             )
-        if joint.large_strain:
+        if joint.large_strain and not self.solved:
             said.append(
                 "of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, 1.6 % "
                 "at 2 %"

@@ -149,7 +149,11 @@ def test_a_full_device_is_told(tmp_path):
 def test_nothing_that_users_name_is_written_in_place():
     """What commands, exports and pictures write, they write to the ``new`` that `writing` and
     `replacing` give."""
-    fits = ("law_fit.py", "hardening_fit.py", "friction_fit.py")  # their tables are of this checkout, not of a user
+    fits = (
+        "law_fit.py",
+        "hardening_fit.py",
+        "factor_fit.py",
+    )  # their tables are of this checkout, not of a user
     tables = {f"postprocess/laws/general/{file}" for file in fits}
     writes = re.compile(
         r"(\w+)\.write_(?:text|bytes)\(|to_csv\((\w+)|\bsave\((?:figure|canvas), (\w+)"

@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model
-from archord.postprocess.laws.general.friction_model import LARGEST, Gain, Rubbing, gain
+from archord.postprocess.laws.general.factor_model import (
+    FRICTION,
+    LARGE_STRAIN,
+    LARGEST,
+    Gain,
+    Plain,
+    gain,
+)
 from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent
@@ -79,7 +86,9 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
     if reason and not extrapolate:
         raise ValueError(f"archord: {reason}.")
-    law = law_of_numbers(joint_numbers(joint), flows(joint), joint.friction)
+    law = law_of_numbers(
+        joint_numbers(joint), flows(joint), joint.friction, large_strain=joint.large_strain
+    )
     about = {
         "title": f"a pin joint in plane {joint.plane}, by archord's law of solved joints",
         "archord": VERSION,
@@ -118,11 +127,15 @@ def _error_in_words(law: JointCurve) -> str:
 
 
 def law_of_numbers(
-    numbers: Sequence[float], given: Flows = (None, None), friction: float = 0.0
+    numbers: Sequence[float],
+    given: Flows = (None, None),
+    friction: float = 0.0,
+    *,
+    large_strain: bool = False,
 ) -> JointCurve:
-    """The law of a joint with these seven ``numbers`` (see `joint_numbers`) and this coefficient of
-    ``friction`` in units of dR, E* dR and E* dR/R, whose bodies harden as ``given``; a body that
-    yields beyond the range is elastic."""
+    """The law of a joint with these seven ``numbers`` (see `joint_numbers`) in units of dR, E* dR
+    and E* dR/R, whose bodies harden as ``given``; a body that yields beyond the range is
+    elastic. The coefficient of ``friction`` and ``large_strain`` add to it."""
     strain, *of_bodies, pin, block = numbers
     joint = Elastic(*of_bodies)
     stresses = np.array([pin, block])
@@ -131,8 +144,11 @@ def law_of_numbers(
     lost = None
     if np.isfinite(stresses).any():
         lost = _lost(numbers, stresses, given)
-    added = _added(bool(strain), joint, lost, friction) if friction else None
-    return reduce_joint(joint, lost, added)
+    kinds = [FRICTION] * bool(friction) + [LARGE_STRAIN] * large_strain
+    if not kinds:
+        return reduce_joint(joint, lost)
+    plain = _plain(bool(strain), friction, joint, lost)
+    return reduce_joint(joint, lost, Gain.together([gain(plain, kind) for kind in kinds]))
 
 
 def _lost(numbers: Sequence[float], stresses: Array, given: Flows) -> Loss:
@@ -144,15 +160,15 @@ def _lost(numbers: Sequence[float], stresses: Array, given: Flows) -> Loss:
     return loss(numbers, Yielding(*stresses), x)
 
 
-def _added(strain: bool, joint: Elastic, lost: Loss | None, friction: float) -> Gain:
-    """What ``friction`` adds to a joint at the nodes."""
+def _plain(strain: bool, friction: float, joint: Elastic, lost: Loss | None) -> Plain:
+    """A joint at the nodes, which ``friction`` and large strain change."""
     x = NODES[1:]
     angle = elastic_model().at(joint, x).angle
     fallen = np.zeros_like(x)
     if lost is not None:
         angle = angle * np.exp(lost.angle)
         fallen = lost.force
-    return gain(Rubbing(strain, friction, joint, x, angle, fallen), NODES[1])
+    return Plain(strain, friction, joint, x, x[0], angle, fallen)
 
 
 def outside(joint: LawJoint) -> str:
@@ -241,7 +257,8 @@ def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
 
 def reduce_joint(joint: Elastic, lost: Loss | None = None, added: Gain | None = None) -> JointCurve:
     """The law of ``joint`` in units of dR, E* dR and E* dR/R, with what is ``lost`` to yielding
-    (None: elastic) and what friction has ``added`` (None: no friction) at the nodes above zero."""
+    (None: elastic) and what friction and large strain have ``added`` (None: neither) at the nodes
+    above zero."""
     x = NODES[1:]
     base = elastic_model().at(joint, x)
     y = base.y

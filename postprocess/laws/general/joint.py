@@ -67,7 +67,7 @@ class LawJoint:
     friction : float
         The coefficient of friction, which the law of solved joints alone knows.
     large_strain : bool
-        Whether strain is large, which no law knows.
+        Whether strain is large, which the law of solved joints alone knows.
     fixed_pairs : bool
         Whether contact is of the pairs of points of the undeformed curves.
 

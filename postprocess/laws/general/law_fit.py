@@ -167,11 +167,11 @@ def by_joint(folder: Path) -> dict[LawJoint, list[NodeRun]]:
 
 
 def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
-    """`by_joint` of joints that do not harden and have no friction, by their numbers, as
-    `joint_numbers` has them."""
+    """`by_joint` of joints at small strain that do not harden and have no friction, by their
+    numbers, as `joint_numbers` has them."""
     found: dict[Numbers, list[NodeRun]] = defaultdict(list)
     for joint, runs in by_joint(folder).items():
-        if not (joint.hardens or joint.friction):
+        if not (joint.hardens or joint.friction or joint.large_strain):
             found[tuple(float(f"{value:.6g}") for value in joint_numbers(joint))] += runs
     return dict(found)
 

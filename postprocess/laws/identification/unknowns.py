@@ -27,7 +27,6 @@ _IGNORED: dict[str, Any] = {
     "length": None,
     "block_size": None,
     "whole": False,
-    "large_strain": False,
     "fixed_pairs": False,
 }
 

@@ -138,6 +138,22 @@ def test_friction_adds_to_the_force(pin: LawJoint, friction: float, deepest: flo
     assert 0 <= float(rubbing.residual([depth])[0]) < depth
 
 
+@given(joints())
+@settings(max_examples=25, deadline=None)
+def test_large_strain_changes_little(pin: LawJoint) -> None:
+    """P changes by a part of the size of delta/R, and by nothing at first touch; the error
+    grows; with friction both change P."""
+    small = general_law(pin)
+    large = general_law(replace(pin, large_strain=True))
+    x = X[X >= 0.02] * pin.clearance
+    change = large.at(x).load / small.at(x).load - 1
+    assert (np.abs(change) <= 2 * x / pin.radius + 1e-12).all()
+    assert (large.at(x).error >= small.at(x).error * (1 + change) * (1 - 1e-12)).all()
+    both = general_law(replace(pin, large_strain=True, friction=0.2)).at(x).load
+    friction = general_law(replace(pin, friction=0.2)).at(x).load
+    np.testing.assert_allclose(both, friction * (1 + change), rtol=0.02)
+
+
 def test_friction_in_the_papers_joint() -> None:
     """Elastic, at 2 dR, by GetFEM (README.md), within what the law expects; more of it is
     refused."""

@@ -1,8 +1,9 @@
-"""Sweep files of joints with friction, each solved without friction, too: those that the law's
-factor is fitted to, and fresh ones to check it on.
+"""Sweep files of joints with friction or at large strain, each solved without it, too: those that
+the law's factors are fitted to, and fresh ones to check them on.
 
-    python3 -m archord.studies.friction_design > friction.sweep.toml
-    python3 -m archord.studies.friction_design --fresh 60 --seed 1 > fresh.sweep.toml
+    python3 -m archord.studies.factor_design friction > friction.sweep.toml
+    python3 -m archord.studies.factor_design "large strain" > large.sweep.toml
+    python3 -m archord.studies.factor_design friction --fresh 60 --seed 1 > fresh.sweep.toml
 
 Joints are drawn as in law_design.py, half of those that yield with hardening curves as in
 hardening_design.py. A third of them comes back.
@@ -11,12 +12,12 @@ hardening_design.py. A third of them comes back.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import cycle
 
 import numpy as np
 
-from archord.postprocess.laws.general.friction_model import LARGEST
+from archord.postprocess.laws.general.factor_model import FRICTION, LARGE_STRAIN, LARGEST
 from archord.postprocess.laws.general.joint import Array
 from archord.studies.hardening_design import hardened
 from archord.studies.law_design import (
@@ -40,6 +41,7 @@ _KINDS = {
     "elastic": 45,
 }
 JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
+_SHARES = {FRICTION: 1.0, LARGE_STRAIN: 0.4}  # of them that are solved: large strain does less
 _SMALLEST = 0.03  # coefficient of friction
 _SEED = 7200
 _FIRST = 0.05  # x
@@ -70,29 +72,35 @@ def drawn(share: float, seed: int) -> Iterator[tuple[Drawn, float]]:
             yield (hardened(joint, random) if hardens else joint), friction
 
 
-def rows(given: Iterable[tuple[Drawn, float]]) -> Iterator[Row]:
-    """The scenes of the ``given`` joints, without friction and with."""
-    for (joint, friction), turn in zip(given, cycle(range(_BACK)), strict=False):
+def rows(kind: str, share: float, seed: int) -> Iterator[Row]:
+    """The scenes of a ``share`` of `JOINTS`, without friction or large strain and with it."""
+    for (joint, friction), turn in zip(drawn(share, seed), cycle(range(_BACK)), strict=False):
         x = nodes(joint)
         if turn == 0:
             x = np.concatenate([x, x[-1] * _WAY])
         row = joint.own | {"load.displacement": [*x]}
         yield row
-        yield row | {"analysis.friction": friction}
+        if kind == FRICTION:
+            yield row | {"analysis.friction": friction}
+        else:
+            yield row | {"analysis.strain": "large"}
 
 
 def main() -> None:
     """Print a sweep file."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kind", choices=[FRICTION, LARGE_STRAIN])
     parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--element-size", type=float, default=ELEMENT_SIZE, help="of fresh ones")
     given = parser.parse_args()
-    text = sweep_file(rows(drawn(1.0, _SEED)))
+    share = _SHARES[given.kind]
+    seed = _SEED
     if given.fresh:
-        chosen = drawn(given.fresh / sum(JOINTS.values()), 1000 * given.seed)
-        text = checking(sweep_file(rows(chosen)), given.element_size)
-    print(text, end="")
+        share = given.fresh / sum(JOINTS.values())
+        seed = 1000 * given.seed
+    text = sweep_file(rows(given.kind, share, seed))
+    print(checking(text, given.element_size) if given.fresh else text, end="")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""What friction adds to joints, from joints that were solved with friction and without, by least
-squares of the logarithms of P, p0 and eps over those without.
+"""What friction and large strain do to joints, from joints that were solved with one of them and
+without, by least squares of the logarithms of P, p0 and eps over those without.
 
-    python3 -m archord.studies.friction_design > friction.sweep.toml
+    python3 -m archord.studies.factor_design friction > friction.sweep.toml
     mpirun -n 2 archord sweep friction.sweep.toml
-    python3 -m archord.postprocess.laws.general.friction_fit runs/friction
+    python3 -m archord.postprocess.laws.general.factor_fit runs/friction
 
 Every fifth joint is predicted by the other joints: these errors make the expected error, and are
 printed.
@@ -22,14 +22,15 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
-from archord.postprocess.laws.general.friction_model import (
+from archord.postprocess.laws.general.factor_model import (
+    FRICTION,
+    LARGE_STRAIN,
     PRODUCTS,
     TABLE,
-    Rubbing,
-    friction_model,
+    Plain,
+    factor_model,
 )
-from archord.postprocess.laws.general.general_law import NODES, joint_numbers, law_of_numbers
-from archord.postprocess.laws.general.hardening_model import flows
+from archord.postprocess.laws.general.general_law import NODES, joint_numbers
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
 from archord.postprocess.run import Run
@@ -44,22 +45,29 @@ _SCATTER = 0.01  # of ln P, against which that counts
 
 
 @dataclass(frozen=True)
-class Rubbed:
-    """A ``joint`` that was solved ``without`` and ``with_`` friction: nodes ``(k, 4)`` as
-    `NodeRun` has them; ``back`` ``(j, 2)`` is x and y of the way back with friction, from the
-    deepest point on."""
+class Changed:
+    """A ``joint`` that was solved ``without`` and ``with_`` friction or large strain: nodes ``(k,
+    4)`` as `NodeRun` has them; ``back`` and ``back_without`` ``(j, 2)`` are x and y of the way
+    back with and without it, from the deepest point on."""
 
     joint: LawJoint
     without: Array
     with_: Array
     back: Array
+    back_without: Array
 
     @classmethod
-    def of(cls, joint: LawJoint, without: NodeRun, with_: NodeRun) -> Rubbed:
+    def of(cls, joint: LawJoint, without: NodeRun, with_: NodeRun) -> Changed:
         """The joint of two runs to the same displacements."""
         loading = slice(without.loading)
         inside = (without.nodes[loading, 0] >= _RANGE[0]) & (without.nodes[loading, 0] <= _RANGE[1])
-        return cls(joint, without.nodes[loading][inside], with_.nodes[loading][inside], with_.back)
+        return cls(
+            joint,
+            without.nodes[loading][inside],
+            with_.nodes[loading][inside],
+            with_.back,
+            without.back,
+        )
 
     @property
     def usual(self) -> npt.NDArray[np.bool_]:
@@ -73,74 +81,79 @@ class Rubbed:
         return np.log(self.with_[:, 1:] / self.without[:, 1:]).T
 
     @property
-    def rubbing(self) -> Rubbing:
-        """What decides it, as it was solved without friction."""
+    def kind(self) -> str:
+        """What it was solved with."""
+        return FRICTION if self.joint.friction else LARGE_STRAIN
+
+    @property
+    def plain(self) -> Plain:
+        """What decides it, as it was solved without."""
         strain, *of_bodies, _, _ = joint_numbers(self.joint)
         x, y, _, angle = self.without.T
         elastic = Elastic(*of_bodies)
         lost = np.log(y / elastic_model().at(elastic, x).y)
-        return Rubbing(bool(strain), self.joint.friction, elastic, x, angle, lost)
+        return Plain(bool(strain), self.joint.friction, elastic, x, NODES[1], angle, lost)
 
-    def way_off(self) -> Array:
-        """The errors of the law on the way back, over the largest force."""
-        law = law_of_numbers(joint_numbers(self.joint), flows(self.joint), self.joint.friction)
-        x, y = self.back.T
-        told = law.at(np.minimum(x, NODES[-1]), min(x[0], NODES[-1])).load
-        return (told - y)[1:] / y[0]
+    @property
+    def way_changed(self) -> Array:
+        """What it changes in P on the way back, over the largest P."""
+        with_ = self.back[:, 1] / self.back[0, 1]
+        without = self.back_without[:, 1] / self.back_without[0, 1]
+        return (with_ - without)[1:]
 
 
-def rubbed_in(folder: Path) -> list[Rubbed]:
+def changed_in(folder: Path) -> list[Changed]:
     """The pairs of runs of the sweep in ``folder``."""
     runs = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
     solved = solved_joints(Run(run).curve for run in runs)
     pairs = []
     for joint, (run, *_) in solved.items():
-        bare = replace(joint, friction=0.0)
-        if joint.friction and bare in solved:
-            pairs.append(Rubbed.of(joint, solved[bare][0], run))
+        bare = replace(joint, friction=0.0, large_strain=False)
+        if bare != joint and bare in solved:
+            pairs.append(Changed.of(joint, solved[bare][0], run))
     return pairs
 
 
-def fit_gain(joints: list[Rubbed]) -> dict[str, Array]:
+def fit_gain(joints: list[Changed]) -> dict[str, Array]:
     """The coefficients of `PRODUCTS` ``(3, terms)`` by plane; each joint counts alike."""
     found = {}
-    for plane in sorted({joint.rubbing.plane for joint in joints}):
+    for plane in sorted({joint.plain.plane for joint in joints}):
         rows = [np.eye(len(PRODUCTS)) / _LIKELY]
         right = [np.zeros((len(PRODUCTS), 3))]
         for joint in joints:
-            rubbing = joint.rubbing
-            if rubbing.plane == plane:
-                weight = 1 / (_SCATTER * np.sqrt(len(rubbing.x) / _PARTS))
-                rows.append(weight * (rubbing.scale(NODES[1]) * rubbing.terms()).T)
+            plain = joint.plain
+            if plain.plane == plane:
+                weight = 1 / (_SCATTER * np.sqrt(len(plain.x) / _PARTS))
+                rows.append(weight * (plain.scale(joint.kind) * plain.terms()).T)
                 right.append(weight * joint.added.T)
         values, *_ = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right))
         found[plane] = values.T
     return found
 
 
-def predicted(joints: list[Rubbed]) -> Iterator[tuple[Rubbed, Array]]:
-    """Each joint, and what is `Rubbed.added` as the other parts of the joints give it."""
+def predicted(joints: list[Changed]) -> Iterator[tuple[Changed, Array]]:
+    """Each joint, and what is `Changed.added` as the other parts of the joints give it."""
     for part in range(_PARTS):
         others = [joint for i, joint in enumerate(joints) if i % _PARTS != part]
         model = fit_gain(others)
         for joint in joints[part::_PARTS]:
-            rubbing = joint.rubbing
-            yield joint, rubbing.scale(NODES[1]) * (model[rubbing.plane] @ rubbing.terms())
+            plain = joint.plain
+            yield joint, plain.scale(joint.kind) * (model[plain.plane] @ plain.terms())
 
 
-def errors_of(joints: list[Rubbed]) -> tuple[dict[str, float], Table]:
+def errors_of(joints: list[Changed]) -> tuple[dict[str, float], Table]:
     """The factors of the expected error by plane; and the errors from 0.1 to 2 dR, in per cent, of
-    what friction does to joints that the others predict, beside the rms and the largest of what it
-    does."""
+    what friction or large strain does to joints that the others predict, beside the rms and the
+    largest of what it does."""
     told = list(predicted(joints))
     factors = {}
     quantities = [f"{name}{what}" for name in ("P", "p0", "eps") for what in ("", ", error")]
     table = Table("plane", "joints", *quantities, "P inside", left=1)
     for plane in ("strain", "stress"):
-        members = [(joint, said) for joint, said in told if joint.rubbing.plane == plane]
+        members = [(joint, said) for joint, said in told if joint.plain.plane == plane]
         added = np.concatenate([joint.added[:, joint.usual] for joint, _ in members], axis=1)
         said = np.concatenate([said[:, joint.usual] for joint, said in members], axis=1)
-        scale = np.concatenate([joint.rubbing.scale(NODES[1])[joint.usual] for joint, _ in members])
+        scale = np.concatenate([joint.plain.scale(joint.kind)[joint.usual] for joint, _ in members])
         off = said - added
         factors[plane] = float(f"{np.quantile(np.abs(off[0]) / scale, _WITHIN):.3g}")
         inside = np.abs(off[0]) <= factors[plane] * scale
@@ -149,37 +162,37 @@ def errors_of(joints: list[Rubbed]) -> tuple[dict[str, float], Table]:
     return factors, table
 
 
-def back_factors(joints: list[Rubbed]) -> dict[str, float]:
-    """The factors of the expected error on the way back by plane."""
+def back_factors(joints: list[Changed]) -> dict[str, float]:
+    """The factors of the expected error on the way back by plane: the law lets P fall there as
+    without friction or large strain."""
     factors = {}
     for plane in ("strain", "stress"):
         shares = []
         for joint in joints:
-            rubbing = joint.rubbing
-            if rubbing.plane == plane and len(joint.back) > 1:
-                shares.append(np.abs(joint.way_off()) / rubbing.scale(NODES[1])[-1])
+            plain = joint.plain
+            if plain.plane == plane and len(joint.back) > 1:
+                shares.append(np.abs(joint.way_changed) / plain.scale(joint.kind)[-1])
         factors[plane] = float(f"{np.quantile(np.concatenate(shares), _WITHIN):.3g}")
     return factors
 
 
-def store(table: dict[str, Any]) -> None:
-    """Write the ``table`` beside this file, and use it from now on."""
+def store(kind: str, model: dict[str, Any]) -> None:
+    """Write the ``model`` of this ``kind`` beside this file, and use it from now on."""
+    table = json.loads(TABLE.read_text(encoding="utf-8")) | {kind: model}
     TABLE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
-    friction_model.cache_clear()
+    factor_model.cache_clear()
 
 
 def main(folder: Path) -> None:
     """Fit to the sweep in ``folder``, write the table beside this file, and print how good it
     is."""
-    joints = rubbed_in(folder)
+    joints = changed_in(folder)
     factors, errors = errors_of(joints)
     gains = {
         plane: [[float(f"{value:.5g}") for value in row] for row in values]
         for plane, values in fit_gain(joints).items()
     }
-    table: dict[str, Any] = {"gain": gains, "error": factors}
-    store(table | {"back error": dict.fromkeys(factors, 0.0)})
-    store(table | {"back error": back_factors(joints)})
+    store(joints[0].kind, {"gain": gains, "error": factors, "back error": back_factors(joints)})
     print(errors.markdown())
 
 
