@@ -63,7 +63,11 @@ class LinearSystem:
     def _strategy(self) -> Strategy:
         if self.border:
             return self.border
-        return self.tangent.condensed or self._factoriser(self.tangent.A)
+        if self.tangent.condensed is not None:
+            return self.tangent.condensed
+        strategy = self._factoriser(self.tangent.A)
+        strategy.product = self.tangent.product
+        return strategy
 
     def update(self, *, factorise: bool = True) -> None:
         """Assemble the tangent of the last evaluation, to be factorised or not."""

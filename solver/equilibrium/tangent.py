@@ -17,11 +17,13 @@ from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.assembly import assemble, matrix
 from archord.solver.contact.tangent import Filled
 from archord.solver.equilibrium.evaluation import Evaluation
+from archord.solver.linear.block_product import BlockProduct
 from archord.solver.linear.condensed import Condensed
 from archord.solver.linear.strategy import Sum
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 _WITHOUT_COPY = 3  # dimension from which on elastic joints have no copy of their matrix
+_WITH_PRODUCT = 3  # dimension from which on much of the matrix is room for contact
 _SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
 Revise = Callable[[Array], Array | None]
 
@@ -45,6 +47,7 @@ class TangentMatrix:
     """The tangent of the last ``evaluation``, assembled by `update`. Collective.
 
     A : matrix of all displacements
+    product : multiplies as ``A`` does, quicker in space
     condensed : where ``revise`` is given (see `Condensed`), for elastic bodies which their
         supports hold: the contact, which ``A`` lacks then; else None
     factorisations : number of factorisations of sparse matrices that `update` asked for
@@ -69,6 +72,7 @@ class TangentMatrix:
         self._bcs = [self._held(axis) for axis in range(self.dimension)]
         self._prescribed, self._rates = self._prescribed_rates()
         self.A = PETSc.Mat()
+        self.product = PETSc.Mat()
         # the constant part, with room for all; in space none of elastic joints, as it is large
         self._elastic = PETSc.Mat()
         self.condensed: Condensed | None = None
@@ -133,6 +137,9 @@ class TangentMatrix:
         changes = self.bulk.plastic or self.bulk.finite or self.springs
         if changes or self.dimension < _WITHOUT_COPY:
             self._elastic = self.A.copy()
+        self.product = self.A
+        if self.dimension >= _WITH_PRODUCT:
+            self.product = BlockProduct(self.A).matrix()
 
     def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
         in_matrix = (rows < self._size) & (columns < self._size)
@@ -194,7 +201,7 @@ class TangentMatrix:
             change.setType("aij")
             change.setUp()
             self._add_contact(change, changes)
-        return Sum(self.A, change).matrix(), [self._of_contact, changes]
+        return Sum(self.product, change).matrix(), [self._of_contact, changes]
 
     def border(self, of_contact: list[Filled] | None = None) -> tuple[Array, Array, Array]:
         """The border of the matrix, of the ``m`` unknown levels: derivatives ``B`` ``(n_owned dofs,

@@ -144,7 +144,7 @@ class NewtonSolver:
         """Solve with the tangent as it is chosen."""
         self._strategy = self._system.strategy
         for snes in self._solvers.values():
-            snes.setJacobian(self._guarded(self._jacobian), self._strategy.matrix)
+            snes.setJacobian(self._guarded(self._jacobian), *self._strategy.operators())
         self._strategy.attach(self._ksp)
         if self._lagged is not None:
             self._lagged.attach(self._ksp)
