@@ -39,7 +39,7 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
     is damaged, or one that would be written is there already and ``force`` is not given."""
     import pandas as pd
 
-    from archord.postprocess.frames import write_frame
+    from archord.postprocess.arrays.frames import write_frame
 
     run.number(None)
     tables = {folder / "history.csv": run.history}

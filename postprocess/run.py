@@ -19,7 +19,6 @@ from archord.materials.kinematics import Kinematics, kinematics
 from archord.output.files.seal import ChangedError, read_report, require_intact
 from archord.output.folder import is_sweep
 from archord.output.history import fault_of_history, read_history
-from archord.postprocess.arc import read_contact
 from archord.postprocess.around_axis import (
     ALONG_Z,
     ORIGIN,
@@ -29,9 +28,11 @@ from archord.postprocess.around_axis import (
     line_load,
     unrolled,
 )
+from archord.postprocess.arrays.arc import read_contact
+from archord.postprocess.arrays.fields import BODIES, Fields, read_fields, read_points
 from archord.postprocess.curve import CURVES, RunCurve
-from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
-from archord.postprocess.probe import Probe, probe
+from archord.postprocess.probes.ask import probe
+from archord.postprocess.probes.probe import Probe
 from archord.presets.views import view_of
 from archord.report.errors import InputError
 from archord.scene.file import load_scene
@@ -143,7 +144,7 @@ class Run:
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of
         every column."""
-        from archord.postprocess.frames import frame_of
+        from archord.postprocess.arrays.frames import frame_of
 
         return frame_of(self.columns, self.units).astype(dict.fromkeys(_WHOLE, int))
 
@@ -233,7 +234,7 @@ class Run:
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
         """`contact` as a table with a row for each point; of one ``side`` if given. Raises
         `InputError`."""
-        from archord.postprocess.frames import contact_frame
+        from archord.postprocess.arrays.frames import contact_frame
 
         arcs = {side: self.arc(step, side)} if side else self.contact(step)
         return contact_frame(arcs, self.scene)
@@ -284,7 +285,7 @@ class Run:
         line: Sequence[float] = (),
     ) -> Probe:
         """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1, in space
-        x0, y0, z0, x1, y1, z1 (von Mises'): see `archord.postprocess.probe.probe`. Raises
+        x0, y0, z0, x1, y1, z1 (von Mises'): see `archord.postprocess.probes.ask.probe`. Raises
         `InputError`."""
         return probe(self, edge, quantity, self.number(step), line)
 

@@ -94,7 +94,7 @@ class Sweep:
         return self._read("sweep.csv", [])
 
     def _read(self, name: str, first: list[str]) -> pd.DataFrame:
-        from archord.postprocess.frames import read_frame
+        from archord.postprocess.arrays.frames import read_frame
 
         try:
             table = read_frame(self.folder / name)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.comparison import COMMON, COMPARED, Comparison, differing_keys
-from archord.postprocess.probe import Probe
+from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.report.doubts import kind
@@ -155,7 +155,7 @@ def named_table(
 
 
 def _table_of(frame: Any) -> Table:
-    from archord.postprocess.frames import with_headings  # with pandas
+    from archord.postprocess.arrays.frames import with_headings  # with pandas
 
     rows = frame.itertuples(index=False)
     return Table(*with_headings(frame), rows=(map(_cell, row) for row in rows))

@@ -35,6 +35,8 @@ ROOMS = [
     "presets",
     "output.files",
     "output",
+    "postprocess.arrays",
+    "postprocess.probes",
     "postprocess",
     "postprocess.judgement",
     "postprocess.pictures",

@@ -16,8 +16,8 @@ import numpy as np
 from archord.benchmarks.paper.figures import Part, X, Y, columns, strength
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs
 from archord.materials.material import Plane
+from archord.postprocess.arrays.fields import BODIES, read_fields
 from archord.postprocess.curve import RunCurve
-from archord.postprocess.fields import BODIES, read_fields
 from archord.postprocess.judgement.convergence import group
 from archord.postprocess.laws.calibration import fit_curve
 from archord.postprocess.laws.general.joint import LawJoint

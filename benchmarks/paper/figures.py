@@ -17,7 +17,7 @@ import numpy as np
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, MILD_YIELD, PLANES, Runs
 from archord.geometry.basis import Array
 from archord.materials.material import Plane
-from archord.postprocess.arc import read_contact
+from archord.postprocess.arrays.arc import read_contact
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from archord.materials.material import Array
+from archord.postprocess.arrays.fields import BODIES, Fields
 from archord.postprocess.curve import gap_name
-from archord.postprocess.fields import BODIES, Fields
 from archord.postprocess.pictures.problems import (
     draw_field,
     draw_outline,

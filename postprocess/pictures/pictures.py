@@ -14,7 +14,7 @@ from archord.output.user_file import writing
 from archord.postprocess.comparison import curves_of
 from archord.postprocess.curve import first_loading
 from archord.postprocess.pictures import joint, problems, solids
-from archord.postprocess.probe import Probe
+from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.presets.views import JointView, ProblemView
 from archord.report.errors import InputError
@@ -138,7 +138,7 @@ def draw_probe(probe: Probe, target: Path) -> Path:
     """Write ``probe`` as ``target``, a table if its name ends in .csv, else a picture; returns the
     file. Raises `InputError`."""
     if target.suffix == ".csv":
-        from archord.postprocess.frames import write_frame
+        from archord.postprocess.arrays.frames import write_frame
 
         return write_frame(probe.frame(), target)
     figure = new_figure(6.0, 4.4)

@@ -11,8 +11,8 @@ import numpy as np
 from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
-from archord.postprocess.fields import Fields
-from archord.postprocess.probe import Probe
+from archord.postprocess.arrays.fields import Fields
+from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.report.errors import InputError
 

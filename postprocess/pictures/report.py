@@ -15,7 +15,7 @@ import numpy as np
 
 from archord.measures.energies import ENERGIES
 from archord.output.user_file import check_target, writing
-from archord.postprocess.fields import Fields
+from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.pictures.pictures import panels_of
 from archord.postprocess.pictures.problems import draw_outline, frame
 from archord.postprocess.run import Run

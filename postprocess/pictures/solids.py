@@ -15,7 +15,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.output.files.vtkhdf import SECOND_ORDER
-from archord.postprocess.fields import Fields
+from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.pictures.problems import (
     OF_PEEQ,
     Colours,

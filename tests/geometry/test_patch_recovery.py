@@ -11,7 +11,7 @@ from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
 from archord.materials.elasticity import Elastic, principal_stresses, von_mises
 from archord.output.fields import FieldWriter, collect_fields, collect_mesh
-from archord.postprocess.fields import read_fields
+from archord.postprocess.arrays.fields import read_fields
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Problem

@@ -22,7 +22,7 @@ from archord.postprocess.export import export_vtk
 from archord.postprocess.pictures.pictures import panels_of
 from archord.postprocess.pictures.report import write_report
 from archord.postprocess.pictures.solids import skin_of
-from archord.postprocess.probe_in_space import located
+from archord.postprocess.probes.located import located
 from tests import forked
 from tests.output.run_files import accepted_steps
 from tests.postprocess.vtk_reader import VtkFile

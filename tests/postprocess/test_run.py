@@ -11,8 +11,8 @@ import pytest
 
 import archord
 from archord.benchmarks.case import paper_joint
+from archord.postprocess.arrays.fields import BODIES
 from archord.postprocess.chord import read_chord_pressure
-from archord.postprocess.fields import BODIES
 from archord.postprocess.pictures.joint import magnification, magnified
 from tests.output.run_files import rewrite_report
 

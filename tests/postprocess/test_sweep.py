@@ -8,7 +8,7 @@ import pytest
 
 import archord
 from archord.cli import run as command
-from archord.postprocess.frames import read_frame
+from archord.postprocess.arrays.frames import read_frame
 from tests.studies import parts
 from tests.studies.parts import STUCK
 

@@ -1,4 +1,4 @@
-"""Points inside bodies in space, and the edges where their named surfaces meet."""
+"""Points inside bodies in space."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.output.files.xdmf import CELLS
-from archord.postprocess.fields import EDGES, Fields
-from archord.report.errors import InputError
+from archord.postprocess.arrays.fields import Fields
 
 _BULGE = 0.1  # of a cell's size, by which a curved cell may reach beyond its nodes
 _NEWTON = 10
@@ -59,42 +58,3 @@ def _reached(nodes: Array, point: Array) -> tuple[Array, Array]:
     far_sides = X.sum(axis=1) - 1 if is_simplex else X - 1
     beyond_sides = np.column_stack([-X, far_sides])
     return tabulate(kind, 2, X)[0], beyond_sides.max(axis=1)
-
-
-def meeting(fields: Fields, edge: str) -> np.ndarray:
-    """Nodes ``(k, 3)`` along the edge "A & B" where two named surfaces meet. Raises `InputError`
-    for other names, and for surfaces that do not meet in one curve."""
-    sides = [name.strip() for name in edge.split("&")]
-    if len(sides) != 2 or not fields.edges.keys() >= {*sides}:
-        known = ", ".join(fields.edges) or "none"
-        raise InputError(
-            f'edge {edge!r}: in space an edge is "A & B", where two of the surfaces meet: {known}.'
-        )
-    one, other = (_edges_of(fields.edges[name]) for name in sides)
-    shared = one[np.isin(one[:, 1], other[:, 1])]  # edges have their middles alone
-    _, once = np.unique(shared[:, 1], return_index=True)
-    return _chained(shared[once], edge)
-
-
-def _edges_of(faces: np.ndarray) -> np.ndarray:
-    """The edges ``(k, 3)`` of ``faces`` ``(m, 6)`` or ``(m, 9)``."""
-    return faces[:, EDGES[faces.shape[1]]].reshape(-1, 3)
-
-
-def _chained(edges: np.ndarray, name: str) -> np.ndarray:
-    """The ``edges`` ``(k, 3)`` in the order of one curve, each turned along it. Raises
-    `InputError`."""
-    vertices, count = np.unique(edges[:, [0, 2]], return_counts=True)
-    ends = vertices[count == 1]
-    at = int(ends[0]) if len(ends) else int(vertices.min(initial=0))
-    left = [(int(start), middle, int(end)) for start, middle, end in edges]
-    chain = []
-    while following := [edge for edge in left if at in (edge[0], edge[2])]:
-        start, middle, end = following[0]
-        left.remove(following[0])
-        onward = end if start == at else start
-        chain.append((at, middle, onward))
-        at = onward
-    if left or not chain or count.max() > 2:
-        raise InputError(f"edge {name!r}: the surfaces do not meet in one curve.")
-    return np.array(chain)

@@ -15,7 +15,7 @@ from archord.materials.elasticity import principal_stresses, von_mises
 from archord.materials.kinematics import PLANE_STRAIN, kinematics
 from archord.materials.material import Array
 from archord.output.files.step_file import all_arrays, step_name
-from archord.postprocess.arc import opened
+from archord.postprocess.arrays.arc import opened
 from archord.report.errors import InputError
 from archord.scene.sections.errors import toml_value
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from archord.output.user_file import writing
-from archord.postprocess.arc import undeformed
+from archord.postprocess.arrays.arc import undeformed
 from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")

@@ -1,0 +1,1 @@
+"""Fields and contact of a step of a run, as arrays and tables."""

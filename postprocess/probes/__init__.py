@@ -1,0 +1,1 @@
+"""Quantities along edges and lines of runs."""

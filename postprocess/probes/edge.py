@@ -1,0 +1,110 @@
+"""Stresses and other quantities at the nodes of an edge, in a plane and in space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.geometry.vectors import unit
+from archord.materials.kinematics import kinematics
+from archord.materials.material import Array
+from archord.postprocess.arrays.fields import Fields
+from archord.postprocess.probes.angles import angles_about, rising
+from archord.postprocess.probes.meeting import meeting
+from archord.postprocess.probes.probed import Along, Probed, nodal
+from archord.report.errors import InputError
+
+_SMOOTH = 0.9  # cosine of the angle between facets without a corner
+
+
+def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
+    """Values at the nodes of an edge, with the stress along it and across."""
+    fields = run.fields(step)
+    if run.kinematics.dimension == 3:
+        return _at_meeting(run, fields, edge, quantity)
+    edges = [name for name, facets in fields.edges.items() if len(facets)]
+    if edge not in edges:
+        known = ", ".join(edges) or "none"
+        raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {known}.")
+    nodes, s, radius = _along(fields, edge)
+    tangent, joined = _tangents(fields.coordinates[nodes], nodes)
+    stresses = {}
+    if fields.stress is not None:
+        xx, yy, across, xy = np.moveaxis(fields.stress[nodes], -1, 0)
+        c, d = np.moveaxis(tangent, -1, 0)
+        along = xx * c**2 + yy * d**2 + 2 * xy * c * d
+        shear = (yy - xx) * c * d + xy * (c**2 - d**2)
+        stresses = {"hoop": along, "normal": xx + yy - along, "shear": shear}
+        if kinematics(run.scene.analysis.plane).has_hoop:
+            stresses |= {"along": along, "hoop": across}
+    shown = np.ones(nodes.shape, dtype=bool)
+    shown[:, 2] = ~joined
+    values = nodal(run, fields, quantity, nodes, **stresses)
+    angle = np.degrees(s[shown] / radius) if radius else None
+    return Along(fields.coordinates[nodes][shown], s[shown], values[shown], angle)
+
+
+def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> Along:
+    """Values at the nodes where two surfaces in space meet, with the stress along the edge."""
+    from archord.geometry.curve import Curve
+
+    nodes = meeting(fields, edge)
+    s = Curve(fields.coordinates, 2, nodes).arc_length(np.array([0.0, 0.5, 1.0]))
+    tangent, joined = _tangents(fields.coordinates[nodes], nodes)
+    stresses = {}
+    if fields.stress is not None:
+        xx, yy, zz, xy, yz, zx = np.moveaxis(fields.stress[nodes], -1, 0)
+        a, b, c = np.moveaxis(tangent, -1, 0)
+        normal = xx * a**2 + yy * b**2 + zz * c**2
+        stresses["hoop"] = normal + 2 * (xy * a * b + yz * b * c + zx * c * a)
+    shown = np.ones(nodes.shape, dtype=bool)
+    shown[:, 2] = ~joined
+    values = nodal(run, fields, quantity, nodes, **stresses)
+    return Along(fields.coordinates[nodes][shown], s[shown], values[shown])
+
+
+def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
+    """Nodes ``(k, 3)`` along the facets of an ``edge``, piece by piece, with the body on the left,
+    but on arcs counterclockwise; ``s`` ``(k, 3)`` of a `Probe` there, and the radius of an arc
+    (else 0)."""
+    from archord.geometry.curve import Curve, circle_through, in_pieces
+
+    x = fields.coordinates
+    nodes = fields.facets()
+    nodes = nodes[np.isin(nodes[:, 1], fields.edges[edge][:, 1])]
+    nodes = nodes[np.unique(nodes[:, 1], return_index=True)[1]]
+    height = x[nodes[:, 0]] @ [1.0, 1e-3]
+    radius = 0.0
+    circle = circle_through(x[np.unique(nodes)])
+    if circle is not None:
+        centre, radius = circle
+        begin = angles_about(x[nodes[:, 0]], centre)
+        end = angles_about(x[nodes[:, 2]], centre)
+        turned = (end - begin + 180) % 360 - 180
+        if turned.sum() < 0:
+            nodes = nodes[:, ::-1]
+            begin, end = end, begin
+        height = rising(begin, begin, end)
+    if len(np.unique(nodes[:, 0])) < len(nodes):
+        raise InputError(
+            f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it."
+        )
+    order = in_pieces(nodes[:, 0], nodes[:, 2], height)
+    s = Curve(x, 2, nodes[order]).arc_length(np.array([0.0, 0.5, 1.0]))
+    if radius:
+        s += radius * np.radians(height[order])[:, None] - s[:, :1]
+    return nodes[order], s, radius
+
+
+def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet
+    without a corner their mean; and which facets ``(k,)`` are so followed by the next."""
+    by_ends = [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]]  # of the parabola, at its nodes
+    tangent = unit(np.einsum("qa,fai->fqi", by_ends, x))
+    here, after = np.nonzero(nodes[:, 2:] == nodes[:, 0])
+    smooth = (tangent[here, 2] * tangent[after, 0]).sum(axis=1) > _SMOOTH
+    here = here[smooth]
+    after = after[smooth]
+    mean = unit(tangent[here, 2] + tangent[after, 0])
+    tangent[here, 2] = mean
+    tangent[after, 0] = mean
+    return tangent, np.isin(np.arange(len(nodes)), here[after == here + 1])

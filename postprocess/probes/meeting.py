@@ -1,0 +1,47 @@
+"""The edges where named surfaces of bodies in space meet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.postprocess.arrays.fields import EDGES, Fields
+from archord.report.errors import InputError
+
+
+def meeting(fields: Fields, edge: str) -> np.ndarray:
+    """Nodes ``(k, 3)`` along the edge "A & B" where two named surfaces meet. Raises `InputError`
+    for other names, and for surfaces that do not meet in one curve."""
+    sides = [name.strip() for name in edge.split("&")]
+    if len(sides) != 2 or not fields.edges.keys() >= {*sides}:
+        known = ", ".join(fields.edges) or "none"
+        raise InputError(
+            f'edge {edge!r}: in space an edge is "A & B", where two of the surfaces meet: {known}.'
+        )
+    one, other = (_edges_of(fields.edges[name]) for name in sides)
+    shared = one[np.isin(one[:, 1], other[:, 1])]  # edges have their middles alone
+    _, once = np.unique(shared[:, 1], return_index=True)
+    return _chained(shared[once], edge)
+
+
+def _edges_of(faces: np.ndarray) -> np.ndarray:
+    """The edges ``(k, 3)`` of ``faces`` ``(m, 6)`` or ``(m, 9)``."""
+    return faces[:, EDGES[faces.shape[1]]].reshape(-1, 3)
+
+
+def _chained(edges: np.ndarray, name: str) -> np.ndarray:
+    """The ``edges`` ``(k, 3)`` in the order of one curve, each turned along it. Raises
+    `InputError`."""
+    vertices, count = np.unique(edges[:, [0, 2]], return_counts=True)
+    ends = vertices[count == 1]
+    at = int(ends[0]) if len(ends) else int(vertices.min(initial=0))
+    left = [(int(start), middle, int(end)) for start, middle, end in edges]
+    chain = []
+    while following := [edge for edge in left if at in (edge[0], edge[2])]:
+        start, middle, end = following[0]
+        left.remove(following[0])
+        onward = end if start == at else start
+        chain.append((at, middle, onward))
+        at = onward
+    if left or not chain or count.max() > 2:
+        raise InputError(f"edge {name!r}: the surfaces do not meet in one curve.")
+    return np.array(chain)
