@@ -21,8 +21,10 @@ from archord.benchmarks.peers.joint_script import axis_pressure
 from archord.benchmarks.timing import Failure, Process, run_once, solving
 from archord.geometry.basis import Array
 from archord.materials.elasticity import von_mises
-from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
+from archord.postprocess.decks.deck import deck, system_of
 from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label, surface_name
+from archord.postprocess.decks.model import thickness
+from archord.postprocess.decks.moved import moved_sets
 from archord.postprocess.run import Run
 from archord.presets.views import view_of
 from archord.report.table import Table

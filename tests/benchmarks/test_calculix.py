@@ -19,8 +19,9 @@ from archord.benchmarks.peers.calculix import (
 )
 from archord.benchmarks.peers.joint_script import axis_pressure
 from archord.benchmarks.timing import run_once
-from archord.postprocess.decks.deck import contact_stiffness, system_of
+from archord.postprocess.decks.deck import system_of
 from archord.postprocess.decks.mesh import deck_mesh
+from archord.postprocess.decks.model_lines import contact_stiffness
 
 # Written by CalculiX 2.20 for this scene, quadratic elements; of the .frd displacements and
 # contact.

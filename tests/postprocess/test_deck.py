@@ -26,13 +26,12 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.kinematic import KinematicMaterial
 from archord.materials.kinematics import AXISYMMETRIC
 from archord.postprocess.decks.deck import (
-    _Writer,
-    contact_stiffness,
     deck,
     system_of,
-    thickness,
 )
 from archord.postprocess.decks.mesh import deck_mesh
+from archord.postprocess.decks.model import DeckModel, thickness
+from archord.postprocess.decks.model_lines import contact_stiffness
 from archord.scene.file import resolved
 from archord.solver.path.system import System
 from archord.solver.problem import (
@@ -403,7 +402,7 @@ def test_a_rigid_disc_around_an_axis_is_refused():
     disc = SimpleNamespace(surfaces=(Rigid(RigidCircle((0.0, 9.0), 1.0)), "top"))
     problem = SimpleNamespace(kinematics=AXISYMMETRIC, interactions=[disc])
     with pytest.raises(ValueError, match="a rigid disc cannot be exported around an axis"):
-        _Writer(SimpleNamespace(problem=problem), None)
+        DeckModel(SimpleNamespace(problem=problem), None)
 
 
 @pytest.mark.parametrize("unit", [1000.0, 1e-3])
