@@ -14,6 +14,7 @@ from archord.postprocess.probes.probed import Along, Probed, nodal
 from archord.report.errors import InputError
 
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
+_NODES = np.array([0.0, 0.5, 1.0])  # of a facet, along it
 
 
 def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
@@ -29,18 +30,25 @@ def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
     tangent, joined = _tangents(fields.coordinates[nodes], nodes)
     stresses = {}
     if fields.stress is not None:
-        xx, yy, across, xy = np.moveaxis(fields.stress[nodes], -1, 0)
-        c, d = np.moveaxis(tangent, -1, 0)
-        along = xx * c**2 + yy * d**2 + 2 * xy * c * d
-        shear = (yy - xx) * c * d + xy * (c**2 - d**2)
-        stresses = {"hoop": along, "normal": xx + yy - along, "shear": shear}
+        stresses = _stresses(fields.stress[nodes], tangent)
         if kinematics(run.scene.analysis.plane).has_hoop:
-            stresses |= {"along": along, "hoop": across}
-    shown = np.ones(nodes.shape, dtype=bool)
-    shown[:, 2] = ~joined
+            stresses["along"] = stresses["hoop"]
+            stresses["hoop"] = fields.stress[nodes][..., 2]
     values = nodal(run, fields, quantity, nodes, **stresses)
-    angle = np.degrees(s[shown] / radius) if radius else None
-    return Along(fields.coordinates[nodes][shown], s[shown], values[shown], angle)
+    found = _once(fields, nodes, joined, s, values)
+    if not radius:
+        return found
+    return found._replace(angle=np.degrees(found.s / radius))
+
+
+def _stresses(stress: Array, tangent: Array) -> dict[str, Array]:
+    """The stress along an edge, across it, and their shear ``(k, 3)``, of the ``stress`` ``(k, 3,
+    4)`` in axes."""
+    xx, yy, _, xy = np.moveaxis(stress, -1, 0)
+    c, d = np.moveaxis(tangent, -1, 0)
+    along = xx * c**2 + yy * d**2 + 2 * xy * c * d
+    shear = (yy - xx) * c * d + xy * (c**2 - d**2)
+    return {"hoop": along, "normal": xx + yy - along, "shear": shear}
 
 
 def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> Along:
@@ -48,18 +56,25 @@ def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> Along:
     from archord.geometry.curve import Curve
 
     nodes = meeting(fields, edge)
-    s = Curve(fields.coordinates, 2, nodes).arc_length(np.array([0.0, 0.5, 1.0]))
+    s = Curve(fields.coordinates, 2, nodes).arc_length(_NODES)
     tangent, joined = _tangents(fields.coordinates[nodes], nodes)
     stresses = {}
     if fields.stress is not None:
         xx, yy, zz, xy, yz, zx = np.moveaxis(fields.stress[nodes], -1, 0)
         a, b, c = np.moveaxis(tangent, -1, 0)
         normal = xx * a**2 + yy * b**2 + zz * c**2
-        stresses["hoop"] = normal + 2 * (xy * a * b + yz * b * c + zx * c * a)
+        shear = xy * a * b + yz * b * c + zx * c * a
+        stresses["hoop"] = normal + 2 * shear
+    values = nodal(run, fields, quantity, nodes, **stresses)
+    return _once(fields, nodes, joined, s, values)
+
+
+def _once(fields: Fields, nodes: np.ndarray, joined: np.ndarray, s: Array, values: Array) -> Along:
+    """``values`` and ``s`` ``(k, 3)`` at the ``nodes`` ``(k, 3)`` of facets, each node once: the
+    last node of a facet that is ``joined`` to the next one is the first node there."""
     shown = np.ones(nodes.shape, dtype=bool)
     shown[:, 2] = ~joined
-    values = nodal(run, fields, quantity, nodes, **stresses)
-    return Along(fields.coordinates[nodes][shown], s[shown], values[shown])
+    return Along(fields.coordinates[nodes[shown]], s[shown], values[shown])
 
 
 def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
@@ -69,9 +84,11 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     from archord.geometry.curve import Curve, circle_through, in_pieces
 
     x = fields.coordinates
-    nodes = fields.facets()
-    nodes = nodes[np.isin(nodes[:, 1], fields.edges[edge][:, 1])]
-    nodes = nodes[np.unique(nodes[:, 1], return_index=True)[1]]
+    all_facets = fields.facets()
+    on_edge = np.isin(all_facets[:, 1], fields.edges[edge][:, 1])
+    nodes = all_facets[on_edge]
+    _, once = np.unique(nodes[:, 1], return_index=True)
+    nodes = nodes[once]
     height = x[nodes[:, 0]] @ [1.0, 1e-3]
     radius = 0.0
     circle = circle_through(x[np.unique(nodes)])
@@ -89,10 +106,12 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
             f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it."
         )
     order = in_pieces(nodes[:, 0], nodes[:, 2], height)
-    s = Curve(x, 2, nodes[order]).arc_length(np.array([0.0, 0.5, 1.0]))
+    nodes = nodes[order]
+    s = Curve(x, 2, nodes).arc_length(_NODES)
     if radius:
-        s += radius * np.radians(height[order])[:, None] - s[:, :1]
-    return nodes[order], s, radius
+        begin_of_facets = radius * np.radians(height[order])
+        s += begin_of_facets[:, None] - s[:, :1]
+    return nodes, s, radius
 
 
 def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
@@ -101,10 +120,12 @@ def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
     by_ends = [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]]  # of the parabola, at its nodes
     tangent = unit(np.einsum("qa,fai->fqi", by_ends, x))
     here, after = np.nonzero(nodes[:, 2:] == nodes[:, 0])
-    smooth = (tangent[here, 2] * tangent[after, 0]).sum(axis=1) > _SMOOTH
+    cosine = (tangent[here, 2] * tangent[after, 0]).sum(axis=1)
+    smooth = cosine > _SMOOTH
     here = here[smooth]
     after = after[smooth]
     mean = unit(tangent[here, 2] + tangent[after, 0])
     tangent[here, 2] = mean
     tangent[after, 0] = mean
-    return tangent, np.isin(np.arange(len(nodes)), here[after == here + 1])
+    followed = here[after == here + 1]
+    return tangent, np.isin(np.arange(len(nodes)), followed)
