@@ -2,9 +2,11 @@
  * The law of any pin joint: force, pressure, contact angle, way back and expected error by displacement.
  *
  * A port of archord's postprocess/laws/general, whose docstrings have the equations and their sources: elastic_model.py,
- * gaussian_process.py, yield_model.py, hardening_model.py, general_law.py and joint_curve.py, in this order. Numbers come
- * from the same files; tests compare the two.
+ * gaussian_process.py, yield_model.py, hardening_model.py, general_law.py and joint_curve.py, in this order; factor_model.py
+ * is in factors.mjs. Numbers come from the same files; tests compare the two.
  */
+
+import { addedBy } from "./factors.mjs";
 
 // --- numbers
 
@@ -596,7 +598,7 @@ export function faultsOf(joint) {
 }
 
 /** The joint of two bodies, each {E, nu, yield, hardening}, or a rigid pin (null). */
-export function jointOf({ radius, clearance, plane, length, pin, block }) {
+export function jointOf({ radius, clearance, plane, length, friction, large_strain, pin, block }) {
     const modulus = ({ E, nu }) => (plane === "strain" ? E / (1 - nu ** 2) : E);
     const wall = modulus(block);
     const own = pin ? modulus(pin) : Infinity;
@@ -605,6 +607,8 @@ export function jointOf({ radius, clearance, plane, length, pin, block }) {
         clearance,
         plane,
         length,
+        friction,
+        large_strain,
         E_star: pin ? 1 / (1 / own + 1 / wall) : wall,
         pin_share: pin ? 1 / (1 + own / wall) : 0,
         nu: block.nu,
@@ -628,7 +632,7 @@ function numbersOf(joint) {
 
 /** What puts a joint outside the range of the law: parameter, value and range; empty inside. */
 export function outside(data, joint) {
-    const { nu: ofNu, clearances, ratios, smallest } = data.range;
+    const { nu: ofNu, clearances, ratios, smallest, friction } = data.range;
     const { strain, p, m, n, clearance, pin, block } = numbersOf(joint);
     const [pinNu, nu] = [m, n].map((value) => (strain ? value / (1 + value) : value));
     const softer = strain ? (1 - pinNu ** 2) / (1 - nu ** 2) : 1;
@@ -639,6 +643,7 @@ export function outside(data, joint) {
         ["dR/R", clearance, ...clearances],
         ["E(pin)/E(block)", stiffness, ratios[0], joint.pin_yield == null ? Infinity : ratios[1]],
         ["sigY R/(E* dR)", Math.min(pin, block), smallest[joint.plane], Infinity],
+        ["friction", joint.friction ?? 0, 0, friction],
     ];
     for (const [name, value, low, high] of checks) {
         if (!(low * (1 - 1e-3) <= value && value <= high * (1 + 1e-3))) {
@@ -672,14 +677,15 @@ export function generalLaw(data, joint) {
     else if (Math.min(stresses.pin, stresses.block) < Infinity) {
         lost = lossOf(data, numbers.strain, elastic, x.map(() => stresses), x);
     }
-    const tables = reduced(elastic, lost);
+    const tables = reduced(elastic, lost, addedBy(data, joint, { elastic, lost }, x));
     const force = joint.E_star * joint.clearance;
     const firstYield = joint.clearance * Math.min(begins(numbers.pin), begins(numbers.block));
     return new JointLaw({ ...tables, length: joint.clearance, force, pressure: numbers.unit, firstYield });
 }
 
-/** The tables of a joint in units of dR, E* dR and E* dR/R, with what is lost to yielding (null: elastic). */
-function reduced(elastic, lost) {
+/** The tables of a joint in units of dR, E* dR and E* dR/R, with what is lost to yielding (null: elastic) and what
+ * friction and large strain have added (null: neither). */
+function reduced(elastic, lost, added) {
     const x = NODES.slice(1);
     const base = x.map(elastic.at);
     let y = base.map((state) => state.y);
@@ -689,6 +695,7 @@ function reduced(elastic, lost) {
     const corner = straight(elastic.p * elastic.m, CORNER, CORNER_ERRORS);
     let error = x.map((place) => (lost || place < SMALL_X ? ELASTIC_ERROR : corner));
     let ratio = x.map(() => 1);
+    let travel = x;
     let toe = x.map(() => 0);
     let backError = x.map(() => 0);
     if (lost) {
@@ -701,11 +708,21 @@ function reduced(elastic, lost) {
         const unit = x.map((place, i) => (place * y[i]) / base[i].y);
         const travels = x.map((place, i) => clip(lost[i].travel * unit[i], 1e-3 * place, place));
         const opens = accumulate(x.map((place, i) => place - travels[i]), maximum);
-        const travel = x.map((place, i) => place - opens[i]);
+        travel = x.map((place, i) => place - opens[i]);
         toe = x.map((place, i) => clip(lost[i].toe * unit[i], 0, place - travel[i]));
-        ratio = ratios(x, base, y, travel);
         backError = error.map((own, i) => Math.hypot(own, lost[i].wayError));
     }
+    if (added) {
+        const rises = splineSlopes(x.map(Math.log), added.map(({ force }) => force), false);
+        dy = dy.map((slope, i) => (slope / y[i] + rises[i] / x[i]) * y[i] * Math.exp(added[i].force));
+        y = y.map((own, i) => own * Math.exp(added[i].force));
+        [y, dy] = rising(x, y, dy);
+        peak = peak.map((own, i) => own * Math.exp(added[i].peak));
+        angle = angle.map((own, i) => own * Math.exp(added[i].angle));
+        error = error.map((own, i) => Math.hypot(own, added[i].deviation));
+        backError = backError.map((own, i) => Math.hypot(own, added[i].wayError));
+    }
+    if (lost || added) ratio = ratios(x, base, y, travel);
     const roots = y.map(Math.sqrt);
     const peaks = peak.map((own, i) => own / roots[i]);
     const angles = angle.map((own, i) => Math.min(own, Math.PI / 2) / roots[i]);
@@ -724,7 +741,7 @@ function reduced(elastic, lost) {
         angle: [first.angle, ...angles],
         error: [error[0], ...error],
         back_error: [0, ...backError],
-        yields: lost !== null,
+        yields: Boolean(lost || added),
     };
     for (const name of ["ratio", "peak", "angle"]) tables[`d${name}`] = pchipSlopes(NODES, tables[name]);
     return tables;

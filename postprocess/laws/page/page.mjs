@@ -7,7 +7,7 @@ import { generalLaw, inDigits, inflated, jointOf, lawData } from "./law.mjs";
 const $ = (id) => document.getElementById(id);
 const POINTS = 300; // of a curve
 const SLIDER = 3000; // of the slider
-const FORM = ["diameter", "by", "fit", "take", "clearance", "length", "plane"];
+const FORM = ["diameter", "by", "fit", "take", "clearance", "length", "plane", "friction", "strain"];
 const OF_BODIES = ["metal", "E", "nu", "yield", "slope", "flow"];
 const FIELDS = [...FORM, ...["pin", "block"].flatMap((body) => OF_BODIES.map((name) => `${body}-${name}`)), "delta", "deepest"];
 const FAR = 10; // PEEQ to which a straight line of hardening goes
@@ -84,7 +84,9 @@ function asked() {
         clearance = positive("clearance", "The clearance");
     }
     const bodies = { pin: bodyOf("pin"), block: bodyOf("block") };
-    return { joint: jointOf({ radius: diameter / 2, clearance, plane: $("plane").value, length, ...bodies }), limits };
+    const friction = number("friction") ?? 0;
+    const ways = { plane: $("plane").value, friction, large_strain: $("strain").value === "large" };
+    return { joint: jointOf({ radius: diameter / 2, clearance, length, ...ways, ...bodies }), limits };
 }
 
 /** The law of a joint with another clearance; null where there is none. */

@@ -1,8 +1,8 @@
 """The law of any pin joint as one HTML file that needs neither Python nor a network: ``python3 -m
 archord.postprocess.laws.page.page docs/law.html``.
 
-The page holds the modules of JavaScript beside this file, and their data: what elastic_model.json,
-yield_model.json and yield_model.npz hold, the metals of named.toml, and the texts of the exports.
+The page holds the modules of JavaScript beside this file without their comments, and their data:
+the tables of the models of the law, the metals of named.toml, and the texts of the exports.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from archord.postprocess.laws.exports.file_forms import FILE_FORMS
 from archord.postprocess.laws.exports.program import Program
 from archord.postprocess.laws.general import (
     elastic_model,
+    factor_model,
     general_law,
     hardening_model,
     yield_model,
@@ -36,7 +37,8 @@ from archord.report.version import VERSION
 
 HERE = Path(__file__).parent
 FLOWS = {"hardens": "hardens", "perfect": "perfectly plastic", "elastic": "does not yield"}
-MODULES = ("law.mjs", "fits.mjs", "dents.mjs", "exports.mjs", "page.mjs")
+MODULES = ("factors.mjs", "law.mjs", "fits.mjs", "dents.mjs", "exports.mjs", "page.mjs")
+_ONLY_IN_MODULES = re.compile(r"^(import .*\n|export | */\*\*(?s:.*?)\*/\n|// .*\n)", re.M)
 _LENGTH = 12345.0  # which stands for any length of a pin
 _CURVES = ("force", "peak", "angle")
 
@@ -44,7 +46,7 @@ _CURVES = ("force", "peak", "angle")
 def law_page() -> str:
     """The text of the page."""
     words, arrays = law_data()
-    modules = [re.sub(r"^(import .*\n|export )", "", _source(name), flags=re.M) for name in MODULES]
+    modules = [_ONLY_IN_MODULES.sub("", _source(name)) for name in MODULES]
     return Template(_source("page.html")).substitute(
         pin=_body("pin", {"rigid": "rigid"}),
         block=_body("block", {}),
@@ -92,6 +94,7 @@ def law_data() -> tuple[str, bytes]:
             "strains": hardening_model.STRAINS.tolist(),
             "shares": hardening_model.SHARES.tolist(),
         },
+        "factors": {"products": factor_model.PRODUCTS, "models": _json(factor_model.TABLE)},
         "mesh": yield_model.MESH_ERROR,
         "range": _range(),
         "metals": metals(),
@@ -119,6 +122,7 @@ def _range() -> dict[str, Any]:
         "ratios": general_law.RATIOS,
         "smallest": general_law.SMALLEST_S,
         "gain": general_law.LARGEST_GAIN,
+        "friction": factor_model.LARGEST,
     }
 
 
