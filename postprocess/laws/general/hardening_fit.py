@@ -28,6 +28,7 @@ from archord.postprocess.laws.general.hardening_model import (
     Flow,
     Flows,
     Strains,
+    begins_of,
     flow_and_rise,
     flows,
     kind,
@@ -51,9 +52,9 @@ from archord.report.table import Table
 Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
 _RANGE = (0.05, 3.05)  # x of the data
 _USUAL = (0.099, 2.001)
-_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(10)])
+_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(12)])
 # how far from it coefficients are likely
-_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7), 1.0, 1.0])
+_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7), 1.0, 1.0, 1.0, 1.0])
 _SCATTER = 0.01  # of ln P of a joint, against which that counts
 _PARTS = 5  # of the joints, each of which the other parts predict
 _ITERATIONS = 6
@@ -107,6 +108,7 @@ class Hardened:
         were constant."""
         columns = np.zeros((2, len(TERMS), len(self.x)))
         means = mean_flows(self.given)
+        begins = begins_of(self.numbers)
         for i, mean in means.items():
             if np.isinf(self.numbers[5 + i]):
                 continue
@@ -116,7 +118,7 @@ class Hardened:
             of_s = (loss(self.numbers, Yielding(*higher), self.x).force - lost.force) / _SMALL
             strain = found.strain[i]
             _, rise = flow_and_rise(mean, strain)
-            at = At(self.x, found.s[i], rise, found.s[1 - i])
+            at = At(self.x, found.s[i], rise, found.s[1 - i], begins)
             slope = slope_at(mean, strain, found.s[i])
             back = slope * feedback(model[f"{self.plane} {body}"], self.numbers, body, at)
             part = of_s * slope / (1 - np.minimum(back, _STEEPEST))

@@ -5,7 +5,8 @@ whose logarithms are distributed normally.
     P(x) = P_pp(x; s_eff),   s_eff = s at eps_rep(x, s_eff),   s = sigY R/(E* dR)
 
 P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x and ln s_eff, of
-what the two bodies are, and of how the curve s(PEEQ) rises. hardening_model.json
+what the two bodies are, of how the curve s(PEEQ) rises, and of how near first yield by s_eff is:
+the first points that yield strain less than those later. hardening_model.json
 has its coefficients by plane and body, and factors of the expected error: hardening_fit.py makes
 it. p0, eps and the way back follow the same s_eff.
 """
@@ -21,16 +22,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.spline import spline_slopes
-from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss
+from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss, yield_places
 
 TABLE = Path(__file__).parent / "hardening_model.json"
 BODIES = ("pin", "block")
 # Products of inputs (see `terms`), of which ln(eps_rep R/dR) is a sum.
 TERMS = (
     *("1", "x", "s", "x x", "x s", "s s"),
-    *("share", "soft", "weaker", "apart", "clearance", "rise", "gain"),
+    *("share", "soft", "weaker", "apart", "clearance", "rise", "gain", "onset", "onset onset"),
 )
 _FACTORS = [names.split() for names in TERMS]
 _WIDTH = 0.7  # standard deviation of ln(strain)
@@ -46,6 +48,7 @@ _SMALL = 1e-6  # of a difference quotient
 # factors on the strains of pin and block ``(2, 3, 1)``: none, one on the pin's, one on the block's
 _SHIFTS = 1 + _SMALL * np.array([[[0.0], [1.0], [0.0]], [[0.0], [0.0], [1.0]]])
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
+_EARLIEST = 1.2  # x of first yield by s_eff over x, above which nothing has yielded
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
 _YIELDED = 0.02
@@ -100,12 +103,13 @@ def flow_and_rise(mean: Flow, strain: Array) -> tuple[Array, Array]:
 
 class At(NamedTuple):
     """Where eps_rep of a body is asked for, each ``(..., k)``: x, the body's s and its rise (see
-    `flow_and_rise`), and the other body's s."""
+    `flow_and_rise`), and the other body's s; and the x of first yield by s."""
 
     x: Array
     own: Array
     rise: Array
     other: Array
+    begins: Callable[[Array], Array]
 
 
 def terms(numbers: Sequence[float], body: str, at: At) -> Array:
@@ -126,11 +130,18 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
         "clearance": np.log(clearance / 0.005),
         "rise": at.rise,
         "gain": np.minimum(ls - np.log(first[BODIES.index(body)]), _LARGEST_GAIN),
+        "onset": np.minimum(at.begins(at.own) / at.x, _EARLIEST) ** 2,
     }
     products = np.empty((len(TERMS), *ls.shape))
     for k, names in enumerate(_FACTORS):
         products[k] = math.prod(inputs[name] for name in names)
     return products
+
+
+def begins_of(numbers: Sequence[float]) -> Callable[[Array], Array]:
+    """About the x of first yield by s of the joint with these ``numbers``."""
+    strain, *of_bodies, _, _ = numbers
+    return yield_places(elastic_model(), bool(strain), Elastic(*of_bodies))
 
 
 def representative(
@@ -140,6 +151,7 @@ def representative(
     as ``given``; ``model`` has the coefficients by plane and body. Newton's method in ln(eps_rep)
     of both bodies, with difference quotients."""
     plane = "strain" if numbers[0] else "stress"
+    begins = begins_of(numbers)
     s = np.empty((2, 3, len(x)))
     s[:] = np.reshape(numbers[5:], (2, 1, 1))
     strain = np.zeros((2, len(x)))
@@ -150,7 +162,8 @@ def representative(
         return np.tensordot(model[f"{plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
 
     for i in hardens:
-        strain[i] = numbers[4] * np.exp(predicted(i, At(x, s[i, 0], np.zeros(len(x)), s[1 - i, 0])))
+        first = At(x, s[i, 0], np.zeros(len(x)), s[1 - i, 0], begins)
+        strain[i] = numbers[4] * np.exp(predicted(i, first))
     # of a body that does not harden nothing is missed: its row of the Jacobian is the identity's
     miss = np.log(_SHIFTS) + np.zeros_like(s)
     rises = np.zeros_like(s)
@@ -160,7 +173,7 @@ def representative(
         for i in hardens:
             s[i], rises[i] = flow_and_rise(means[i], shifted[i])
         for i in hardens:
-            at = At(x, s[i], rises[i], s[1 - i])
+            at = At(x, s[i], rises[i], s[1 - i], begins)
             miss[i] = np.log(shifted[i] / numbers[4]) - predicted(i, at)
         step = _step(miss, step)
         strain *= np.exp(-step)

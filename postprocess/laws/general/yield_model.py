@@ -17,7 +17,7 @@ law_fit.py makes both.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -101,10 +101,21 @@ def first_yield(
     """About the x of first yield by ``s`` (any shape): where the elastic p0, times what is ``left``
     of it, is ``g`` sigY, with g of Hertz's contact at first and less in wide ones; at the end of
     the range or beyond for a larger s, infinite for an infinite one."""
+    return yield_places(model, strain, joint, left)(s)
+
+
+def yield_places(
+    model: ElasticModel, strain: bool, joint: Elastic, left: Array | float = 1.0
+) -> Callable[[npt.ArrayLike], Array]:
+    """`first_yield` of a joint by s."""
     pressure = left * model.pressure(joint, _GRID) / _pressure_at_yield(strain, _GRID)
-    over = np.maximum.accumulate(pressure)
-    found = np.interp(np.log(s), np.log(over), np.log(_GRID))
-    return np.where(np.isfinite(s), np.exp(found), np.inf)
+    over = np.log(np.maximum.accumulate(pressure))
+
+    def place(s: npt.ArrayLike) -> Array:
+        found = np.interp(np.log(s), over, np.log(_GRID))
+        return np.where(np.isfinite(s), np.exp(found), np.inf)
+
+    return place
 
 
 def onset(

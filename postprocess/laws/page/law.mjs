@@ -450,6 +450,7 @@ const BODIES = ["pin", "block"];
 const LITTLE = 1e-6; // of a difference quotient
 const WIDE = 3; // factor on a strain, up and down
 const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
+const EARLIEST = 1.2; // x of first yield by s_eff over x, above which nothing has yielded
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
 
 /** The mean s by a strain, of strains about it. */
@@ -460,7 +461,7 @@ const meanFlow = (flow, { strains, shares }) => (strain) =>
 const riseOf = (mean, strain) => Math.log(mean(WIDE * strain) / mean(strain / WIDE)) / (2 * Math.log(WIDE));
 
 /** ln(eps_rep R/dR) of a body at x, where the bodies have these s: a sum of products of inputs. */
-function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, own, rise, other) {
+function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, own, rise, other, begins) {
     const ls = Math.log(own);
     const weaker = clip(Math.log(other) - ls, -ALIKE, ALIKE);
     const inputs = {
@@ -474,6 +475,7 @@ function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, o
         clearance: Math.log(clearance / 0.005),
         rise,
         gain: Math.min(ls - Math.log(first), LARGEST_GAIN),
+        onset: Math.min(begins(own) / x, EARLIEST) ** 2,
     };
     const product = (names) => names.split(" ").reduce((all, name) => all * inputs[name], 1);
     return model.terms.reduce((sum, names, k) => sum + coefficients[k] * product(names), 0);
@@ -484,10 +486,11 @@ function representative(model, strain, elastic, begin, flows, x) {
     const plane = strain ? "strain" : "stress";
     const hardens = BODIES.map((body) => Boolean(flows[body]));
     const first = BODIES.map((body) => begin[body]);
+    const begins = yieldAt(strain, elastic);
     return x.map((place) => {
         const ln = (i, s, rise) => {
             const coefficients = model.strain[`${plane} ${BODIES[i]}`];
-            return lnStrain(model, coefficients, elastic, BODIES[i], first[i], place, s[i], rise, s[1 - i]);
+            return lnStrain(model, coefficients, elastic, BODIES[i], first[i], place, s[i], rise, s[1 - i], begins);
         };
         const flowsAt = (eps) => first.map((own, i) => (hardens[i] ? flows[BODIES[i]](eps[i]) : own));
         const missAt = (eps) => {
