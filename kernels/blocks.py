@@ -38,6 +38,16 @@ def blocks_of(A: PETSc.Mat) -> tuple[Blocks, Blocks, npt.NDArray[np.int32]]:
     return _arrays(here), others, _array(number, 1 + others.columns.max(initial=-1))
 
 
+def ghost_exchange(A: PETSc.Mat, ghosts: np.ndarray) -> tuple[PETSc.Scatter, PETSc.Vec]:
+    """What takes the values of a vector of the block matrix ``A`` at the nodes ``ghosts`` ``(m,)``
+    of other ranks to the vector behind it. Collective."""
+    d = A.getBlockSize()
+    places = (d * ghosts[:, None] + np.arange(d)).astype(PETSc.IntType)
+    wanted = PETSc.IS().createGeneral(places.ravel(), comm=PETSc.COMM_SELF)
+    values = PETSc.Vec().createSeq(d * len(ghosts))
+    return PETSc.Scatter().create(A.createVecRight(), wanted, values, None), values
+
+
 def add_blocks(
     A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: npt.NDArray[np.floating]
 ) -> None:

@@ -40,7 +40,7 @@ class DeckModel:
     moved : list of Moved
         All sets that are held or moved: ``hung`` on nodes of drives, or ``held``.
     loads : dict
-        Nodal forces ``(n, 2)`` by the names of their drives, per unit of the drive's value.
+        Nodal forces ``(n, d)`` by the names of their drives, per unit of the drive's value.
     own : dict
         The labels of nodes of their own, by the names of drives; forces pull the ``pulled`` ones.
     """

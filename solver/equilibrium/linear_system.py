@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from petsc4py import PETSc
 
@@ -33,13 +31,12 @@ class LinearSystem:
         self.choice = choose(self.facts)
         condense = self._revise_condensed if self.choice.uses("condensed") else None
         self.tangent = TangentMatrix(evaluation, timer, condense)
-        self._factoriser = partial(self.choice.factoriser, self.unknowns.V, self.unknowns.fixed)
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
             if self.unknowns.n_levels:
                 stiffness = self.unknowns.drives.stiffness
                 n = self.unknowns.n_levels
-                self.border = Bordered(self.tangent.A, n, stiffness, self._factoriser)
+                self.border = Bordered(self.tangent.A, n, stiffness, self._solver_of)
             self.strategy = self._strategy()
 
     def _facts(self) -> Facts:
@@ -63,9 +60,11 @@ class LinearSystem:
     def _strategy(self) -> Strategy:
         if self.border:
             return self.border
-        if self.tangent.condensed is not None:
-            return self.tangent.condensed
-        strategy = self._factoriser(self.tangent.A)
+        return self.tangent.condensed or self._solver_of(self.tangent.A)
+
+    def _solver_of(self, A: PETSc.Mat) -> Strategy:
+        """The strategy for the matrix of the displacements."""
+        strategy = self.choice.factoriser(self.unknowns.V, self.unknowns.fixed, A)
         strategy.product = self.tangent.product
         return strategy
 

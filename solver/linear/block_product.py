@@ -1,7 +1,7 @@
 """The product of a block matrix and a vector, without the blocks that are zero.
 
-In space half of the matrix is room for contact that there is not, at each moment: PETSc would read
-and multiply it in every iteration of GMRES.
+In space a large part of the matrix is room for contact, most of it empty at any moment: PETSc
+would read and multiply it in every iteration of GMRES.
 """
 
 from __future__ import annotations
@@ -12,15 +12,18 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.kernels.blocks import Blocks, blocks_of
+from archord.kernels.blocks import Blocks, blocks_of, ghost_exchange
 from archord.kernels.compiled import library, pointer
 
 _SOURCE = Path(__file__).with_suffix(".c")
-_D = 3  # displacements a node
 
 
 class _Part:
-    """The blocks of some columns that are not zero."""
+    """The ``blocks`` of some columns that are not zero.
+
+    start : (n + 1,) where the rows begin among the numbers of such blocks
+    filled : (k,) their numbers
+    """
 
     def __init__(self, blocks: Blocks) -> None:
         n = len(blocks.offsets) - 1
@@ -47,11 +50,8 @@ class BlockProduct:
     def __init__(self, A: PETSc.Mat) -> None:
         self._A = A
         self._state = -1  # of the matrix whose blocks are known
-        ghosts = blocks_of(A)[2]
-        places = (_D * ghosts[:, None] + np.arange(_D)).astype(PETSc.IntType)
-        wanted = PETSc.IS().createGeneral(places.ravel(), comm=PETSc.COMM_SELF)
-        self._ghosts = PETSc.Vec().createSeq(_D * len(ghosts))
-        self._exchange = PETSc.Scatter().create(A.createVecRight(), wanted, self._ghosts, None)
+        self._parts: list[_Part] = []  # in the rank's own columns, and in those of ghosts
+        self._exchange, self._ghosts = ghost_exchange(A, blocks_of(A)[2])
 
     def matrix(self) -> PETSc.Mat:
         """The matrix."""
@@ -61,18 +61,17 @@ class BlockProduct:
 
     def _update(self) -> None:
         """Find the blocks of the matrix as it is now."""
-        own, others, _ = blocks_of(self._A)
-        self._own = _Part(own)
-        self._others = _Part(others)
+        self._parts = [_Part(blocks) for blocks in blocks_of(self._A)[:2]]
         self._state = self._A.stateGet()
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = A x``, called by PETSc."""
         if self._A.stateGet() != self._state:
             self._update()
-        self._exchange.begin(x, self._ghosts)
+        own, others = self._parts
         product = np.zeros(y.getLocalSize())
-        self._own.add(x.array_r, product)
+        self._exchange.begin(x, self._ghosts)
+        own.add(x.array_r, product)
         self._exchange.end(x, self._ghosts)
-        self._others.add(self._ghosts.array_r, product)
+        others.add(self._ghosts.array_r, product)
         y.array[:] = product

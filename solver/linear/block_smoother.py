@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.kernels.blocks import Blocks
+from archord.kernels.blocks import Blocks, ghost_exchange
 from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_suffix(".c")
@@ -66,12 +66,8 @@ class BlockSmoother:
             "inverse": np.zeros(n * d**2 + 1, dtype=np.float32),
         }
         self._rows = structure(_SOURCE, "BlockRows", self._members)
-        self._ghosted = PETSc.Vec().createSeq(d * len(self.ghosts))
-        places = (d * self.ghosts[:, None] + np.arange(d)).astype(PETSc.IntType)
-        whole = self.matrix.createVecRight()
-        wanted = PETSc.IS().createGeneral(places.ravel(), comm=PETSc.COMM_SELF)
-        self._exchange = PETSc.Scatter().create(whole, wanted, self._ghosted, None)
-        self._whole = whole
+        self._whole = self.matrix.createVecRight()
+        self._exchange, self._ghosted = ghost_exchange(self.matrix, ghosts)
 
     def _part(self, k: int) -> dict[str, np.ndarray]:
         """Room for ``k`` blocks."""

@@ -52,9 +52,9 @@ from archord.report.table import Table
 Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
 _RANGE = (0.05, 3.05)  # x of the data
 _USUAL = (0.099, 2.001)
-_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(12)])
+_GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(len(TERMS) - 3)])
 # how far from it coefficients are likely
-_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7), 1.0, 1.0, 1.0, 1.0])
+_FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7), *np.ones(len(TERMS) - 11)])
 _SCATTER = 0.01  # of ln P of a joint, against which that counts
 _PARTS = 5  # of the joints, each of which the other parts predict
 _ITERATIONS = 6
