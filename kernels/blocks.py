@@ -65,6 +65,26 @@ def add_blocks(
     )
 
 
+def without_zeros(A: PETSc.Mat) -> PETSc.Mat:
+    """A matrix of scalar rows, of the blocks of ``A`` that are not zero. Collective."""
+    d = A.getBlockSize()
+    first = A.getOwnershipRange()[0] // d
+    own, others, ghosts = blocks_of(A)
+    n = len(own.offsets) - 1
+    found = PETSc.Mat().create(A.comm)
+    found.setSizes(A.getSizes(), bsize=d)
+    found.setType("aij")
+    found.setUp()
+    for blocks, node in ((own, np.arange(first, first + n)), (others, ghosts)):
+        by_columns = blocks.values.reshape(-1, d, d)
+        filled = by_columns.any(axis=(1, 2))
+        rows = first + np.repeat(np.arange(n), np.diff(blocks.offsets))
+        values = by_columns[filled].transpose(0, 2, 1)
+        add_blocks(found, rows[filled], node[blocks.columns[filled]], values)
+    found.assemble()
+    return found
+
+
 def _arrays(matrix: ctypes.c_void_p) -> Blocks:
     n = ctypes.c_int64()
     offsets = _INT()

@@ -17,13 +17,12 @@ from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.assembly import assemble, matrix
 from archord.solver.contact.tangent import Filled
 from archord.solver.equilibrium.evaluation import Evaluation
-from archord.solver.linear.block_product import BlockProduct
+from archord.solver.linear.block_product import quick_product
 from archord.solver.linear.condensed import Condensed
 from archord.solver.linear.strategy import Sum
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 _WITHOUT_COPY = 3  # dimension from which on elastic joints have no copy of their matrix
-_WITH_PRODUCT = 3  # dimension from which on much of the matrix is room for contact
 _SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
 Revise = Callable[[Array], Array | None]
 
@@ -137,9 +136,7 @@ class TangentMatrix:
         changes = self.bulk.plastic or self.bulk.finite or self.springs
         if changes or self.dimension < _WITHOUT_COPY:
             self._elastic = self.A.copy()
-        self.product = self.A
-        if self.dimension >= _WITH_PRODUCT:
-            self.product = BlockProduct(self.A).matrix()
+        self.product = quick_product(self.A)
 
     def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
         in_matrix = (rows < self._size) & (columns < self._size)

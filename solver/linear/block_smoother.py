@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.kernels.blocks import Blocks, ghost_exchange
+from archord.kernels.blocks import Blocks, blocks_of, ghost_exchange
 from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_suffix(".c")
@@ -77,26 +77,48 @@ class BlockSmoother:
             "block": np.zeros(k * self._d**2 + 1, dtype=np.float32),
         }
 
+    @property
+    def own(self) -> np.ndarray:
+        """The solution of this rank's nodes ``(n, d)``."""
+        return self.x[: self._n]
+
     def from_zero(self, b: Array) -> Array:
         """Smooth from zero for a right-hand side ``b`` ``(n d,)``; returns the residual."""
         residual = np.empty_like(b)
         arrays = np.ascontiguousarray(b), self.x, self._work, residual
         library(_SOURCE).smooth_from_zero(self._rows, *map(pointer, arrays))
         if self.matrix.comm.size > 1:
-            self._take_ghosts(self.x[: self._n].ravel())
+            self._take_ghosts(self.own.ravel())
             library(_SOURCE).subtract_ghosts(self._rows, pointer(self.x), pointer(residual))
         return residual
 
     def again(self, b: Array, correction: Array) -> Array:
         """Smooth on after a ``correction`` ``(n d,)`` of the solution; returns the solution."""
-        own = self.x[: self._n]
         if self.matrix.comm.size > 1:
-            self._take_ghosts(own.ravel() + correction)
+            self._take_ghosts(self.own.ravel() + correction)
         arrays = np.ascontiguousarray(b), np.ascontiguousarray(correction), self.x, self._work
         library(_SOURCE).smooth(self._rows, *map(pointer, arrays))
-        return own.ravel()
+        return self.own.ravel()
 
     def _take_ghosts(self, own: Array) -> None:
         self._whole.array[:] = own
         self._exchange.scatter(self._whole, self._ghosted)
         self.x[self._n :] = self._ghosted.array_r.reshape(-1, self._d)
+
+
+class Sweeps:
+    """Python context of a preconditioner: a sweep there and back with the block matrix ``A``, as it
+    is when `update` is called. Collective."""
+
+    def __init__(self, A: PETSc.Mat) -> None:
+        self._A = A
+        self._smoother = BlockSmoother(A)
+
+    def update(self) -> None:
+        """Take the values of the matrix."""
+        self._smoother.update(*blocks_of(self._A))
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """``x`` is nearly the solution for ``b``, called by PETSc."""
+        self._smoother.from_zero(b.array_r)
+        x.array[:] = self._smoother.own.ravel()

@@ -8,6 +8,13 @@ static inline void add_product(int d, const double *left, const double *A, const
         for (int j = 0; j < d; j++) block[d * i + j] += left[i] * A[d * j + i] * right[j];
 }
 
+static inline int is_zero(int size, const double *block)
+{
+    for (int k = 0; k < size; k++)
+        if (block[k] != 0.0) return 0;
+    return 1;
+}
+
 static inline int32_t product(const Product *p, const int d, int32_t most, int32_t *place, int32_t *rows, int32_t *columns,
                               double *blocks)
 {
@@ -18,6 +25,7 @@ static inline int32_t product(const Product *p, const int d, int32_t most, int32
             const int32_t i = p->row[e];
             for (int32_t k = p->offsets[i]; k < p->offsets[i + 1]; k++) {
                 const int32_t column = p->columns[k];
+                if (!p->with_zeros && is_zero(d * d, p->values + (int64_t)d * d * k)) continue;
                 for (int32_t f = p->to[column]; f < p->to[column + 1]; f++) {
                     const int32_t c = p->node[f];
                     if (place[c] < begin) {

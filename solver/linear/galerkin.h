@@ -6,6 +6,7 @@ typedef struct {
     int32_t n, d;
     const int32_t *offsets, *columns; /* (rows + 1), (k) */
     const double *values;             /* (k d d) */
+    int32_t with_zeros;               /* whether blocks that are zero make entries, too */
     const int32_t *from, *row;        /* (n + 1), (p): the rows that each of n coarse nodes gives values to */
     const double *row_weight;         /* (p, d) */
     const int32_t *to, *node;         /* (columns + 1), (q): the coarse nodes that give values to each column */

@@ -52,7 +52,7 @@ class Galerkin:
         size = P.getLocalSize()[1], None
         self.matrix = PETSc.Mat().create(P.comm)
         self.matrix.setSizes((size, size), bsize=self._d)
-        self.matrix.setType("aij")
+        self.matrix.setType("baij")
         self.matrix.setUp()
 
     def _rows_of(self, ghosts: np.ndarray) -> PETSc.Mat:
@@ -85,18 +85,25 @@ class Galerkin:
 
     def update(self, own: Blocks, others: Blocks) -> None:
         """Take the values of a matrix, in the rank's ``own`` columns and in ``others``."""
-        if self.matrix.isAssembled():
+        is_first = not self.matrix.isAssembled()
+        if not is_first:
             self.matrix.zeroEntries()
         for A, right in zip((own, others), self._right, strict=True):
-            rows, columns, blocks = self._product(A, right)
+            rows, columns, blocks = self._product(A, right, is_first)
             add_blocks(self.matrix, self._nodes[rows], self._nodes[columns], blocks)
         self.matrix.assemble()
 
     def _product(
-        self, A: Blocks, right: dict[str, np.ndarray]
+        self, A: Blocks, right: dict[str, np.ndarray], with_zeros: bool
     ) -> tuple[np.ndarray, np.ndarray, Array]:
-        """Rows and columns ``(k,)`` and blocks ``(k, d, d)`` of the product of some columns."""
-        of_A = {"offsets": A.offsets, "columns": A.columns, "values": A.values}
+        """Rows and columns ``(k,)`` and blocks ``(k, d, d)`` of the product of some columns, also
+        of blocks that are zero, ``with_zeros``, to make room for them."""
+        of_A = {
+            "offsets": A.offsets,
+            "columns": A.columns,
+            "values": A.values,
+            "with_zeros": int(with_zeros),
+        }
         product = structure(_SOURCE, "Product", self._left | right | of_A)
         most = 0
         needed = _ROOM * len(self._nodes)

@@ -3,9 +3,9 @@
 The first level below the displacements are the linear displacements on the same mesh (p-multigrid).
 Its matrix is the Galerkin product ``P^T A P`` with the interpolation ``P``. Aggregates of its nodes
 make the levels below, with the rigid motions as near null space (smoothed aggregation; Vanek,
-Mandel and Brezina 1996). Sweeps of Gauss-Seidel smooth the displacements, Chebyshev polynomials the
-levels below, polynomials of sweeps the first of them, so that the number of iterations grows slowly
-with the mesh, and hardly with the ranks.
+Mandel and Brezina 1996). Sweeps of Gauss-Seidel smooth both kinds of displacements, Chebyshev
+polynomials the levels below, so that the number of iterations grows slowly with the mesh, and
+hardly with the ranks. Neither reads the room for contact where it is empty.
 
 Prescribed displacements are rows and columns of the unit matrix. The interpolation leaves them out,
 but for the linear displacement at the same node. So the product has unit rows there, too.
@@ -22,9 +22,10 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, lagrange_element
-from archord.kernels.blocks import Blocks, blocks_of
+from archord.kernels.blocks import Blocks, blocks_of, without_zeros
 from archord.materials.kinematics import kinematics
-from archord.solver.linear.block_smoother import BlockSmoother
+from archord.solver.linear.block_product import quick_product
+from archord.solver.linear.block_smoother import BlockSmoother, Sweeps
 from archord.solver.linear.galerkin import Galerkin
 from archord.solver.linear.strategy import Facts, Strategy
 
@@ -36,9 +37,9 @@ _LOOSEST = 2e-3  # residual of a linear system over its right-hand side
 _SUPERLINEAR = 2.0  # power of the last reduction of the residual of Newton's method
 ACCURATE = 1e-10  # the same, where a solve stands for a factorisation
 _MARGIN = 0.01  # of the goal: what the last linear system may leave, as reactions fall meanwhile
-_SMOOTHING = 5  # degree of the polynomials
-_SWEEPS = 2  # degree of the polynomials of sweeps, of the linear displacements
-_GROWN = 2.0  # entry of the diagonal over what it was, above which polynomials may diverge
+_SMOOTHING = 3  # degree of the polynomials
+_SWEEPS = 3  # there and back, of the linear displacements
+_GROWN = 2.0  # entry of the diagonal over what it was, above which levels below may mislead
 _SOFTENED = 0.05  # part of the diagonal that may have shrunk as much
 _FEWEST_COARSE = 100  # equations that are factorised on the last level
 _WEAK = 0.05  # of the diagonal: couplings that aggregates do not follow
@@ -81,7 +82,8 @@ class Multigrid(Strategy):
 
     interpolation : matrix that takes linear displacements to the own ones; None where those are
         linear
-    coarse : matrix of the linear displacements
+    linear : matrix of the linear displacements
+    entries : those of it that were not zero when the levels below were made
     """
 
     def __init__(
@@ -90,7 +92,8 @@ class Multigrid(Strategy):
         self.matrix = A
         self._tolerance = tolerance
         self.interpolation: PETSc.Mat | None = None
-        self.coarse = PETSc.Mat()
+        self.linear = A
+        self.entries = A
         if V.element.basix_element.degree > 1:
             V_linear, fixed_linear = _linear(V, fixed)
             self.interpolation = _interpolation(V, V_linear, fixed, fixed_linear)
@@ -98,7 +101,7 @@ class Multigrid(Strategy):
             fixed = fixed_linear
         self._motions = _free_rigid_motions(V, fixed)
         self._product: Galerkin | None = None
-        self._diagonal: Array = np.zeros(1)  # of the coarse matrix at the last set-up below it
+        self._diagonal: Array = np.zeros(1)  # of `linear` when the levels below were made
         self._below = PETSc.PC().create(A.comm)
         self._smoother = BlockSmoother(A)
         self._right_side = 0.0
@@ -125,30 +128,31 @@ class Multigrid(Strategy):
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Make the levels of the matrix as it is now, called by PETSc."""
-        if self.interpolation is None:
-            self.matrix.convert("aij", self.coarse)
-        else:
+        if self.interpolation is not None:
             self._update(*blocks_of(self.matrix))
         if not self._is_ready:
-            self.coarse.setNearNullSpace(_near_null_space(self.coarse, self._motions))
-            self._right, self._found = self.coarse.createVecs()
-            self._below = _aggregates(self.coarse)
+            self._sweeps = Sweeps(self.linear)
+            self._product_of_linear = quick_product(self.linear)
+            self._right, self._found = self.linear.createVecs()
             self._is_ready = True
+        self._sweeps.update()
         self._set_up_below()
 
     def _set_up_below(self) -> None:
-        """Set up the levels below the linear displacements, unless those that are there will do:
-        that takes more time than the iterations which it saves."""
-        diagonal = self.coarse.getDiagonal().array
+        """Make the levels below the linear displacements, unless those that are there will do: that
+        takes more time than the iterations which it saves."""
+        diagonal = self.linear.getDiagonal().array
         grown = (diagonal > _GROWN * self._diagonal).sum()
         softened = (_GROWN * diagonal < self._diagonal).sum()
         comm = self.matrix.comm.tompi4py()
         n_grown, n_softened = comm.allreduce(np.array([grown, softened]))
-        will_do = n_grown == 0 and n_softened <= _SOFTENED * self.coarse.getSize()[0]
-        if not will_do:
-            self._diagonal = diagonal
-        self._below.setReusePreconditioner(bool(will_do))
-        self._below.setUp()
+        if n_grown == 0 and n_softened <= _SOFTENED * self.linear.getSize()[0]:
+            return
+        self._diagonal = diagonal
+        self._below.destroy()
+        self.entries = without_zeros(self.linear)
+        self.entries.setNearNullSpace(_near_null_space(self.entries, self._motions))
+        self._below = _aggregates(self._product_of_linear, self.entries, self._sweeps)
 
     def level_sizes(self) -> list[int]:
         """Equations of the levels below the displacements, finest first, once they are made."""
@@ -161,10 +165,10 @@ class Multigrid(Strategy):
         assert self.interpolation is not None
         if self._product is None:
             self._product = Galerkin(self.interpolation, ghosts)
+            self.linear = self._product.matrix
             self._residual = self.interpolation.createVecLeft()
             self._correction = self._residual.duplicate()
         self._product.update(own, others)
-        self.coarse = self._product.matrix
         self._smoother.update(own, others, ghosts)
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
@@ -181,39 +185,33 @@ class Multigrid(Strategy):
         x.array[:] = self._smoother.again(r.array_r, self._correction.array_r)
 
 
-def _aggregates(A: PETSc.Mat) -> PETSc.PC:
-    """Multigrid by smoothed aggregation for ``A``, whose levels are made twice, as options tell
-    levels by their numbers, and the finest one has the last."""
+def _aggregates(A: PETSc.Mat, entries: PETSc.Mat, sweeps: Sweeps) -> PETSc.PC:
+    """Multigrid by smoothed aggregation for ``A``, a matrix with these ``entries``, which
+    ``sweeps`` smooth."""
     # an aggregate with fewer dofs than rigid motions leaves zeros on the diagonal: no blocks, and
     # no sweeps but on the finest level
     options = {
         "pc_type": "gamg",
+        "pc_use_amat": True,
         "pc_gamg_threshold": _WEAK,
         "pc_gamg_coarse_eq_limit": _FEWEST_COARSE,
-        "pc_gamg_reuse_interpolation": True,
+        "mg_levels_ksp_type": "chebyshev",
+        "mg_levels_ksp_max_it": _SMOOTHING,
+        "mg_levels_pc_type": "jacobi",
     }
-    levels = _set_up(A, _COARSE, options)
+    levels = PETSc.PC().create(A.comm)
+    levels.setOperators(A, entries)
+    _use_options(levels, _COARSE, options)
+    levels.setUp()
     finest = levels.getMGLevels() - 1
-    if finest == 0:
-        return levels
-    levels.destroy()
-    for level in range(1, finest + 1):
-        sweeps = level == finest
-        options |= {
-            f"mg_levels_{level}_ksp_type": "chebyshev",
-            f"mg_levels_{level}_ksp_max_it": _SWEEPS if sweeps else _SMOOTHING,
-            f"mg_levels_{level}_pc_type": "sor" if sweeps else "jacobi",
-        }
-    # PETSc takes but one number in an option's name for a level's
-    return _set_up(A, f"{_COARSE}{finest * 'i'}_", options)
-
-
-def _set_up(A: PETSc.Mat, prefix: str, options: Mapping[str, Any]) -> PETSc.PC:
-    pc = PETSc.PC().create(A.comm)
-    pc.setOperators(A)
-    _use_options(pc, prefix, options)
-    pc.setUp()
-    return pc
+    if finest > 0:
+        smoother = levels.getMGSmoother(finest)
+        smoother.setType("richardson")
+        smoother.setTolerances(max_it=_SWEEPS)
+        smoother.getPC().setType("python")
+        smoother.getPC().setPythonContext(sweeps)
+        smoother.setUp()
+    return levels
 
 
 def _use_options(solver: PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> None:

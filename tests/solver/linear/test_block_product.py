@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from archord.kernels.blocks import blocks_of
+from archord.kernels.blocks import blocks_of, without_zeros
 from archord.solver.linear.block_product import BlockProduct
 from tests.solver.linear.test_multigrid import elastic_cube
 
@@ -50,3 +50,19 @@ def test_blocks_that_become_filled_count_and_zeros_do_not():
     A.stateIncrease()
     by_A, by_B = products(A, B)
     np.testing.assert_allclose(by_B, by_A, rtol=0, atol=1e-14 * abs(by_A).max())
+
+
+@pytest.mark.mpi
+def test_a_matrix_without_zeros_multiplies_in_the_same_way_with_fewer_entries():
+    _V, _, A = elastic_cube(4, skew=0.1)
+    filled = 0
+    for part in blocks_of(A)[:2]:
+        blocks = part.values.reshape(-1, 9)
+        blocks[::3] = 0.0
+        filled += blocks.any(axis=1).sum()
+    A.stateIncrease()
+    B = without_zeros(A)
+    by_A, by_B = products(A, B)
+    np.testing.assert_allclose(by_B, by_A, rtol=0, atol=1e-14 * abs(by_A).max())
+    used = B.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+    assert used == 9 * A.comm.tompi4py().allreduce(filled)
