@@ -107,11 +107,12 @@ class BlockSmoother:
 
 
 class Sweeps:
-    """Python context of a preconditioner: a sweep there and back with the block matrix ``A``, as it
-    is when `update` is called. Collective."""
+    """Python context of a preconditioner: so ``many`` sweeps there and back with the block matrix
+    ``A``, as it is when `update` is called. Collective."""
 
-    def __init__(self, A: PETSc.Mat) -> None:
+    def __init__(self, A: PETSc.Mat, many: int) -> None:
         self._A = A
+        self._many = many
         self._smoother = BlockSmoother(A)
 
     def update(self) -> None:
@@ -120,5 +121,8 @@ class Sweeps:
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x`` is nearly the solution for ``b``, called by PETSc."""
-        self._smoother.from_zero(b.array_r)
-        x.array[:] = self._smoother.own.ravel()
+        residual = b.array_r
+        x.set(0.0)
+        for _ in range(self._many):
+            residual = self._smoother.from_zero(residual)
+            x.array[:] += self._smoother.own.ravel()

@@ -131,7 +131,7 @@ class Multigrid(Strategy):
         if self.interpolation is not None:
             self._update(*blocks_of(self.matrix))
         if not self._is_ready:
-            self._sweeps = Sweeps(self.linear)
+            self._sweeps = Sweeps(self.linear, _SWEEPS)
             self._product_of_linear = quick_product(self.linear)
             self._right, self._found = self.linear.createVecs()
             self._is_ready = True
@@ -207,7 +207,7 @@ def _aggregates(A: PETSc.Mat, entries: PETSc.Mat, sweeps: Sweeps) -> PETSc.PC:
     if finest > 0:
         smoother = levels.getMGSmoother(finest)
         smoother.setType("richardson")
-        smoother.setTolerances(max_it=_SWEEPS)
+        smoother.setTolerances(max_it=1)
         smoother.getPC().setType("python")
         smoother.getPC().setPythonContext(sweeps)
         smoother.setUp()
