@@ -6,22 +6,32 @@ fresh ones to check the law on.
 
 Joints are drawn as in law_design.py. Every body that yields then gets a hardening curve of its own,
 of one of the `CURVES`; half of the joints whose bodies yield at one stress have one curve for both.
+To these come pairs of named metals as they are, with a clearance that is drawn.
+
+    python3 -m archord.studies.hardening_design --metals stress > metals.sweep.toml
+
+prints all pairs of named metals with one clearance.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from archord.materials.named import metals
-from archord.postprocess.laws.general.general_law import NODES, law_of_numbers
+from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.general_law import NODES, SMALLEST_S, law_of_numbers
+from archord.postprocess.laws.general.hardening_model import BODIES
 from archord.postprocess.laws.general.law_fit import EARLY
+from archord.postprocess.laws.general.yield_model import first_yield
 from archord.studies.law_design import (
     CHECK_SIZE,
+    END,
     FRESH_WAY,
     Drawn,
     Row,
@@ -36,8 +46,12 @@ from archord.studies.law_design import (
 # how many joints of each kind of law_design.py
 _KINDS = {"both": 84, "block": 54, "pin": 42, "block weaker": 42, "pin weaker": 42}
 JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
+PAIRS = 80  # of named metals, in each plane
+NUMBER = sum(JOINTS.values()) + 2 * PAIRS
 CURVES = ("line", "Swift", "Voce", "plateau", "metal")
 _LATEST = 1.8  # x0 beyond which yielding says little of hardening
+_PAIR_CLEARANCES = (0.002, 0.01)  # dR/R of pairs
+_ALL_PAIRS_CLEARANCE = 0.005
 _SPARE = 4  # times as many joints are drawn as have an earlier x0
 _SEED = 3600
 _NEXT = 1.2  # x of a node to fit to over the last one's
@@ -73,6 +87,46 @@ def hardening(random: np.random.Generator, strength: float, E: float, clearance:
     return np.column_stack([peeq * clearance, rise * strength]).tolist()
 
 
+def pair(metal_of: Mapping[str, Any], strain: bool, clearance: float) -> Drawn:
+    """The joint of the metals of "pin" and "block", in plane ``strain`` or in plane stress."""
+    E, nu = (np.array([metal_of[body][key] for body in BODIES]) for key in ("E", "nu"))
+    compliances = (1 - nu**2 if strain else 1.0) / E
+    E_star = 1 / compliances.sum()
+    elastic = Elastic(compliances[0] * E_star, *(nu / (1 - nu) if strain else nu), clearance)
+    own: Row = {} if strain else {"analysis.plane": "stress"}
+    own["joint.clearance"] = clearance
+    strengths = []
+    for body, metal in metal_of.items():
+        points = np.array(metal["hardening"]) / [1.0, E_star]
+        own |= {f"{body}.E": metal["E"] / E_star, f"{body}.nu": metal["nu"]}
+        own |= {f"{body}.yield_stress": float(points[0, 1]), f"{body}.hardening": points.tolist()}
+        strengths.append(float(points[0, 1]) / clearance)
+    first = float(first_yield(elastic_model(), strain, elastic, min(strengths)))
+    return Drawn(own, (float(strain), *elastic, *strengths), first, first, 0.5, 1.0)
+
+
+def pairs(number: int, plane: str, random: np.random.Generator) -> Iterator[Drawn]:
+    """``number`` pairs of named metals that yield early enough and are in the law's range."""
+    names = sorted(metals())
+    low, high = _PAIR_CLEARANCES
+    found = 0
+    while found < number:
+        metal_of = {body: metals()[random.choice(names)] for body in BODIES}
+        joint = pair(metal_of, plane == "strain", low * (high / low) ** random.random())
+        if joint.first < _LATEST and min(joint.numbers[5:]) > SMALLEST_S[plane]:
+            found += 1
+            yield joint
+
+
+def all_pairs(plane: str) -> Iterator[Drawn]:
+    """All pairs of different named metals that yield before 3 dR, with one clearance."""
+    for names in itertools.product(sorted(metals()), repeat=2):
+        metal_of = {body: metals()[name] for body, name in zip(BODIES, names, strict=True)}
+        joint = pair(metal_of, plane == "strain", _ALL_PAIRS_CLEARANCE)
+        if joint.first < END:
+            yield joint
+
+
 def hardened(joint: Drawn, random: np.random.Generator) -> Drawn:
     """``joint``, with curves of the bodies that yield."""
     own = dict(joint.own)
@@ -90,7 +144,7 @@ def hardened(joint: Drawn, random: np.random.Generator) -> Drawn:
 
 
 def drawn(share: float, seed: int) -> Iterator[Drawn]:
-    """A ``share`` of `JOINTS`, which harden."""
+    """A ``share`` of `JOINTS`, which harden, and of `PAIRS`."""
     random = np.random.default_rng(seed)
     for kind, count in JOINTS.items():
         wanted = max(round(count * share), 1)
@@ -99,6 +153,8 @@ def drawn(share: float, seed: int) -> Iterator[Drawn]:
         early = (joint for joint in candidates if joint.first < _LATEST)
         for joint, _ in zip(early, range(wanted), strict=False):
             yield hardened(joint, random)
+    for plane in SMALLEST_S:
+        yield from pairs(round(PAIRS * share), plane, random)
 
 
 def rows_to_fit(given: Iterable[Drawn]) -> Iterator[Row]:
@@ -129,11 +185,15 @@ def main() -> None:
     parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--element-size", type=float, default=CHECK_SIZE, help="of fresh ones")
+    parser.add_argument("--metals", choices=SMALLEST_S, help="all pairs of metals in this plane")
     given = parser.parse_args()
     text = sweep_file(rows_to_fit(drawn(1.0, _SEED)))
     if given.fresh:
-        chosen = drawn(given.fresh / sum(JOINTS.values()), 1000 * given.seed)
+        chosen = drawn(given.fresh / NUMBER, 1000 * given.seed)
         text = checking(sweep_file(rows_to_check(chosen)), given.element_size)
+    if given.metals:
+        rows = sweep_file(rows_to_fit(all_pairs(given.metals)))
+        text = checking(rows, given.element_size)
     plane = 'plane = "strain"\n'
     print(text.replace(plane, f"{plane}tolerance = {_TOLERANCE}\n", 1), end="")
 

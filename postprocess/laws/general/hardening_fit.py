@@ -29,7 +29,7 @@ from archord.postprocess.laws.general.hardening_model import (
     Flows,
     Strains,
     begins_of,
-    flow_and_rise,
+    curve_at,
     flows,
     kind,
     mean_flows,
@@ -117,8 +117,7 @@ class Hardened:
             higher[i] *= 1 + _SMALL
             of_s = (loss(self.numbers, Yielding(*higher), self.x).force - lost.force) / _SMALL
             strain = found.strain[i]
-            _, rise = flow_and_rise(mean, strain)
-            at = At(self.x, found.s[i], rise, found.s[1 - i], begins)
+            at = At(self.x, curve_at(mean, strain), found.s[1 - i], begins)
             slope = slope_at(mean, strain, found.s[i])
             back = slope * feedback(model[f"{self.plane} {body}"], self.numbers, body, at)
             part = of_s * slope / (1 - np.minimum(back, _STEEPEST))
@@ -133,7 +132,7 @@ def slope_at(mean: Flow, strain: Array, s: Array) -> Array:
 
 def feedback(of: Array, numbers: Sequence[float], body: str, at: At) -> Array:
     """d(ln eps_rep)/d(ln s) ``(k,)`` with the coefficients ``of`` all `TERMS`; see `terms`."""
-    higher = at._replace(own=at.own * (1 + _SMALL))
+    higher = at._replace(own=at.own._replace(s=at.own.s * (1 + _SMALL)))
     change = terms(numbers, body, higher) - terms(numbers, body, at)
     return of @ change / np.log1p(_SMALL)
 

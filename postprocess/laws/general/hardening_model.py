@@ -5,10 +5,10 @@ whose logarithms are distributed normally.
     P(x) = P_pp(x; s_eff),   s_eff = s at eps_rep(x, s_eff),   s = sigY R/(E* dR)
 
 P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x and ln s_eff, of
-what the two bodies are, of how the curve s(PEEQ) rises, and of how near first yield by s_eff is:
-the first points that yield strain less than those later. hardening_model.json
-has its coefficients by plane and body, and factors of the expected error: hardening_fit.py makes
-it. p0, eps and the way back follow the same s_eff.
+what the two bodies are, of how the curve s(PEEQ) rises and bends, and of how near first yield by
+s_eff is: the first points that yield strain less than those later. hardening_model.json has its
+coefficients by plane and body, and factors of the expected error: hardening_fit.py makes it. p0,
+eps and the way back follow the same s_eff.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ BODIES = ("pin", "block")
 TERMS = (
     *("1", "x", "s", "x x", "x s", "s s"),
     *("share", "soft", "weaker", "apart", "clearance", "rise", "gain", "onset", "onset onset"),
+    *("s onset", "gain onset", "share onset", "x share", "s share", "x soft", "x weaker"),
+    *("weaker weaker", "rise rise", "gain gain", "x bend", "apart bend"),
 )
 _FACTORS = [names.split() for names in TERMS]
 _WIDTH = 0.7  # standard deviation of ln(strain)
@@ -94,20 +96,28 @@ def mean_flows(given: Flows) -> dict[int, Flow]:
     return {i: mean_flow(flow) for i, flow in enumerate(given) if flow is not None}
 
 
-def flow_and_rise(mean: Flow, strain: Array) -> tuple[Array, Array]:
-    """A `mean_flow` at ``strain`` (any shape), and its d(ln s)/d(ln strain) on average, from a part
-    of the strain to a multiple, `WIDE`."""
+class Curve(NamedTuple):
+    """How a `mean_flow` rises about a strain, in logarithms, from a part of the strain to a
+    multiple of it, `WIDE`; each of the strain's shape."""
+
+    s: Array  # there
+    rise: Array  # its slope on average
+    bend: Array  # what it rises more above the strain than below
+
+
+def curve_at(mean: Flow, strain: Array) -> Curve:
+    """A `mean_flow` about ``strain`` (any shape)."""
     below, s, above = mean(np.stack([strain / WIDE, strain, WIDE * strain]))
-    return s, np.log(above / below) / (2 * np.log(WIDE))
+    rise = np.log(above / below) / (2 * np.log(WIDE))
+    return Curve(s, rise, np.log(above * below / s**2))
 
 
 class At(NamedTuple):
-    """Where eps_rep of a body is asked for, each ``(..., k)``: x, the body's s and its rise (see
-    `flow_and_rise`), and the other body's s; and the x of first yield by s."""
+    """Where eps_rep of a body is asked for, each ``(..., k)``: x, the body's curve there, and the
+    other body's s; and the x of first yield by s."""
 
     x: Array
-    own: Array
-    rise: Array
+    own: Curve
     other: Array
     begins: Callable[[Array], Array]
 
@@ -117,7 +127,7 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
     `joint_numbers`)."""
     _, p, m, n, clearance, *first = numbers
     share, soft = (p, p * m) if body == "pin" else (1 - p, (1 - p) * n)
-    ls = np.log(at.own)
+    ls = np.log(at.own.s)
     weaker = np.clip(np.log(at.other) - ls, -_ALIKE, _ALIKE)
     inputs = {
         "1": 1.0,
@@ -128,9 +138,10 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
         "weaker": weaker,
         "apart": np.abs(weaker),
         "clearance": np.log(clearance / 0.005),
-        "rise": at.rise,
+        "rise": at.own.rise,
+        "bend": at.own.bend,
         "gain": np.minimum(ls - np.log(first[BODIES.index(body)]), _LARGEST_GAIN),
-        "onset": np.minimum(at.begins(at.own) / at.x, _EARLIEST) ** 2,
+        "onset": np.minimum(at.begins(at.own.s) / at.x, _EARLIEST) ** 2,
     }
     products = np.empty((len(TERMS), *ls.shape))
     for k, names in enumerate(_FACTORS):
@@ -162,18 +173,18 @@ def representative(
         return np.tensordot(model[f"{plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
 
     for i in hardens:
-        first = At(x, s[i, 0], np.zeros(len(x)), s[1 - i, 0], begins)
-        strain[i] = numbers[4] * np.exp(predicted(i, first))
+        straight = Curve(s[i, 0], np.zeros(len(x)), np.zeros(len(x)))
+        strain[i] = numbers[4] * np.exp(predicted(i, At(x, straight, s[1 - i, 0], begins)))
     # of a body that does not harden nothing is missed: its row of the Jacobian is the identity's
     miss = np.log(_SHIFTS) + np.zeros_like(s)
-    rises = np.zeros_like(s)
     step: Array = np.zeros_like(strain)
     for _ in range(_ITERATIONS):
         shifted = strain[:, None] * _SHIFTS
-        for i in hardens:
-            s[i], rises[i] = flow_and_rise(means[i], shifted[i])
-        for i in hardens:
-            at = At(x, s[i], rises[i], s[1 - i], begins)
+        curves = {i: curve_at(means[i], shifted[i]) for i in hardens}
+        for i, curve in curves.items():
+            s[i] = curve.s
+        for i, curve in curves.items():
+            at = At(x, curve, s[1 - i], begins)
             miss[i] = np.log(shifted[i] / numbers[4]) - predicted(i, at)
         step = _step(miss, step)
         strain *= np.exp(-step)
@@ -237,8 +248,7 @@ def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
     ``lost`` to yielding, and less before."""
     squares: Array = np.full(len(lost.force), _LEAST**2)
     for i, mean in mean_flows(given).items():
-        _, rise = flow_and_rise(mean, found.strain[i])
-        squares += (2 * np.log(WIDE) * rise) ** 2
+        squares += (2 * np.log(WIDE) * curve_at(mean, found.strain[i]).rise) ** 2
     return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)
 
 

@@ -457,12 +457,15 @@ const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter whi
 const meanFlow = (flow, { strains, shares }) => (strain) =>
     strains.reduce((sum, part, i) => sum + shares[i] * flow(strain * part), 0);
 
-/** d(ln s)/d(ln strain) of the mean flow, from a third of a strain to three times it. */
-const riseOf = (mean, strain) => Math.log(mean(WIDE * strain) / mean(strain / WIDE)) / (2 * Math.log(WIDE));
+/** How the mean flow rises from a third of a strain to three times it, in logarithms: its s, slope, and bend. */
+function curveAt(mean, strain) {
+    const [below, s, above] = [strain / WIDE, strain, WIDE * strain].map(mean);
+    return { s, rise: Math.log(above / below) / (2 * Math.log(WIDE)), bend: Math.log((above * below) / s ** 2) };
+}
 
 /** ln(eps_rep R/dR) of a body at x, where the bodies have these s: a sum of products of inputs. */
-function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, own, rise, other, begins) {
-    const ls = Math.log(own);
+function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, { s, rise, bend }, other, begins) {
+    const ls = Math.log(s);
     const weaker = clip(Math.log(other) - ls, -ALIKE, ALIKE);
     const inputs = {
         1: 1,
@@ -474,8 +477,9 @@ function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, o
         apart: Math.abs(weaker),
         clearance: Math.log(clearance / 0.005),
         rise,
+        bend,
         gain: Math.min(ls - Math.log(first), LARGEST_GAIN),
-        onset: Math.min(begins(own) / x, EARLIEST) ** 2,
+        onset: Math.min(begins(s) / x, EARLIEST) ** 2,
     };
     const product = (names) => names.split(" ").reduce((all, name) => all * inputs[name], 1);
     return model.terms.reduce((sum, names, k) => sum + coefficients[k] * product(names), 0);
@@ -488,17 +492,17 @@ function representative(model, strain, elastic, begin, flows, x) {
     const first = BODIES.map((body) => begin[body]);
     const begins = yieldAt(strain, elastic);
     return x.map((place) => {
-        const ln = (i, s, rise) => {
+        const ln = (i, curves) => {
             const coefficients = model.strain[`${plane} ${BODIES[i]}`];
-            return lnStrain(model, coefficients, elastic, BODIES[i], first[i], place, s[i], rise, s[1 - i], begins);
+            return lnStrain(model, coefficients, elastic, BODIES[i], first[i], place, curves[i], curves[1 - i].s, begins);
         };
-        const flowsAt = (eps) => first.map((own, i) => (hardens[i] ? flows[BODIES[i]](eps[i]) : own));
+        const straight = first.map((s) => ({ s, rise: 0, bend: 0 }));
+        const curvesAt = (eps) => straight.map((own, i) => (hardens[i] ? curveAt(flows[BODIES[i]], eps[i]) : own));
         const missAt = (eps) => {
-            const s = flowsAt(eps);
-            const missed = (i) => Math.log(eps[i] / elastic.clearance) - ln(i, s, riseOf(flows[BODIES[i]], eps[i]));
-            return hardens.map((own, i) => (own ? missed(i) : 0));
+            const curves = curvesAt(eps);
+            return hardens.map((own, i) => (own ? Math.log(eps[i] / elastic.clearance) - ln(i, curves) : 0));
         };
-        let eps = hardens.map((own, i) => (own ? elastic.clearance * Math.exp(ln(i, first, 0)) : 0));
+        let eps = hardens.map((own, i) => (own ? elastic.clearance * Math.exp(ln(i, straight)) : 0));
         let step = [0, 0];
         for (let k = 0; k < 40; k++) {
             const miss = missAt(eps);
@@ -514,7 +518,7 @@ function representative(model, strain, elastic, begin, flows, x) {
             const said = "as the curves rise in steep steps; solve this joint instead";
             throw new RangeError(`archord: the law finds no representative strain at ${inDigits(place)} dR, ${said}.`);
         }
-        const [pin, block] = flowsAt(eps);
+        const [pin, block] = curvesAt(eps).map((curve) => curve.s);
         return { pin, block, strain: { pin: eps[0], block: eps[1] } };
     });
 }
@@ -551,7 +555,7 @@ function hardenedLoss(data, strain, elastic, begin, given, x) {
     const kind = `${strain ? "strain" : "stress"} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
         const hardens = BODIES.filter((body) => flows[body]);
-        const rises = hardens.map((body) => 2 * Math.log(WIDE) * riseOf(flows[body], found[i].strain[body]));
+        const rises = hardens.map((body) => 2 * Math.log(WIDE) * curveAt(flows[body], found[i].strain[body]).rise);
         const yielded = Math.min(Math.max((1 - Math.exp(state.force)) / 0.02, 0), 1);
         const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded;
         const deviation = Math.hypot(state.deviation, wrong);
