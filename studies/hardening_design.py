@@ -92,7 +92,8 @@ def pair(metal_of: Mapping[str, Any], strain: bool, clearance: float) -> Drawn:
     E, nu = (np.array([metal_of[body][key] for body in BODIES]) for key in ("E", "nu"))
     compliances = (1 - nu**2 if strain else 1.0) / E
     E_star = 1 / compliances.sum()
-    elastic = Elastic(compliances[0] * E_star, *(nu / (1 - nu) if strain else nu), clearance)
+    m, n = nu / (1 - nu) if strain else nu
+    elastic = Elastic(compliances[0] * E_star, m, n, clearance)
     own: Row = {} if strain else {"analysis.plane": "stress"}
     own["joint.clearance"] = clearance
     strengths = []

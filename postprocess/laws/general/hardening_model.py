@@ -14,7 +14,6 @@ eps and the way back follow the same s_eff.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -36,7 +35,12 @@ TERMS = (
     *("s onset", "gain onset", "share onset", "x share", "s share", "x soft", "x weaker"),
     *("weaker weaker", "rise rise", "gain gain", "x bend", "apart bend"),
 )
-_FACTORS = [names.split() for names in TERMS]
+INPUTS = (
+    *("1", "x", "s", "share", "soft", "weaker", "apart", "clearance"),
+    *("rise", "bend", "gain", "onset"),
+)
+# (terms, 2) the places of the two inputs that make each of `TERMS`
+_FACTORS = np.array([[INPUTS.index(name) for name in (*of.split(), "1")[:2]] for of in TERMS])
 _WIDTH = 0.7  # standard deviation of ln(strain)
 _PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
 STRAINS = np.exp(_WIDTH * _PLACES)  # over eps_rep
@@ -129,7 +133,7 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
     share, soft = (p, p * m) if body == "pin" else (1 - p, (1 - p) * n)
     ls = np.log(at.own.s)
     weaker = np.clip(np.log(at.other) - ls, -_ALIKE, _ALIKE)
-    inputs = {
+    of = {
         "1": 1.0,
         "x": np.log(np.maximum(at.x, _NEAREST)),
         "s": ls,
@@ -143,10 +147,12 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
         "gain": np.minimum(ls - np.log(first[BODIES.index(body)]), _LARGEST_GAIN),
         "onset": np.minimum(at.begins(at.own.s) / at.x, _EARLIEST) ** 2,
     }
-    products = np.empty((len(TERMS), *ls.shape))
-    for k, names in enumerate(_FACTORS):
-        products[k] = math.prod(inputs[name] for name in names)
-    return products
+    inputs = np.empty((len(INPUTS), *ls.shape))
+    for k, name in enumerate(INPUTS):
+        inputs[k] = of[name]
+    one, other = _FACTORS.T
+    product: Array = inputs[one] * inputs[other]
+    return product
 
 
 def begins_of(numbers: Sequence[float]) -> Callable[[Array], Array]:
