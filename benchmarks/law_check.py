@@ -173,7 +173,7 @@ def table_of(found: list[Off]) -> Table:
 def largest_table(found: list[Off]) -> Table:
     """The largest error of P from 0.1 to 2 dR of each joint, in per cent: what half and nine in ten
     of the joints stay below, and the largest of all."""
-    table = Table("largest error of a joint", "number", "half", "9 in 10", "all", left=1)
+    table = Table("largest error of P, 0.1 to 2 dR", "number", "half", "9 in 10", "all", left=1)
     kinds = defaultdict(list)
     for one in found:
         usual = one.errors["P 0.1 to 2 dR"]

@@ -33,6 +33,7 @@ from archord.postprocess.laws.general.hardening_model import (
     flows,
     kind,
     mean_flows,
+    peak_rise,
     representative,
     terms,
     unsure,
@@ -67,27 +68,30 @@ _WITHIN = 0.93  # share of errors that the expected error is to contain
 
 @dataclass(frozen=True)
 class Hardened:
-    """A joint that was solved: its ``numbers``, how its bodies harden, and ``ln(P/P_el)`` ``(k,)``
-    at ``x`` ``(k,)``."""
+    """A joint that was solved: its ``numbers``, how its bodies harden, and ``ln(P/P_el)`` and
+    ``ln(p0/p0_el)``, each ``(k,)``, at ``x`` ``(k,)``."""
 
     numbers: Sequence[float]
     given: Flows
     x: Array
     force: Array
+    peak: Array
 
     @classmethod
     def of(cls, joint: LawJoint, runs: list[NodeRun]) -> Hardened:
         """The joint that was solved in ``runs``."""
         numbers = joint_numbers(joint)
-        x, y, *_ = first_loading(runs).T
-        inside = (x >= _RANGE[0]) & (x <= _RANGE[1])
-        x = x[inside]
+        nodes = first_loading(runs)
+        inside = (nodes[:, 0] >= _RANGE[0]) & (nodes[:, 0] <= _RANGE[1])
+        x, y, peak, _ = nodes[inside].T
         elastic = elastic_model()
         of_bodies = Elastic(*numbers[1:5])
         side = sides_of(numbers)[0]
         begins = first_yield(elastic, bool(numbers[0]), of_bodies, Yielding(*numbers[5:]).of(side))
-        force = np.log(y[inside] / elastic.at(of_bodies, x).y) - mesh_excess(side, x / begins)
-        return cls(numbers, flows(joint), x, force)
+        without = elastic.at(of_bodies, x)
+        excess = mesh_excess(side, x / begins)
+        force = np.log(y / without.y) - excess
+        return cls(numbers, flows(joint), x, force, np.log(peak / without.peak) - excess)
 
     @property
     def plane(self) -> str:
@@ -161,6 +165,22 @@ def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, 
     return model
 
 
+def fit_peak(joints: list[Hardened], model: Model) -> dict[str, float]:
+    """The factor on `peak_rise` by plane, by least squares of ln p0."""
+    factors = {}
+    for plane in sorted({joint.plane for joint in joints}):
+        rises = []
+        misses = []
+        for joint in joints:
+            if joint.plane == plane:
+                found, lost = joint.state(model)
+                rises.append(peak_rise(joint.given, found, lost))
+                misses.append(joint.peak - lost.peak)
+        rise = np.concatenate(rises)
+        factors[plane] = float(f"{rise @ np.concatenate(misses) / (rise @ rise):.4g}")
+    return factors
+
+
 def predicted(joints: list[Hardened], model: Model) -> list[Model]:
     """For each joint the coefficients that the other parts of the joints give; ``model`` is of all
     joints."""
@@ -206,7 +226,11 @@ def main(folder: Path) -> None:
     factors, table = errors_of(joints, predicted(joints, model))
     found = {name: [float(f"{value:.5g}") for value in values] for name, values in model.items()}
     stored = json.loads(TABLE.read_text(encoding="utf-8"))
-    new = {"strain": stored["strain"] | found, "error": stored["error"] | factors}
+    new = {
+        "strain": stored["strain"] | found,
+        "peak": stored["peak"] | fit_peak(joints, model),
+        "error": stored["error"] | factors,
+    }
     TABLE.write_text(json.dumps(new, indent=1) + "\n", encoding="utf-8")
     print(table.markdown())
 

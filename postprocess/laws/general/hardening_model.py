@@ -8,7 +8,7 @@ P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x 
 what the two bodies are, of how the curve s(PEEQ) rises and bends, and of how near first yield by
 s_eff is: the first points that yield strain less than those later. hardening_model.json has its
 coefficients by plane and body, and factors of the expected error: hardening_fit.py makes it. p0,
-eps and the way back follow the same s_eff.
+eps and the way back follow the same s_eff, and p0 the rise of the curve, too.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _EARLIEST = 1.2  # x of first yield by s_eff over x, above which nothing has yielded
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
-_YIELDED = 0.02
+_YIELDED = 0.02  # of P
+_PEAK_YIELDED = 0.1  # of p0
 _LEAST = 0.5  # ln of the rise that counts where a curve is flat
 WIDE = 3.0  # factor on eps_rep, up and down, between which the curve tells the error
 
@@ -233,10 +234,12 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
         )
     lost = loss(numbers, Yielding(*found.s), x)
     slope = spline_slopes(np.log(x), lost.force) / x
+    plane = kind(numbers).split()[0]
+    peak = lost.peak + table["peak"][plane] * peak_rise(given, found, lost)
     wrong = table["error"][kind(numbers)] * unsure(given, found, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
     way_error = np.hypot(lost.way_error, wrong)  # of the travel, too
-    return lost._replace(slope=slope, deviation=error, way_error=way_error)
+    return lost._replace(slope=slope, deviation=error, peak=peak, way_error=way_error)
 
 
 def kind(numbers: Sequence[float]) -> str:
@@ -258,10 +261,23 @@ def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
     return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)
 
 
+def peak_rise(given: Flows, found: Strains, lost: Loss) -> Array:
+    """The rise of the curve of the weaker body ``(k,)``, where `_PEAK_YIELDED` of p0 and more is
+    ``lost`` to yielding, and less before: points under the largest pressure strain more than
+    eps_rep."""
+    rises = np.zeros_like(found.s)
+    for i, mean in mean_flows(given).items():
+        rises[i] = curve_at(mean, found.strain[i]).rise
+    weaker = found.s.argmin(axis=0)
+    rise: Array = rises[weaker, np.arange(len(weaker))]
+    return rise * np.clip((1 - np.exp(lost.peak)) / _PEAK_YIELDED, 0.0, 1.0)
+
+
 @cache
 def hardening_model() -> dict[str, dict[str, Any]]:
-    """The model that comes with archord: ``strain``, the coefficients of `TERMS` by plane and body,
-    and ``error``, the factor on `unsure` that 9 in 10 errors keep, by `kind`."""
+    """The model that comes with archord: ``strain``, the coefficients of `TERMS` by plane and body;
+    ``peak``, the factor on `peak_rise` by plane; and ``error``, the factor on `unsure` that 9 in 10
+    errors keep, by `kind`."""
     table = json.loads(TABLE.read_text(encoding="utf-8"))
     strain = {name: np.array(values) for name, values in table["strain"].items()}
-    return {"strain": strain, "error": table["error"]}
+    return table | {"strain": strain}

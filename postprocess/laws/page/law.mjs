@@ -552,17 +552,22 @@ function hardenedLoss(data, strain, elastic, begin, given, x) {
     const logs = x.map(Math.log);
     const slopes = splineSlopes(logs, lost.map((state) => state.force), false);
     const alone = BODIES.filter((body) => Number.isFinite(begin[body]));
-    const kind = `${strain ? "strain" : "stress"} ${alone.length > 1 ? "both" : alone[0]}`;
+    const plane = strain ? "strain" : "stress";
+    const kind = `${plane} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
-        const hardens = BODIES.filter((body) => flows[body]);
-        const rises = hardens.map((body) => 2 * Math.log(WIDE) * curveAt(flows[body], found[i].strain[body]).rise);
-        const yielded = Math.min(Math.max((1 - Math.exp(state.force)) / 0.02, 0), 1);
-        const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded;
+        const riseOf = (body) => (flows[body] ? curveAt(flows[body], found[i].strain[body]).rise : 0);
+        const rises = BODIES.map((body) => 2 * Math.log(WIDE) * riseOf(body));
+        const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded(state.force, 0.02);
+        const weaker = found[i].block < found[i].pin ? "block" : "pin";
+        const peak = state.peak + data.hardening.peak[plane] * riseOf(weaker) * yielded(state.peak, 0.1);
         const deviation = Math.hypot(state.deviation, wrong);
         const wayError = Math.hypot(state.wayError, wrong);
-        return { ...state, slope: slopes[i] / x[i], deviation, wayError };
+        return { ...state, slope: slopes[i] / x[i], deviation, peak, wayError };
     });
 }
+
+/** How far a loss of P or p0 has got to where all of what hardening does is felt. */
+const yielded = (loss, felt) => clip((1 - Math.exp(loss)) / felt, 0, 1);
 
 // --- the law of one joint
 
