@@ -42,9 +42,7 @@ def test_a_pair_of_metals_is_the_joint_of_the_scene_that_names_them(plane: str) 
     )
     metal_of = {body: metals()[metal] for body, metal in named.items()}
     drawn = hardening_design.pair(metal_of, plane == "strain", 0.005)
-    np.testing.assert_allclose(
-        drawn.numbers, joint_numbers(LawJoint.from_scene(scene)), rtol=1e-12
-    )
+    np.testing.assert_allclose(drawn.numbers, joint_numbers(LawJoint.from_scene(scene)), rtol=1e-12)
 
 
 @pytest.mark.parametrize("plane", SMALLEST_S)
