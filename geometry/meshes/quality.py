@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import basix
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 
 from archord.geometry.basis import Array, bulk_quadrature, lagrange_element, tabulate
 from archord.geometry.meshes.cells import corners_of, distinct, entities_of, sides_of
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
+from archord.kernels.compat import cell_nodes
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 # Smallest over largest jacobian below which a cell is told of. Cells below -0.02 are refused: the
@@ -19,6 +23,13 @@ _DISTORTED = 0.02
 # area over the square of the longest edge, or the root of the volume over its cube, below which a
 # cell is told of
 _THIN = 0.005
+# area over the square of the edge of the regular cell, or the root of the volume over its cube
+_REGULAR = {
+    basix.CellType.triangle: 3**0.5 / 4,
+    basix.CellType.quadrilateral: 1.0,
+    basix.CellType.tetrahedron: (2**0.5 / 12) ** 0.5,
+    basix.CellType.hexahedron: 1.0,
+}
 _UNLIKE_CORNERS = {
     2: "triangles alone, or with quadrilaterals of four different corners",
     3: "tetrahedra alone, or with hexahedra of eight different corners",
@@ -159,20 +170,58 @@ def distorted(mesh: MeshArrays) -> list[str]:
     ]
 
 
-def thin(mesh: MeshArrays) -> list[str]:
-    """A warning of cells that are far longer than wide, as with one node that lies far off."""
+class Quality(NamedTuple):
+    """How good ``n`` cells are; 1 is best.
+
+    - ``jacobian`` ``(n,)``: smallest over largest Jacobian determinant of the cell's map
+    - ``roundness`` ``(n,)``: about the width over the longest edge, over this of the regular cell
+    """
+
+    jacobian: Array
+    roundness: Array
+
+
+def quality(mesh: MeshArrays) -> Quality:
+    """How good the cells of ``mesh`` are."""
+    smallest, largest = smallest_determinants(mesh)
+    return Quality(smallest / largest, _widths(mesh) / _REGULAR[mesh.kind])
+
+
+def worst_cells(mesh: Mesh) -> dict[str, float]:
+    """The lowest `Quality` of cells of a distributed ``mesh``, by its names. Collective."""
+    dim = mesh.topology.dim
+    n = mesh.topology.index_map(dim).size_local
+    cells = cell_nodes(mesh)[:n]
+    none = np.zeros(0, dtype=np.int64)
+    own = MeshArrays(mesh.geometry.x[:, :dim], mesh.basix_cell(), cells, none, none, none)
+    lowest = [float(values.min(initial=1.0)) for values in quality(own)]
+    return {
+        name: mesh.comm.allreduce(value, MPI.MIN)
+        for name, value in zip(Quality._fields, lowest, strict=True)
+    }
+
+
+def _widths(mesh: MeshArrays) -> Array:
+    """The area over the square of the longest edge, or the root of the volume over its cube
+    ``(n,)``: about the width of cells over their length."""
     d = mesh.dimension
     ends = mesh.x[entities_of(mesh.kind, mesh.cells, 1)[:, :2]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     longest = lengths.reshape(len(mesh.cells), -1).max(axis=1)
-    roundness = (measures(mesh) / longest**d) ** (1 / (d - 1))
-    bad = np.flatnonzero(roundness < _THIN)
+    width: Array = (measures(mesh) / longest**d) ** (1 / (d - 1))
+    return width
+
+
+def thin(mesh: MeshArrays) -> list[str]:
+    """A warning of cells that are far longer than wide, as with one node that lies far off."""
+    width = _widths(mesh)
+    bad = np.flatnonzero(width < _THIN)
     if not len(bad):
         return []
-    at = _place_of(mesh, bad[roundness[bad].argmin()])
+    at = _place_of(mesh, bad[width[bad].argmin()])
     return [
         f"{len(bad)} cells are far longer than wide, the worst at {at} by about "
-        f"{1 / roundness.min():.2g}: look "
+        f"{1 / width.min():.2g}: look "
         "whether their nodes are where they belong"
     ]
 

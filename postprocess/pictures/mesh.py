@@ -22,7 +22,7 @@ from archord.geometry.meshes.cells import (
 )
 from archord.geometry.meshes.check import cracks, parts
 from archord.geometry.meshes.mesh_arrays import MeshArrays
-from archord.geometry.meshes.quality import distorted, measures, place
+from archord.geometry.meshes.quality import distorted, measures, place, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.patches import Patches
 from archord.postprocess.pictures.pictures import save_figure
@@ -31,7 +31,8 @@ from archord.report.table import Table
 
 
 def mesh_text(name: str, mesh: MeshArrays) -> str:
-    """What is in ``mesh``, in tables with a row a set; warnings come last."""
+    """What is in ``mesh``, in tables with a row a set, which tell the `quality` of the worst cells;
+    warnings come last."""
     area = measures(mesh)
     is_plane = mesh.dimension == 2
     extents = " by ".join(f"{extent:g}" for extent in np.ptp(mesh.x, axis=0))
@@ -40,10 +41,13 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     extent = f"{extents} from {place(mesh.x.min(axis=0))}"
     head = f"{name}: {len(mesh.cells)} {kind}, {len(mesh.x)} nodes, {extent}"
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
-    bodies = Table("cell set", "cells", "area" if is_plane else "volume", "parts", left=1)
+    size = "area" if is_plane else "volume"
+    bodies = Table("cell set", "cells", size, "parts", "Jacobian", "roundness", left=1)
+    good = quality(mesh)
     for name, inside in cells.items():
         n_parts = parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1
-        bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", n_parts)
+        worst = [f"{values[inside].min(initial=1.0):.2g}" for values in good]
+        bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", n_parts, *worst)
     columns = ["facet set", "of", "circle", "facets", "length", "shortest", "longest"]
     if not is_plane:
         columns = ["facet set", "of", "middle", "cylinder", *columns[3:]]

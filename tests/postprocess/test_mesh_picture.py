@@ -38,8 +38,10 @@ def test_what_is_said_of_a_mesh():
     assert head == "ring.msh: 24 quadrilaterals of order 1, 48 nodes, 6 by 6 from (-3, -3)"
     said = rows("\n".join(tables))
     area = 12 / 2 * np.sin(np.pi / 6)
-    assert said["inner"].split() == ["inner", "12", f"{3 * area:.6g}", "1"]
-    assert said["all"].split() == ["all", "24", f"{8 * area:.6g}", "2"]
+    roundness = 3 * area / 12 / (4 * np.sin(np.pi / 12)) ** 2  # radii 1 and 2
+    worst = ["0.5", f"{roundness:.2g}"]
+    assert said["inner"].split() == ["inner", "12", f"{3 * area:.6g}", "1", *worst]
+    assert said["all"].split() == ["all", "24", f"{8 * area:.6g}", "2", *worst]
     chord = 2 * np.sin(np.pi / 12)
     assert "inner, all  (0, 0) R 1, sagitta 0.033, closed  " in said["bore"]
     assert said["bore"].split()[-3:] == [f"{12 * chord:.5g}", *2 * [f"{chord:.5g}"]]
@@ -67,7 +69,7 @@ def test_a_mesh_in_space_is_told_of_and_drawn(tmp_path):
     head, *tables = mesh_text("bar.msh", mesh).split("\n\n")
     assert head == "bar.msh: 6 hexahedra of order 2, 105 nodes, 3 by 1 by 2 from (0, 0, 0)"
     said = rows("\n".join(tables))
-    assert said["bar"].split() == ["bar", "6", "6", "1"]
+    assert said["bar"].split() == ["bar", "6", "6", "1", "1", "1"]
     columns = ["bar", "right", "bar", "(3,", "0.5,", "1)", "2", "2", "1", "1"]
     assert said["bar right"].split() == columns
     assert draw_mesh(mesh, tmp_path / "bar.png").stat().st_size > 10_000

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from basix import CellType
+from dolfinx.mesh import create_unit_square
 from mpi4py import MPI
 
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE, lagrange_element, tabulate
@@ -13,7 +15,13 @@ from archord.geometry.meshes.fenicsx import distribute, gathered
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.motions import AXISYMMETRIC, free_motions
-from archord.geometry.meshes.quality import beyond_axis, distorted, faults
+from archord.geometry.meshes.quality import (
+    beyond_axis,
+    distorted,
+    faults,
+    quality,
+    worst_cells,
+)
 from archord.geometry.meshes.refine import Circle, refined
 
 
@@ -457,3 +465,46 @@ def test_checks_see_the_mesh_of_all_ranks(comm):
     mesh = distribute(comm, MeshArrays.of_sets(QUADRILATERAL, *TWO, {}) if comm.rank == 0 else None)
     whole = gathered(mesh)
     assert (whole is None) or len(whole.cells) == 10
+
+
+REGULAR = {
+    TRIANGLE: [[0, 0], [1, 0], [0.5, 0.75**0.5]],
+    QUADRILATERAL: [[0, 0], [1, 0], [0, 1], [1, 1]],
+    CellType.tetrahedron: [[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]],
+    CellType.hexahedron: [[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)],
+}
+
+
+def of_one_cell(kind, x):
+    none = np.zeros(0, dtype=np.int64)
+    cells = np.arange(len(x))[None]
+    return MeshArrays(np.array(x, dtype=float), kind, cells, np.zeros(1), none, none)
+
+
+@pytest.mark.parametrize("kind", REGULAR)
+def test_regular_cells_of_any_size_are_the_best_and_flat_ones_are_less_round(kind):
+    x = np.array(REGULAR[kind])
+    for size in (1.0, 1e-6):
+        np.testing.assert_allclose(quality(of_one_cell(kind, size * x)), 1.0)
+    flat = quality(of_one_cell(kind, x * np.append(np.ones(x.shape[1] - 1), 0.01)))
+    assert flat.roundness[0] < 0.15
+    assert flat.jacobian[0] == pytest.approx(1.0)
+
+
+def test_a_bent_side_lowers_the_jacobian_as_far_as_a_closed_form_says():
+    """The middle of the side y = 0 of a right triangle is moved into it by h: the determinant of
+    the map is 1 - 4 h X."""
+    h = 0.1
+    x = [[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, h]]
+    assert quality(of_one_cell(TRIANGLE, x)).jacobian[0] == pytest.approx(1 - 4 * h)
+
+
+@pytest.mark.mpi
+def test_the_worst_cells_are_those_of_all_ranks():
+    """The right half of a square of right triangles is made four times as long."""
+    mesh = create_unit_square(MPI.COMM_WORLD, 6, 6)
+    x = mesh.geometry.x[:, 0]
+    x[:] += 3 * np.maximum(x - 0.5, 0.0)
+    worst = worst_cells(mesh)
+    assert worst["jacobian"] == pytest.approx(1.0)
+    assert worst["roundness"] == pytest.approx(4 / 2 / (4**2 + 1) / (3**0.5 / 4))
