@@ -38,11 +38,12 @@ def test_what_is_said_of_a_mesh():
     assert head == "ring.msh: 24 quadrilaterals of order 1, 48 nodes, 6 by 6 from (-3, -3)"
     said = rows("\n".join(tables))
     area = 12 / 2 * np.sin(np.pi / 6)
-    roundness = 3 * area / 12 / (4 * np.sin(np.pi / 12)) ** 2  # radii 1 and 2
-    worst = ["0.5", f"{roundness:.2g}"]
-    assert said["inner"].split() == ["inner", "12", f"{3 * area:.6g}", "1", *worst]
-    assert said["all"].split() == ["all", "24", f"{8 * area:.6g}", "2", *worst]
     chord = 2 * np.sin(np.pi / 12)
+    # the determinant grows with the radius, from 1 to 2 and from 2 to 3
+    inner = ["0.5", f"{3 * area / 12 / (2 * chord) ** 2:.2g}"]
+    everything = ["0.5", f"{5 * area / 12 / (3 * chord) ** 2:.2g}"]
+    assert said["inner"].split() == ["inner", "12", f"{3 * area:.6g}", "1", *inner]
+    assert said["all"].split() == ["all", "24", f"{8 * area:.6g}", "2", *everything]
     assert "inner, all  (0, 0) R 1, sagitta 0.033, closed  " in said["bore"]
     assert said["bore"].split()[-3:] == [f"{12 * chord:.5g}", *2 * [f"{chord:.5g}"]]
     assert "inner, all  (0, 0) R 1, sagitta 0.033  " in said["half"]
