@@ -85,7 +85,7 @@ class Report:
             },
             "ranks": ranks,
             "peak_memory": [],
-            **account.facts,
+            **account.facts(),
             "tolerances": {
                 "newton": self.system.problem.tolerance,
                 "gamma_factor": account.scene.analysis.gamma_factor,

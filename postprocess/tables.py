@@ -189,9 +189,6 @@ def facts_of(run: Run) -> Iterator[tuple[str, str]]:
     cells = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')}"
     counts = f"{cells} of degree {run.scene.analysis.degree}, {mesh.get('dofs', '?')} dofs"
     yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
-    worst = [f"{name} {value:.2g}" for name, value in mesh.get("worst_cells", {}).items()]
-    if worst:
-        yield "worst cells", f"{', '.join(worst)} (1 is best)"
 
 
 def history_table(run: Run) -> Table:

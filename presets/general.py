@@ -87,7 +87,7 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         fixed=fixed(system),
         per_step=(*per_step(system), "slip"),
         balance=_balance_of(scene, system.problem.kinematics.axes),
-        facts=_facts(scene, system, file),
+        facts=partial(_facts, scene, system, file),
         warnings=warnings,
         checks=step_checks(scene, system),
         refusal=partial(refusal, system),
@@ -127,8 +127,7 @@ def _balance_of(scene: ProblemScene, axes: Sequence[str]) -> Callable[[Accepted,
 
 
 def _facts(scene: ProblemScene, system: System, file: str | None) -> dict[str, Any]:
-    """Sizes of the mesh, which is in a ``file``, if any, and what was made of the scene.
-    Collective."""
+    """Sizes of the mesh, which is in a ``file``, if any, and what was made of the scene."""
     source = {"file": scene.mesh.file} if scene.mesh.file else {}
     if file:
         source["sha256"] = sha256(Path(file).read_bytes()).hexdigest()

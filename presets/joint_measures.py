@@ -47,7 +47,7 @@ def joint_account(
         fixed=("s", "angle", "weight"),
         per_step=per_step(system),
         balance=joint.force_balance,
-        facts=joint.facts(),
+        facts=joint.facts,
         warnings=before_steps(scene, system),
         checks=step_checks(scene, system),
         refusal=lambda steps: "",  # supports and the load hold both bodies
@@ -149,7 +149,7 @@ class JointMeasures:
         return max(abs(force - P) for force in forces.values()) / scale if scale else 0.0
 
     def facts(self) -> dict[str, dict[str, Any]]:
-        """Sizes of the mesh and what was made of the scene, for run.json. Collective."""
+        """Sizes of the mesh and what was made of the scene, for run.json."""
         shares = [pair.share for pair in self.system.contact.pairs]
         model = {"E_star": self.scene.E_star, "contact_shares": shares}
         return {"mesh": sizes(self.system), "model": model, "materials": self.scene.materials}

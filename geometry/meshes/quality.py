@@ -7,14 +7,11 @@ from typing import NamedTuple
 
 import basix
 import numpy as np
-from dolfinx.mesh import Mesh
-from mpi4py import MPI
 
 from archord.geometry.basis import Array, bulk_quadrature, lagrange_element, tabulate
 from archord.geometry.meshes.cells import corners_of, distinct, entities_of, sides_of
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
-from archord.kernels.compat import cell_nodes
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 # Smallest over largest jacobian below which a cell is told of. Cells below -0.02 are refused: the
@@ -185,20 +182,6 @@ def quality(mesh: MeshArrays) -> Quality:
     """How good the cells of ``mesh`` are."""
     smallest, largest = smallest_determinants(mesh)
     return Quality(smallest / largest, _widths(mesh) / _REGULAR[mesh.kind])
-
-
-def worst_cells(mesh: Mesh) -> dict[str, float]:
-    """The lowest `Quality` of cells of a distributed ``mesh``, by its names. Collective."""
-    dim = mesh.topology.dim
-    n = mesh.topology.index_map(dim).size_local
-    cells = cell_nodes(mesh)[:n]
-    none = np.zeros(0, dtype=np.int64)
-    own = MeshArrays(mesh.geometry.x[:, :dim], mesh.basix_cell(), cells, none, none, none)
-    lowest = [float(values.min(initial=1.0)) for values in quality(own)]
-    return {
-        name: mesh.comm.allreduce(value, MPI.MIN)
-        for name, value in zip(Quality._fields, lowest, strict=True)
-    }
 
 
 def _widths(mesh: MeshArrays) -> Array:

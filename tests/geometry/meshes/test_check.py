@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from basix import CellType
-from dolfinx.mesh import create_unit_square
 from mpi4py import MPI
 
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE, lagrange_element, tabulate
@@ -20,7 +19,6 @@ from archord.geometry.meshes.quality import (
     distorted,
     faults,
     quality,
-    worst_cells,
 )
 from archord.geometry.meshes.refine import Circle, refined
 
@@ -497,14 +495,3 @@ def test_a_bent_side_lowers_the_jacobian_as_far_as_a_closed_form_says():
     h = 0.1
     x = [[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, h]]
     assert quality(of_one_cell(TRIANGLE, x)).jacobian[0] == pytest.approx(1 - 4 * h)
-
-
-@pytest.mark.mpi
-def test_the_worst_cells_are_those_of_all_ranks():
-    """The right half of a square of right triangles is made four times as long."""
-    mesh = create_unit_square(MPI.COMM_WORLD, 6, 6)
-    x = mesh.geometry.x[:, 0]
-    x[:] += 3 * np.maximum(x - 0.5, 0.0)
-    worst = worst_cells(mesh)
-    assert worst["jacobian"] == pytest.approx(1.0)
-    assert worst["roundness"] == pytest.approx(4 / 2 / (4**2 + 1) / (3**0.5 / 4))
