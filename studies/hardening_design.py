@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.elasticity import Plane, contact_modulus
 from archord.materials.named import metals
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import NODES, SMALLEST_S, law_of_numbers
@@ -89,11 +90,13 @@ def hardening(random: np.random.Generator, strength: float, E: float, clearance:
 
 def pair(metal_of: Mapping[str, Any], strain: bool, clearance: float) -> Drawn:
     """The joint of the metals of "pin" and "block", in plane ``strain`` or in plane stress."""
-    E, nu = (np.array([metal_of[body][key] for body in BODIES]) for key in ("E", "nu"))
-    compliances = (1 - nu**2 if strain else 1.0) / E
-    E_star = 1 / compliances.sum()
+    plane: Plane = "strain" if strain else "stress"
+    metals_in_order = [metal_of[body] for body in BODIES]
+    moduli = [contact_modulus(metal["E"], metal["nu"], plane) for metal in metals_in_order]
+    E_star = 1 / sum(1 / modulus for modulus in moduli)
+    nu = np.array([metal["nu"] for metal in metals_in_order])
     m, n = nu / (1 - nu) if strain else nu
-    elastic = Elastic(compliances[0] * E_star, m, n, clearance)
+    elastic = Elastic(E_star / moduli[0], m, n, clearance)
     own: Row = {} if strain else {"analysis.plane": "stress"}
     own["joint.clearance"] = clearance
     strengths = []
@@ -120,7 +123,8 @@ def pairs(number: int, plane: str, random: np.random.Generator) -> Iterator[Draw
 
 
 def all_pairs(plane: str) -> Iterator[Drawn]:
-    """All pairs of different named metals that yield before 3 dR, with one clearance."""
+    """All pairs of named metals, each with itself, too, that yield before 3 dR, with one
+    clearance."""
     for names in itertools.product(sorted(metals()), repeat=2):
         metal_of = {body: metals()[name] for body, name in zip(BODIES, names, strict=True)}
         joint = pair(metal_of, plane == "strain", _ALL_PAIRS_CLEARANCE)
@@ -183,18 +187,20 @@ def _up_to_the_last(opens: Callable[[float], Any]) -> Callable[[float], Any]:
 def main() -> None:
     """Print a sweep file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--fresh", type=int, help="that many joints to check the law on")
+    which.add_argument("--metals", choices=SMALLEST_S, help="all pairs of metals in this plane")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--element-size", type=float, default=CHECK_SIZE, help="of fresh ones")
-    parser.add_argument("--metals", choices=SMALLEST_S, help="all pairs of metals in this plane")
     given = parser.parse_args()
-    text = sweep_file(rows_to_fit(drawn(1.0, _SEED)))
     if given.fresh:
         chosen = drawn(given.fresh / NUMBER, 1000 * given.seed)
         text = checking(sweep_file(rows_to_check(chosen)), given.element_size)
-    if given.metals:
+    elif given.metals:
         rows = sweep_file(rows_to_fit(all_pairs(given.metals)))
         text = checking(rows, given.element_size)
+    else:
+        text = sweep_file(rows_to_fit(drawn(1.0, _SEED)))
     plane = 'plane = "strain"\n'
     print(text.replace(plane, f"{plane}tolerance = {_TOLERANCE}\n", 1), end="")
 

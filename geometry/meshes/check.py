@@ -26,7 +26,7 @@ from archord.geometry.meshes.cells import (
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.overlap import PIECES, Inside, overlaps, polygons
-from archord.geometry.meshes.quality import distorted, faults, place, thin
+from archord.geometry.meshes.quality import faults, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
@@ -77,7 +77,8 @@ def check_mesh(
             overlaps(mesh, inside, overlap),
         )
         fault = next(found, "")
-        warnings = distorted(mesh) + thin(mesh) + [said for said, _ in straight]
+    if mesh is not None and not fault:
+        warnings = poor_cells(mesh, quality(mesh)) + [said for said, _ in straight]
         for body, within in inside.items():
             warnings += cracks(mesh, body, within)
             if is_plane:

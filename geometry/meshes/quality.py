@@ -153,20 +153,6 @@ def _falls(ratio: float) -> str:
     return f"its Jacobian determinant falls to {ratio:.2g} of its largest value"
 
 
-def distorted(mesh: MeshArrays) -> list[str]:
-    """A warning of cells whose map is nearly singular somewhere: stresses there are worthless."""
-    smallest, largest = smallest_determinants(mesh)
-    bad = np.flatnonzero(smallest < _DISTORTED * largest)
-    if not len(bad):
-        return []
-    ratio = smallest[bad] / largest[bad]
-    at = _place_of(mesh, bad[ratio.argmin()])
-    return [
-        f"{len(bad)} cells are distorted, the worst at {at}: "
-        f"{_falls(ratio.min())}, so stresses there are not to be trusted"
-    ]
-
-
 class Quality(NamedTuple):
     """How good ``n`` cells are; 1 is best.
 
@@ -195,18 +181,27 @@ def _widths(mesh: MeshArrays) -> Array:
     return width
 
 
-def thin(mesh: MeshArrays) -> list[str]:
-    """A warning of cells that are far longer than wide, as with one node that lies far off."""
-    width = _widths(mesh)
+def poor_cells(mesh: MeshArrays, good: Quality) -> list[str]:
+    """Warnings of cells of ``mesh``, which are as ``good`` as `quality` says: of those whose map is
+    nearly singular somewhere, where stresses are worthless, and of those that are far longer than
+    wide, as with one node that lies far off."""
+    said = []
+    bad = np.flatnonzero(good.jacobian < _DISTORTED)
+    if len(bad):
+        worst = bad[good.jacobian[bad].argmin()]
+        said.append(
+            f"{len(bad)} cells are distorted, the worst at {_place_of(mesh, worst)}: "
+            f"{_falls(good.jacobian[worst])}, so stresses there are not to be trusted"
+        )
+    width = good.roundness * _REGULAR[mesh.kind]
     bad = np.flatnonzero(width < _THIN)
-    if not len(bad):
-        return []
-    at = _place_of(mesh, bad[width[bad].argmin()])
-    return [
-        f"{len(bad)} cells are far longer than wide, the worst at {at} by about "
-        f"{1 / width.min():.2g}: look "
-        "whether their nodes are where they belong"
-    ]
+    if len(bad):
+        worst = bad[width[bad].argmin()]
+        said.append(
+            f"{len(bad)} cells are far longer than wide, the worst at {_place_of(mesh, worst)} by "
+            f"about {1 / width[worst]:.2g}: look whether their nodes are where they belong"
+        )
+    return said
 
 
 def measures(mesh: MeshArrays) -> Array:

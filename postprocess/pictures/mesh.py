@@ -22,7 +22,7 @@ from archord.geometry.meshes.cells import (
 )
 from archord.geometry.meshes.check import cracks, parts
 from archord.geometry.meshes.mesh_arrays import MeshArrays
-from archord.geometry.meshes.quality import distorted, measures, place, quality
+from archord.geometry.meshes.quality import measures, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.patches import Patches
 from archord.postprocess.pictures.pictures import save_figure
@@ -59,7 +59,7 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     points = Table("point set", "nodes", left=1)
     for name, nodes in mesh.point_sets.items():
         points.add(name, len(nodes))
-    doubts = [*mesh.notes, *distorted(mesh)]
+    doubts = [*mesh.notes, *poor_cells(mesh, good)]
     for name, inside in cells.items():
         doubts += cracks(mesh, name, inside)
     parts_of_text = [head]

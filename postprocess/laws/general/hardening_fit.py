@@ -35,6 +35,7 @@ from archord.postprocess.laws.general.hardening_model import (
     mean_flows,
     peak_rise,
     representative,
+    rises_of,
     terms,
     unsure,
 )
@@ -174,7 +175,7 @@ def fit_peak(joints: list[Hardened], model: Model) -> dict[str, float]:
         for joint in joints:
             if joint.plane == plane:
                 found, lost = joint.state(model)
-                rises.append(peak_rise(joint.given, found, lost))
+                rises.append(peak_rise(found, rises_of(joint.given, found), lost))
                 misses.append(joint.peak - lost.peak)
         rise = np.concatenate(rises)
         factors[plane] = float(f"{rise @ np.concatenate(misses) / (rise @ rise):.4g}")
@@ -202,7 +203,7 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
         told = [
             lost.force - joint.force,
             lost.deviation,
-            unsure(joint.given, found, lost),
+            unsure(rises_of(joint.given, found), lost),
         ]
         by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])
     factors = {}

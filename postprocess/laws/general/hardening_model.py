@@ -235,8 +235,9 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     lost = loss(numbers, Yielding(*found.s), x)
     slope = spline_slopes(np.log(x), lost.force) / x
     plane = kind(numbers).split()[0]
-    peak = lost.peak + table["peak"][plane] * peak_rise(given, found, lost)
-    wrong = table["error"][kind(numbers)] * unsure(given, found, lost)
+    rises = rises_of(given, found)
+    peak = lost.peak + table["peak"][plane] * peak_rise(found, rises, lost)
+    wrong = table["error"][kind(numbers)] * unsure(rises, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
     way_error = np.hypot(lost.way_error, wrong)  # of the travel, too
     return lost._replace(slope=slope, deviation=error, peak=peak, way_error=way_error)
@@ -251,26 +252,38 @@ def kind(numbers: Sequence[float]) -> str:
     return f"{'strain' if strain else 'stress'} {body}"
 
 
-def unsure(given: Flows, found: Strains, lost: Loss) -> Array:
-    """By how much P ``(k,)`` would change, roughly and relatively, if eps_rep were `WIDE` times as
-    large: ln of the rise of the curves, at least `_LEAST`, where `_YIELDED` of P and more is
-    ``lost`` to yielding, and less before."""
-    squares: Array = np.full(len(lost.force), _LEAST**2)
-    for i, mean in mean_flows(given).items():
-        squares += (2 * np.log(WIDE) * curve_at(mean, found.strain[i]).rise) ** 2
-    return np.sqrt(squares) * np.clip((1 - np.exp(lost.force)) / _YIELDED, 0.0, 1.0)
-
-
-def peak_rise(given: Flows, found: Strains, lost: Loss) -> Array:
-    """The rise of the curve of the weaker body ``(k,)``, where `_PEAK_YIELDED` of p0 and more is
-    ``lost`` to yielding, and less before: points under the largest pressure strain more than
-    eps_rep."""
+def rises_of(given: Flows, found: Strains) -> Array:
+    """The rise of the `Curve` of pin and block at eps_rep ``(2, k)``; 0 of a body that does not
+    harden."""
     rises = np.zeros_like(found.s)
     for i, mean in mean_flows(given).items():
         rises[i] = curve_at(mean, found.strain[i]).rise
+    return rises
+
+
+def unsure(rises: Array, lost: Loss) -> Array:
+    """By how much P ``(k,)`` would change, roughly and relatively, if eps_rep were `WIDE` times as
+    large: ln of the rise of the curves, at least `_LEAST`, where `_YIELDED` of P and more is
+    ``lost`` to yielding, and less before. ``rises`` ``(2, k)`` is what `rises_of` tells."""
+    across = 2 * np.log(WIDE) * rises
+    of_curves: Array = np.sqrt(_LEAST**2 + (across**2).sum(axis=0))
+    return of_curves * _share(lost.force, _YIELDED)
+
+
+def peak_rise(found: Strains, rises: Array, lost: Loss) -> Array:
+    """The rise of the curve of the weaker body ``(k,)``, where `_PEAK_YIELDED` of p0 and more is
+    ``lost`` to yielding, and less before: points under the largest pressure strain more than
+    eps_rep. ``rises`` ``(2, k)`` is what `rises_of` tells."""
     weaker = found.s.argmin(axis=0)
     rise: Array = rises[weaker, np.arange(len(weaker))]
-    return rise * np.clip((1 - np.exp(lost.peak)) / _PEAK_YIELDED, 0.0, 1.0)
+    return rise * _share(lost.peak, _PEAK_YIELDED)
+
+
+def _share(lost: Array, whole: float) -> Array:
+    """How far the part that is lost, of which ``lost`` ``(k,)`` is the logarithm of the rest, comes
+    to ``whole``; 1 beyond."""
+    share: Array = np.clip((1 - np.exp(lost)) / whole, 0.0, 1.0)
+    return share
 
 
 @cache
