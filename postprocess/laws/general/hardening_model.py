@@ -23,7 +23,7 @@ import numpy as np
 
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.joint import Array, LawJoint
-from archord.postprocess.laws.general.spline import spline_slopes
+from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
 from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss, yield_places
 
 TABLE = Path(__file__).parent / "hardening_model.json"
@@ -56,6 +56,7 @@ _SHIFTS = 1 + _SMALL * np.array([[[0.0], [1.0], [0.0]], [[0.0], [0.0], [1.0]]])
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _EARLIEST = 1.2  # x of first yield by s_eff over x, above which nothing has yielded
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
+_NEARLY_ALIKE = 0.15  # the same, beyond which the curve of the weaker body alone tells of p0
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
 _YIELDED = 0.02  # of P
 _PEAK_YIELDED = 0.1  # of p0
@@ -271,11 +272,13 @@ def unsure(rises: Array, lost: Loss) -> Array:
 
 
 def peak_rise(found: Strains, rises: Array, lost: Loss) -> Array:
-    """The rise of the curve of the weaker body ``(k,)``, where `_PEAK_YIELDED` of p0 and more is
-    ``lost`` to yielding, and less before: points under the largest pressure strain more than
-    eps_rep. ``rises`` ``(2, k)`` is what `rises_of` tells."""
-    weaker = found.s.argmin(axis=0)
-    rise: Array = rises[weaker, np.arange(len(weaker))]
+    """The rise of the curve of the weaker body ``(k,)``, a mean of both where they are nearly
+    alike, where `_PEAK_YIELDED` of p0 and more is ``lost`` to yielding, and less before: points
+    under the largest pressure strain more than eps_rep. ``rises`` ``(2, k)`` is what `rises_of`
+    tells."""
+    stronger = np.log(found.s[1]) - np.log(found.s[0])  # block than pin
+    of_pin = smooth_step(0.5 + stronger / (2 * _NEARLY_ALIKE))
+    rise = of_pin * rises[0] + (1 - of_pin) * rises[1]
     return rise * _share(lost.peak, _PEAK_YIELDED)
 
 

@@ -59,3 +59,10 @@ def monotone_slopes(at: Array, values: Array) -> Array:
         most = 3 * own
         slopes[..., end] = np.clip(own + bend, np.minimum(most, 0.0), np.maximum(most, 0.0))
     return slopes
+
+
+def smooth_step(t: Array) -> Array:
+    """From 0 for ``t <= 0`` to 1 for ``t >= 1``, without a kink."""
+    inside = np.clip(t, 0.0, 1.0)
+    step: Array = inside**2 * (3 - 2 * inside)
+    return step

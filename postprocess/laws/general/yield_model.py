@@ -30,7 +30,7 @@ from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.joint_curve import Piece, interval
-from archord.postprocess.laws.general.spline import spline_slopes
+from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
 
 DATA = Path(__file__).parent / "yield_model.npz"
 KERNELS = Path(__file__).parent / "yield_model.json"
@@ -290,8 +290,7 @@ def _share_of_pin(pin: Array, block: Array) -> Array:
     excess = np.zeros(len(pin))
     weaker = (pin < block) & ~_alike(pin, block)
     excess[weaker] = np.log(block[weaker] / pin[weaker]) / _BLENDED
-    t = np.minimum(excess, 1.0)
-    return t * t * (3 - 2 * t)
+    return smooth_step(excess)
 
 
 def needed(side: str) -> tuple[str, ...]:

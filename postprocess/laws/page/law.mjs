@@ -279,17 +279,21 @@ const ELASTIC_BELOW = 0.8; // x/x0: nothing has yielded
 const STRONGER = { strain: [0.5], stress: [1 - Math.sqrt(0.75), 0.2] }; // parts within which the other body matters
 const FELT = 0.3; // exponent of what a yielded pin leaves
 const DEEPER = 3; // x/x0 where that is asked
+const BLENDED = 0.05; // ln of the block's s over the pin's, up to which the processes of two sides are mixed
 const NINE_IN_TEN = 1.645; // standard deviations
 const PIN_ALONE = "strain pin alone";
 const PIN_WEAKER = "strain pin weaker";
 
-/** The sides, from the weaker body's, of a joint: the first tells its law. */
-function sideOf(strain, pin, block) {
-    if (strain && block === Infinity) return PIN_ALONE;
-    const blockWeaker = strain ? "strain block" : "stress block";
-    const pinWeaker = strain ? PIN_WEAKER : "stress pin";
-    if (alike(pin, block)) return blockWeaker;
-    return pin < block ? pinWeaker : blockWeaker;
+/** The share of joints with the weaker pin in what is told: 0 of a weaker block and of like bodies. */
+function shareOfPin({ pin, block }) {
+    if (!(pin < block) || alike(pin, block)) return 0;
+    return smoothStep(Math.log(block / pin) / BLENDED);
+}
+
+/** From 0 for t <= 0 to 1 for t >= 1, without a kink. */
+function smoothStep(t) {
+    const inside = clip(t, 0, 1);
+    return inside ** 2 * (3 - 2 * inside);
 }
 
 const alike = (a, b) => a === b || (Number.isFinite(b) && Math.abs(a - b) <= 1e-8 + 1e-4 * Math.abs(b));
@@ -369,18 +373,23 @@ function splineAt(nodes, f, df, x) {
     return [value, rise / piece.width];
 }
 
-/** What the model of one side says at the nodes x, where the bodies have these stresses (one for all, or one a node). */
+/**
+ * What the model of one side says at the nodes x, where the bodies have these stresses (one for all, or one a node);
+ * of a pin alone also its losses of p0 at all nodes, with each stress.
+ */
 function sideLoss(data, side, elastic, stresses, x, onset) {
     const told = (data.processes[side] ??= processesOf(data, side));
     const end = x[x.length - 1];
     let curves = null;
     let inputs = null;
+    let peaks = null;
     return x.map((place, i) => {
         const own = stresses[i];
-        const { x0, lost } = onset(own);
+        const { x0, lost } = onset(own, i);
         if (own !== stresses[i - 1]) {
             inputs = features(side, elastic, own, lost);
             curves = curvesOf(data, told, inputs, end / x0);
+            peaks = side === PIN_ALONE ? x.map((at) => curves(Math.log(at / x0)).peak) : null;
         }
         const u = Math.log(place / x0);
         const [[travel, toe, misfit, again], [uncertain]] = told.back([...inputs, u]);
@@ -388,19 +397,22 @@ function sideLoss(data, side, elastic, stresses, x, onset) {
         const wayError = Math.hypot(told.spread.back * uncertain, NINE_IN_TEN * misfit, again);
         const begun = clip(Math.log(place / (ELASTIC_BELOW * x0)) / 0.2, 0, 1);
         const deviation = told.spread.force * state.deviation;
-        return { ...state, slope: state.slope / place, deviation, travel: 1 + travel, toe, wayError, begun };
+        return { ...state, slope: state.slope / place, deviation, travel: 1 + travel, toe, wayError, begun, peaks };
     });
 }
 
+const NO_LOSS = { force: 0, slope: 0, deviation: 0, peak: 0, angle: 0, travel: 1, toe: 0, wayError: 0 };
+
 /** The sum of what the models of a side tell at the nodes; each begins where its body yields. */
 function totalLoss(data, side, strain, elastic, stresses, x) {
-    const none = { force: 0, slope: 0, deviation: 0, peak: 0, angle: 0, travel: 1, toe: 0, wayError: 0 };
-    let total = x.map(() => none);
+    let total = x.map(() => NO_LOSS);
+    const nothing = x.map(() => 0);
+    let ofPin = x.map(() => nothing);
     for (const model of side === PIN_WEAKER ? [PIN_ALONE, PIN_WEAKER] : [side]) {
-        const peaks = total.map((state) => state.peak);
-        const onset = onsetOf(model, strain, elastic, x, peaks);
-        if (stresses.every((own) => ELASTIC_BELOW * onset(own).x0 >= x[x.length - 1])) continue;
+        const onset = onsetOf(model, strain, elastic, x, ofPin);
+        if (stresses.every((own, i) => ELASTIC_BELOW * onset(own, i).x0 >= x[x.length - 1])) continue;
         const added = sideLoss(data, model, elastic, stresses, x, onset);
+        if (model === PIN_ALONE) ofPin = added.map((own) => own.peaks);
         total = total.map((sum, i) => {
             const own = added[i];
             const mixed = (name) => sum[name] + own.begun * (own[name] - sum[name]);
@@ -419,26 +431,43 @@ function totalLoss(data, side, strain, elastic, stresses, x) {
     return total;
 }
 
-/** By stresses: about the x of first yield, and how far ln(p0/p0_el) is lost to a weaker pin some way beyond. */
-function onsetOf(side, strain, elastic, x, peaks) {
+/**
+ * By stresses of the node i: about the x of first yield, and how far ln(p0/p0_el) is lost to a weaker pin some way
+ * beyond; ofPin[i] is what the pin loses at all x.
+ */
+function onsetOf(side, strain, elastic, x, ofPin) {
     if (side !== PIN_WEAKER) {
         const begins = yieldAt(strain, elastic);
         return (stresses) => ({ x0: begins(ownStress(side, stresses)), lost: 0 });
     }
-    const left = GRID.map((place) => ((Math.exp(straight(place, x, peaks)) * place) / 0.7) ** FELT);
-    const begins = yieldAt(strain, elastic, left);
-    return (stresses) => {
+    let peaks = null;
+    let begins = null;
+    return (stresses, i) => {
+        if (ofPin[i] !== peaks) {
+            peaks = ofPin[i];
+            const left = GRID.map((place) => ((Math.exp(straight(place, x, peaks)) * place) / 0.7) ** FELT);
+            begins = yieldAt(strain, elastic, left);
+        }
         const x0 = begins(stresses.block);
         return { x0, lost: straight(DEEPER * x0, x, peaks) };
     };
 }
 
-/** What yielding does at x: the weaker body at each x tells of it. */
+/** What yielding does at x: the weaker body at each x tells of it, both where they are nearly alike. */
 function lossOf(data, strain, elastic, stresses, x) {
-    const sides = stresses.map(({ pin, block }) => sideOf(strain, pin, block));
-    const told = {};
-    for (const side of new Set(sides)) told[side] = totalLoss(data, side, strain, elastic, stresses, x);
-    return x.map((_, i) => told[sides[i]][i]);
+    const blockWeaker = strain ? "strain block" : "stress block";
+    const pinOfStrain = stresses.every(({ block }) => block === Infinity) ? PIN_ALONE : PIN_WEAKER;
+    const pinWeaker = strain ? pinOfStrain : "stress pin";
+    const shares = stresses.map(shareOfPin);
+    const told = (side) => totalLoss(data, side, strain, elastic, stresses, x);
+    const ofBlock = shares.some((share) => share < 1) ? told(blockWeaker) : null;
+    const ofPin = shares.some((share) => share > 0) ? told(pinWeaker) : null;
+    return shares.map((share, i) => {
+        if (share === 0) return ofBlock[i];
+        if (share === 1) return ofPin[i];
+        const mixed = Object.keys(NO_LOSS).map((name) => [name, share * ofPin[i][name] + (1 - share) * ofBlock[i][name]]);
+        return Object.fromEntries(mixed);
+    });
 }
 
 // --- hardening
@@ -452,6 +481,7 @@ const WIDE = 3; // factor on a strain, up and down
 const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
 const EARLIEST = 1.2; // x of first yield by s_eff over x, above which nothing has yielded
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
+const NEARLY_ALIKE = 0.15; // the same, beyond which the curve of the weaker body alone tells of p0
 
 /** The mean s by a strain, of strains about it. */
 const meanFlow = (flow, { strains, shares }) => (strain) =>
@@ -555,11 +585,13 @@ function hardenedLoss(data, strain, elastic, begin, given, x) {
     const plane = strain ? "strain" : "stress";
     const kind = `${plane} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
-        const riseOf = (body) => (flows[body] ? curveAt(flows[body], found[i].strain[body]).rise : 0);
-        const rises = BODIES.map((body) => 2 * Math.log(WIDE) * riseOf(body));
-        const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...rises) * yielded(state.force, 0.02);
-        const weaker = found[i].block < found[i].pin ? "block" : "pin";
-        const peak = state.peak + data.hardening.peak[plane] * riseOf(weaker) * yielded(state.peak, 0.1);
+        const { pin, block, strain: strains } = found[i];
+        const rises = BODIES.map((body) => (flows[body] ? curveAt(flows[body], strains[body]).rise : 0));
+        const across = rises.map((rise) => 2 * Math.log(WIDE) * rise);
+        const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...across) * yielded(state.force, 0.02);
+        const ofPin = smoothStep(0.5 + Math.log(block / pin) / (2 * NEARLY_ALIKE));
+        const rise = ofPin * rises[0] + (1 - ofPin) * rises[1];
+        const peak = state.peak + data.hardening.peak[plane] * rise * yielded(state.peak, 0.1);
         const deviation = Math.hypot(state.deviation, wrong);
         const wayError = Math.hypot(state.wayError, wrong);
         return { ...state, slope: slopes[i] / x[i], deviation, peak, wayError };

@@ -27,6 +27,11 @@ from archord.postprocess.laws.general.general_law import (
     law_of_numbers,
     outside,
 )
+from archord.postprocess.laws.general.hardening_model import (
+    hardened_loss,
+    hardening_model,
+    representative,
+)
 from archord.postprocess.laws.general.joint import LawJoint
 
 X = np.linspace(0.0, 3.0, 241)
@@ -368,3 +373,35 @@ def test_curves_that_rise_in_steep_steps_are_refused() -> None:
     )
     with pytest.raises(ValueError, match=r"no representative strain at .* dR, as the curves rise"):
         general_law(joint)
+
+
+@pytest.mark.parametrize("hardens", ["pin", "block"])
+@pytest.mark.parametrize("share", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
+    plane: str, share: float, hardens: str
+) -> None:
+    """One body hardens until it is the stronger one. All that yielding does is smooth in x: from
+    one of 300 points to the next its slope changes by less than 0.1 %, the travel's by less than
+    1 %."""
+    clearance = 0.005
+    first = 0.17
+    second = {"strain": 1.17, "stress": 1.45}[plane] * first
+
+    def line(strain: np.ndarray) -> np.ndarray:
+        return first * (1 + 0.45 * strain / clearance)
+
+    def flat(strain: np.ndarray) -> np.ndarray:
+        return np.full_like(strain, second)
+
+    flows = (line, flat) if hardens == "pin" else (flat, line)
+    stresses = (first, second) if hardens == "pin" else (second, first)
+    numbers = (float(plane == "strain"), share, 0.45, 0.5, clearance, *stresses)
+    x = np.geomspace(0.3, 3.0, 300)
+    pin, block = representative(hardening_model()["strain"], numbers, flows, x).s
+    assert (pin[0] < block[0]) != (pin[-1] < block[-1])
+    lost = hardened_loss(numbers, flows, x)
+    for name in ("force", "peak", "angle", "deviation"):
+        bends = np.diff(getattr(lost, name), 2)
+        assert np.abs(bends).max() < 1e-3, name
+    assert np.abs(np.diff(lost.travel, 2)).max() < 1e-2

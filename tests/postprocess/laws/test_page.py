@@ -122,6 +122,21 @@ def random_joints(count: int) -> list[dict[str, Any]]:
     return joints
 
 
+def crossing_joints() -> list[dict[str, Any]]:
+    """Joints with a body that hardens until it is the stronger one."""
+    joints = []
+    for plane in ("strain", "stress"):
+        given = {"radius": 10.0, "clearance": 0.05, "E_star": 1e5, "plane": plane, "nu": 0.3}
+        given |= {"pin_nu": 0.3, "pin_share": 0.4}
+        begin = 85.0
+        other = {"strain": 1.17, "stress": 1.45}[plane] * begin
+        curve = [[0.0, begin], [0.02, 2.8 * begin], [0.1, 3.0 * begin]]
+        for weaker, stronger in (("pin", "block"), ("block", "pin")):
+            own = {f"{weaker}_yield": begin, f"{weaker}_hardening": curve}
+            joints.append(given | own | {f"{stronger}_yield": other})
+    return joints
+
+
 def law_or_reason(given: dict[str, Any]) -> JointCurve | str:
     """The law of a joint, whose hardening is points, or the sentence that refuses it."""
     curves = {
@@ -153,7 +168,7 @@ def test_javascript_says_what_python_says(tmp_path):
     little noise amplifies it, to some 1e-11 of a force and more of what depends on its slope."""
     rng = np.random.default_rng(11)
     cases = []
-    for joint in random_joints(50):
+    for joint in random_joints(50) + crossing_joints():
         places = joint["clearance"] * np.column_stack(
             [rng.uniform(0, 3, 20), rng.uniform(0, 3, 20)]
         )
