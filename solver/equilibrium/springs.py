@@ -4,8 +4,9 @@ Springs between bodies and their last accepted state hold what does not touch ev
 to rest as if rigid. Each point of a body of area ``A`` is pulled back with `WEAK` times ``M / A``
 per displacement and area, ``M`` being the modulus of uniaxial strain, so that a force moves the
 body by about ``1 / WEAK`` times as much as it deforms it; rigid discs under forces, with `WEAK`
-``M``. Beside a far softer body ``M`` is `_STIFFER` times its shear modulus: springs are weak for
-all that carries.
+``M``. In space, where ``A`` is a volume, ``M`` is times the edge of a cube of this volume: so the
+springs do not depend on the unit of length. Beside a far softer body ``M`` is `_STIFFER` times its
+shear modulus: springs are weak for all that carries.
 """
 
 from __future__ import annotations
@@ -150,6 +151,7 @@ def _form(drives: Drives, body: Body, softest: float) -> fem.Form:
     dx = drives.loads.measure(body.cells or body.name)
     area = drives.loads.integral(fem.Constant(V.mesh, 1.0) * dx)
     own = float(body.material.elastic_tangent[0, 0])
-    modulus = fem.Constant(V.mesh, WEAK * spring_modulus(own, softest) / area)
+    length = np.cbrt(area) if drives.dimension == 3 else 1.0
+    modulus = fem.Constant(V.mesh, WEAK * spring_modulus(own, softest) * length / area)
     product = ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V))
     return fem.form(modulus * drives.loads.swept(product) * dx)

@@ -244,3 +244,43 @@ def test_a_step_in_which_springs_alone_hold_a_body_is_not_accepted(kinematics):
         system.solve([3.0], StepRules(minimum=0.05, cutback=0.05))  # a large step and a small one
     np.testing.assert_array_equal(system.equilibrium.state(), settled)
     assert np.abs(settled).max() < 1e-3
+
+
+def carried_by_base(kinematics: str, length: float) -> tuple[float, float]:
+    """What the base lacks of the force on a block that nothing but contact holds, over this force;
+    and how far the block goes, over the ``length`` of its edges."""
+    if kinematics == "space":
+        mesh = tagged(bodies(MPI.COMM_SELF))
+        base, faces, lid, down = "base", ("upper", "lower"), "upper", "z"
+        names = ("lower", "upper")
+    else:
+        boxes = {"base": (0.0, 0.0, 1.0, 1.0), "lid": (0.0, 1.0, 1.0, 1.0)}
+        mesh = rectangles(boxes, size=0.5)
+        base, faces, lid, down = "base bottom", ("base top", "lid bottom"), "lid", "y"
+        names = ("base", "lid")
+    mesh.mesh.geometry.x[:] *= length
+    force = 20.0 * length ** (2 if kinematics in ("axisymmetric", "space") else 1)
+    problem = Problem(
+        mesh,
+        [Body(name, Elastic(210e3, 0.3)) for name in names],
+        [Interaction("contact", faces)],
+        [Support(base)],
+        [Load("press", on=lid, direction=down, force=-force)],
+        kinematics=kinematics,
+    )
+    system = System(problem)
+    system.solve([1.0])
+    lacking = system.reaction(base)[-1] / force - 1
+    return float(lacking), system.drive_displacement("press") / length
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e3])
+@pytest.mark.parametrize("kinematics", ["plane strain", "plane stress", "axisymmetric", "space"])
+def test_springs_do_not_depend_on_the_unit_of_length(kinematics, length):
+    """Millimetres, and units that are a million times as large or a thousandth as large: the base
+    takes the same part of the force, all but what springs carry."""
+    lacking, moved = carried_by_base(kinematics, 1.0)
+    lacking_there, moved_there = carried_by_base(kinematics, length)
+    assert abs(lacking) < 1e-6
+    assert lacking_there == pytest.approx(lacking, abs=1e-8)
+    assert moved_there == pytest.approx(moved, rel=1e-6)
