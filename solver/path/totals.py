@@ -44,10 +44,12 @@ class Totals:
 
     def reaction_moments(self, name: str, point: Sequence[float]) -> Array:
         """Moments ``(t,)`` of these forces at ``point``: about z in a plane, about x, y and z in
-        space, none around an axis."""
+        space, none around an axis. At large strain forces act where their nodes are now."""
         d = self.problem.kinematics.dimension
         forces = self.equilibrium.diagnostics.reaction(name)
         places = self.equilibrium.unknowns.V.tabulate_dof_coordinates()[: len(forces), :d]
+        if self.bulk.finite:
+            places = places + self.equilibrium.displacement()[: len(forces)]
         arm = places - np.asarray(point)
         turns = self.problem.kinematics.turns
         here = [(arm[:, i] * forces[:, j] - arm[:, j] * forces[:, i]).sum() for i, j in turns]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.shapes.rectangles import rectangles
 from archord.materials.elasticity import Elastic
 from archord.materials.finite import LargeStrain
 from archord.materials.hardening import LinearHardening
@@ -19,7 +20,16 @@ from archord.presets.joint import joint_problem
 from archord.scene.presets.joint import Scene
 from archord.solver.bulk import Bulk
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
+from archord.solver.problem import (
+    Body,
+    Coupling,
+    Dirichlet,
+    Drive,
+    Interaction,
+    Load,
+    Problem,
+    Support,
+)
 from tests.solver.parts import (
     ELASTIC,
     PERFECT,
@@ -35,6 +45,7 @@ from tests.solver.parts import (
     space,
 )
 from tests.solver.solving import joint_system
+from tests.solver.space import box
 from tests.solver.test_bulk_terms import stiffness, warped_annulus
 
 
@@ -245,3 +256,34 @@ def test_energy_balances_where_metal_flows_far():
     stored, dissipated = system.energies()
     assert stored + dissipated == pytest.approx(work, rel=5e-3)
     assert system.peeq()[0] > 0.15
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_moments_balance_where_bodies_move_far(dimension):
+    """A bar is clamped at one end; the other one is bent far down and turned. Both moments are of
+    forces where they act on the deformed bar."""
+    if dimension == 2:
+        mesh = rectangles({"bar": (0.0, 0.0, 4.0, 1.0)}, size=0.5)
+        wall, end, down, turn = "bar left", "bar right", "y", "rotation"
+    else:
+        mesh = box(MPI.COMM_SELF, (4, 1, 1), (4.0, 1.0, 1.0))
+        wall, end, down, turn = "x0", "x1", "z", "rotation y"
+    point = (4.0, 0.5, 0.5)[:dimension]
+    system = System(
+        Problem(
+            mesh,
+            [Body("bar", Elastic(1e3, 0.3), "bar" if dimension == 2 else "box")],
+            supports=[Support("wall", on=wall)],
+            couplings=[Coupling("end", end, point)],
+            loads=[
+                Load("down", on="end", direction=down, displacement=-1.0),
+                Load("turn", on="end", direction=turn, displacement=0.3),
+            ],
+            strain="large",
+        )
+    )
+    system.solve([0.5, 1.0])
+    origin = (0.0,) * dimension
+    at_wall = system.reaction_moments("wall", origin)
+    at_end = system.reaction_moments("end", origin)
+    np.testing.assert_allclose(at_end, -at_wall, atol=1e-8 * np.abs(at_wall).max())
