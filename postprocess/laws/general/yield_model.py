@@ -17,11 +17,11 @@ law_fit.py makes both.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -97,55 +97,43 @@ class Loss(NamedTuple):
     way_error: Array  # of P on the way back, over the largest P
 
 
-def first_yield(model: ElasticModel, strain: bool, joint: Elastic, s: npt.ArrayLike) -> Array:
-    """About the x of first yield by ``s`` (any shape): where the elastic p0 is ``g`` sigY, with g
-    of Hertz's contact at first and less in wide ones; at the end of the range or beyond for a
-    larger s, infinite for an infinite one."""
-    return yield_places(model, strain, joint)(s)
+def first_yield(
+    model: ElasticModel, strain: bool, joint: Elastic, s: npt.ArrayLike, left: Array | float = 1.0
+) -> Array:
+    """About the x of first yield by ``s`` (any shape): where the elastic p0, times what is ``left``
+    of it, is ``g`` sigY, with g of Hertz's contact at first and less in wide ones; at the end of
+    the range or beyond for a larger s, infinite for an infinite one."""
+    return yield_places(model, strain, joint, left)(s)
 
 
-class YieldPlaces(Protocol):
-    """`first_yield` of a joint."""
+def yield_places(
+    model: ElasticModel, strain: bool, joint: Elastic, left: Array | float = 1.0
+) -> Callable[[npt.ArrayLike], Array]:
+    """`first_yield` of a joint by s."""
+    pressure = left * model.pressure(joint, _GRID) / _pressure_at_yield(strain, _GRID)
+    over = np.log(np.maximum.accumulate(pressure))
 
-    def __call__(self, s: npt.ArrayLike, left: Array | float = 1.0) -> Array:
-        """By ``s`` (any shape), where the factor ``left`` is left of the elastic p0 at `_GRID`."""
-
-
-def yield_places(model: ElasticModel, strain: bool, joint: Elastic) -> YieldPlaces:
-    """`first_yield` of a joint by s, and by what is left of its elastic p0."""
-    pressure = model.pressure(joint, _GRID) / _pressure_at_yield(strain, _GRID)
-    places = np.log(_GRID)
-
-    def place(s: npt.ArrayLike, left: Array | float = 1.0) -> Array:
-        over = np.log(np.maximum.accumulate(left * pressure))
-        found = np.interp(np.log(s), over, places)
+    def place(s: npt.ArrayLike) -> Array:
+        found = np.interp(np.log(s), over, np.log(_GRID))
         return np.where(np.isfinite(s), np.exp(found), np.inf)
 
     return place
 
 
 def onset(
-    side: str, model: ElasticModel, joint: Elastic, yielding: Yielding, x: Array, of_pin: Array
+    side: str, model: ElasticModel, joint: Elastic, yielding: Yielding, x: Array, lost: Array
 ) -> tuple[Any, Any]:
-    """About the x of first yield of the body of one of `SIDES`, for each of its s (``()`` or
-    ``(n,)``), and how far ``ln(p0/p0_el)`` is lost to a weaker pin some way beyond; ``of_pin``
-    ``(k,)`` or ``(n, k)`` is what the pin loses at ``x`` ``(k,)``, with each of its s."""
-    places = yield_places(model, side.startswith("strain"), joint)
+    """About the x of first yield of the body of one of `SIDES`, for each of its s (any shape), and
+    how far ``ln(p0/p0_el)`` is lost to a weaker pin some way beyond; ``lost`` ``(k,)`` is the loss
+    at ``x`` ``(k,)``."""
+    strain = side.startswith("strain")
     s = yielding.of(side)
     if side != PIN_WEAKER:
-        x0 = places(s)
+        x0 = first_yield(model, strain, joint, s)
         return x0, np.zeros_like(x0)
-
-    def after(own: Any, lost: Any) -> tuple[Array, Array]:
-        left = np.exp(np.interp(_GRID, x, lost)) * _GRID / 0.7
-        x0 = places(own, left**_FELT)
-        return x0, np.interp(_DEEPER * x0, x, lost)
-
-    if np.ndim(s) == 0:
-        return after(s, of_pin)
-    each = [after(own, lost) for own, lost in zip(s, of_pin, strict=True)]
-    x0, lost_beyond = np.transpose(each)
-    return x0, lost_beyond
+    left = np.exp(np.interp(_GRID, x, lost)) * _GRID / 0.7
+    x0 = first_yield(model, strain, joint, s, left**_FELT)
+    return x0, np.interp(_DEEPER * x0, x, lost)
 
 
 def mesh_excess(side: str, u: Array) -> Array:
@@ -223,10 +211,7 @@ class YieldModel:
         force, deviation = self.processes["force"].predict(rows)
         shape = self.processes["shape"].means(rows)
         nodes = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=-1)
-        curves, rises, lines = _between(nodes, u, most)
-        force, peak, angle, _ = curves.T
-        slope = rises[:, 0]
-        deviation = lines[:, -1]
+        force, slope, peak, angle, deviation = _between(nodes, u, most).T
         way, uncertain = self.processes["back"].predict(np.column_stack([each, u]))
         travel, toe, misfit, again = way.T
         errors = [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again]
@@ -245,17 +230,6 @@ class YieldModel:
         found = Loss(*everywhere)
         return found._replace(travel=1 + found.travel)
 
-    def peaks(self, inputs: Array, x0: Array, x: Array) -> Array:
-        """``ln(p0/p0_el)`` ``(n, k)`` at ``x`` ``(k,)`` of joints with these `features` ``(n, d)``,
-        which yield at about ``x0`` ``(n,)``."""
-        nodes, _ = np.split(self.processes["shape"].means(inputs), 2, axis=1)
-        u = np.log(x / x0[:, None])
-        joint, _ = begun = np.nonzero(u > _AT[0])
-        found = np.zeros(u.shape)
-        most = x[-1] / x0[joint]
-        found[begun] = _between(nodes[joint, :, None], u[begun], most)[0, :, 0]
-        return found
-
 
 def loss(
     numbers: Sequence[float], yielding: Yielding, x: Array, model: ElasticModel | None = None
@@ -269,7 +243,7 @@ def loss(
     pin, block, _ = np.broadcast_arrays(*yielding, x)
     pins = _share_of_pin(pin, block)
     if strain:
-        pin_weaker = PIN_ALONE if np.isinf(yielding.block).all() else PIN_WEAKER
+        pin_weaker = PIN_ALONE if np.isinf(block).all() else PIN_WEAKER
         shares = {"strain block": 1 - pins, pin_weaker: pins}
     else:
         shares = {"stress block": 1 - pins, "stress pin": pins}
@@ -311,15 +285,12 @@ def total_loss(
     *_, last = models
     none = np.zeros(len(x))
     total = Loss(none, none, none, none, none, none + 1, none, none)
-    of_pin = np.zeros((*np.shape(yielding.pin), len(x)))
     for side, told in models.items():
-        x0, lost = onset(side, model, joint, yielding, x, of_pin)
+        x0, lost = onset(side, model, joint, yielding, x, total.peak)
         if (ELASTIC_BELOW * x0 >= x[-1]).all():
             continue
         inputs = features(side, joint, yielding, lost)
         own = told.at(inputs, x0, x, asked if side == last else True)
-        if side != last:
-            of_pin = told.peaks(inputs, x0, x) if inputs.ndim > 1 else own.peak
         begun = np.clip(np.log(x / (ELASTIC_BELOW * x0)) / 0.2, 0.0, 1.0)
         total = Loss(
             force=total.force + own.force,
@@ -337,20 +308,20 @@ def total_loss(
 
 
 def _between(nodes: Array, u: Array, most: Array) -> Array:
-    """The curves of ``nodes`` ``(1 or k, multiples, c)`` at ``ln(x/x0) = u`` ``(k,)``, smooth
-    between nodes, their slopes by u, and straight lines between nodes, ``(3, k, c)``; only nodes up
-    to ``most`` x0 ``(k,)`` and one beyond are known."""
+    """The first of four curves of ``nodes`` ``(1 or k, multiples, 4)`` at ``ln(x/x0) = u``
+    ``(k,)``, its slope by u, and the others ``(k, 5)``: smooth between nodes; only nodes up to
+    ``most`` x0 ``(k,)`` and one beyond are known."""
     known = np.minimum(np.searchsorted(MULTIPLES, most) + 1, len(MULTIPLES))
-    found = np.zeros((3, len(u), nodes.shape[-1]))
+    found = np.zeros((len(u), 5))
     for count in np.unique(known):
         own = known == count
         rows = nodes if len(nodes) == 1 else nodes[own]
-        found[:, own] = _curves(rows[:, :count], u[own])
+        found[own] = _curves(rows[:, :count], u[own])
     return found
 
 
 def _curves(nodes: Array, u: Array) -> Array:
-    """The numbers of `_between` by all ``nodes`` ``(1 or k, known, c)``."""
+    """The numbers of `_between` by all ``nodes`` ``(1 or k, known, 4)``."""
     values = np.insert(nodes, 0, 0.0, axis=1)
     at = _AT[: values.shape[1]]
     slopes = _spline(len(at)) @ values
@@ -362,8 +333,8 @@ def _curves(nodes: Array, u: Array) -> Array:
     last = values[row, i + 1]
     piece = Piece.between(width, first, last, slopes[row, i], slopes[row, i + 1])
     curves, rises = piece.at(t)
-    lines = first + np.clip(t, 0.0, 1.0) * (last - first)
-    return np.stack([curves, rises / width, lines])
+    deviation = first + np.clip(t, 0.0, 1.0) * (last - first)
+    return np.column_stack([curves[:, 0], rises[:, :1] / width, curves[:, 1:3], deviation[:, 3]])
 
 
 @cache

@@ -373,23 +373,18 @@ function splineAt(nodes, f, df, x) {
     return [value, rise / piece.width];
 }
 
-/**
- * What the model of one side says at the nodes x, where the bodies have these stresses (one for all, or one a node);
- * of a pin alone also its losses of p0 at all nodes, with each stress.
- */
+/** What the model of one side says at the nodes x, where the bodies have these stresses (one for all, or one a node). */
 function sideLoss(data, side, elastic, stresses, x, onset) {
     const told = (data.processes[side] ??= processesOf(data, side));
     const end = x[x.length - 1];
     let curves = null;
     let inputs = null;
-    let peaks = null;
     return x.map((place, i) => {
         const own = stresses[i];
-        const { x0, lost } = onset(own, i);
+        const { x0, lost } = onset(own);
         if (own !== stresses[i - 1]) {
             inputs = features(side, elastic, own, lost);
             curves = curvesOf(data, told, inputs, end / x0);
-            peaks = side === PIN_ALONE ? x.map((at) => curves(Math.log(at / x0)).peak) : null;
         }
         const u = Math.log(place / x0);
         const [[travel, toe, misfit, again], [uncertain]] = told.back([...inputs, u]);
@@ -397,7 +392,7 @@ function sideLoss(data, side, elastic, stresses, x, onset) {
         const wayError = Math.hypot(told.spread.back * uncertain, NINE_IN_TEN * misfit, again);
         const begun = clip(Math.log(place / (ELASTIC_BELOW * x0)) / 0.2, 0, 1);
         const deviation = told.spread.force * state.deviation;
-        return { ...state, slope: state.slope / place, deviation, travel: 1 + travel, toe, wayError, begun, peaks };
+        return { ...state, slope: state.slope / place, deviation, travel: 1 + travel, toe, wayError, begun };
     });
 }
 
@@ -406,13 +401,11 @@ const NO_LOSS = { force: 0, slope: 0, deviation: 0, peak: 0, angle: 0, travel: 1
 /** The sum of what the models of a side tell at the nodes; each begins where its body yields. */
 function totalLoss(data, side, strain, elastic, stresses, x) {
     let total = x.map(() => NO_LOSS);
-    const nothing = x.map(() => 0);
-    let ofPin = x.map(() => nothing);
     for (const model of side === PIN_WEAKER ? [PIN_ALONE, PIN_WEAKER] : [side]) {
-        const onset = onsetOf(model, strain, elastic, x, ofPin);
-        if (stresses.every((own, i) => ELASTIC_BELOW * onset(own, i).x0 >= x[x.length - 1])) continue;
+        const peaks = total.map((state) => state.peak);
+        const onset = onsetOf(model, strain, elastic, x, peaks);
+        if (stresses.every((own) => ELASTIC_BELOW * onset(own).x0 >= x[x.length - 1])) continue;
         const added = sideLoss(data, model, elastic, stresses, x, onset);
-        if (model === PIN_ALONE) ofPin = added.map((own) => own.peaks);
         total = total.map((sum, i) => {
             const own = added[i];
             const mixed = (name) => sum[name] + own.begun * (own[name] - sum[name]);
@@ -431,23 +424,15 @@ function totalLoss(data, side, strain, elastic, stresses, x) {
     return total;
 }
 
-/**
- * By stresses of the node i: about the x of first yield, and how far ln(p0/p0_el) is lost to a weaker pin some way
- * beyond; ofPin[i] is what the pin loses at all x.
- */
-function onsetOf(side, strain, elastic, x, ofPin) {
+/** By stresses: about the x of first yield, and how far ln(p0/p0_el) is lost to a weaker pin some way beyond. */
+function onsetOf(side, strain, elastic, x, peaks) {
     if (side !== PIN_WEAKER) {
         const begins = yieldAt(strain, elastic);
         return (stresses) => ({ x0: begins(ownStress(side, stresses)), lost: 0 });
     }
-    let peaks = null;
-    let begins = null;
-    return (stresses, i) => {
-        if (ofPin[i] !== peaks) {
-            peaks = ofPin[i];
-            const left = GRID.map((place) => ((Math.exp(straight(place, x, peaks)) * place) / 0.7) ** FELT);
-            begins = yieldAt(strain, elastic, left);
-        }
+    const left = GRID.map((place) => ((Math.exp(straight(place, x, peaks)) * place) / 0.7) ** FELT);
+    const begins = yieldAt(strain, elastic, left);
+    return (stresses) => {
         const x0 = begins(stresses.block);
         return { x0, lost: straight(DEEPER * x0, x, peaks) };
     };

@@ -389,7 +389,7 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
     second = {"strain": 1.17, "stress": 1.45}[plane] * first
 
     def line(strain: np.ndarray) -> np.ndarray:
-        return first * (1 + 0.45 * strain / clearance)
+        return first * (1 + 0.4 * strain / clearance)
 
     def flat(strain: np.ndarray) -> np.ndarray:
         return np.full_like(strain, second)
