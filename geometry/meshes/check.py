@@ -33,6 +33,7 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 # of the clearance: sagitta from which corners of straight sides show in the pressure
 _POLYGONAL = 1e-3
+_ROUND_OFF = 1e-12  # of the radius: a sagitta that is none, of sides along a cylinder's axis
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
 _STRAIGHT = np.cos(0.5)  # of the angle up to which two facets are of one line
 _NO_CELL = "look whether a cell is missing there"
@@ -250,6 +251,8 @@ def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
         bulge = np.linalg.norm(middle - (start + end) / 2, axis=1)
         deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
     radii += [radius for radius in pair if not isinstance(radius, str)]
+    if deepest < _ROUND_OFF * radii[0]:
+        return
     clearance = abs(radii[0] - radii[1])
     arcs = (
         f"the arcs {' and '.join(map(repr, names))} have straight sides with a sagitta of "

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE, lagrange_element, tabulate
 from archord.geometry.curve import circle_through
 from archord.geometry.meshes.check import check_mesh
-from archord.geometry.meshes.fenicsx import distribute, gathered
+from archord.geometry.meshes.fenicsx import distribute, gathered, gmsh_to_mesh
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.motions import AXISYMMETRIC, free_motions
@@ -495,3 +495,31 @@ def test_a_bent_side_lowers_the_jacobian_as_far_as_a_closed_form_says():
     h = 0.1
     x = [[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, h]]
     assert quality(of_one_cell(TRIANGLE, x)).jacobian[0] == pytest.approx(1 - 4 * h)
+
+
+def _quarter_sleeves(gmsh) -> None:
+    """Two quarters of tubes, one in the other, whose surfaces lie on one cylinder along z."""
+    cad = gmsh.model.occ
+    for name, inner, outer in (("sleeve", 4.0, 10.0), ("hub", 10.0, 20.0)):
+        tube = [(3, cad.addCylinder(0, 0, 0, 0, 0, 3, outer, angle=np.pi / 2))]
+        bore = [(3, cad.addCylinder(0, 0, 0, 0, 0, 3, inner, angle=np.pi / 2))]
+        tube, _ = cad.cut(tube, bore)
+        cad.synchronize()
+        gmsh.model.addPhysicalGroup(3, [tag for _, tag in tube], name=name)
+        sides = [tag for _, tag in gmsh.model.getBoundary(tube, oriented=False)]
+        round_ones = [tag for tag in sides if gmsh.model.getType(2, tag) == "Cylinder"]
+        round_ones.sort(key=lambda tag: gmsh.model.occ.getMass(2, tag))
+        for at, tag in zip(("inside", "outside"), round_ones, strict=True):
+            gmsh.model.addPhysicalGroup(2, [tag], name=f"{name} {at}")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 3.0)
+    gmsh.model.mesh.generate(3)
+
+
+def test_straight_sides_along_a_cylinder_have_no_sagitta():
+    """Curved cells of two tubes without clearance, as for a press fit: sides along the axis are
+    straight."""
+    along_z = {"centre": (0.0, 0.0, 0.0), "radius": 10.0, "axis": (0.0, 0.0, 1.0)}
+    circles = [Circle(facets=name, **along_z) for name in ("sleeve outside", "hub inside")]
+    mesh = gmsh_to_mesh(MPI.COMM_SELF, _quarter_sleeves, circles)
+    bodies = {"sleeve": "sleeve", "hub": "hub"}
+    assert not check_mesh(mesh, bodies, pairs=[("sleeve outside", "hub inside")])
