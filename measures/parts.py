@@ -35,7 +35,9 @@ def _moments(moments: Callable[[Accepted, str], Any]) -> dict[str, Value]:
 
 
 def _contact_length(state: Accepted, contact: str) -> float:
-    return float(np.mean([profile.contact_length for profile in state.met[contact]]))
+    """Of the whole, as the force is."""
+    modelled = np.mean([profile.contact_length for profile in state.met[contact]])
+    return state.system.problem.symmetry * float(modelled)
 
 
 def _contact_fraction(state: Accepted, contact: str) -> float:

@@ -93,6 +93,7 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         refusal=partial(refusal, system),
         ending=partial(ending, scene, system),
         fit=scene.path.fit_steps if scene.fits else 0,
+        copies=system.problem.symmetry,
     )
 
 

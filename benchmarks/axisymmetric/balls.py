@@ -125,12 +125,9 @@ def _deep(size: float = 0.28, yield_stress: float = YIELD_STRESS, strain: str = 
     return _pressed(mesh, material, SMALL_BALL, DEPTH, steps=10, strain=strain)
 
 
-def hertz(
-    run: Run, modulus: float, symmetry: int = 1, peak: float | None = None
-) -> Iterator[Compared]:
-    """P from the depth, a and p0 from the force, by the contact ``modulus`` E*, of a run whose mesh
-    has the whole over its ``symmetry``. The ``peak`` of the pressure is the history's if
-    absent."""
+def hertz(run: Run, modulus: float, peak: float | None = None) -> Iterator[Compared]:
+    """P from the depth, a and p0 from the force, by the contact ``modulus`` E*. The ``peak`` of the
+    pressure is the history's if absent."""
     if peak is None:
         peak = run.columns["contact largest pressure"][-1]
     force = abs(run.columns["ball force"][-1])
@@ -138,7 +135,7 @@ def hertz(
     radius = (3 * force * BALL / (4 * modulus)) ** (1 / 3)
     pressure = 3 * force / (2 * math.pi * radius**2)
     exact = 4 / 3 * modulus * math.sqrt(BALL) * depth**1.5
-    area = symmetry * run.columns["contact contact area"][-1]
+    area = run.columns["contact contact area"][-1]
     yield Compared("P", exact, "Hertz", force)
     yield Compared("a", radius, "Hertz", math.sqrt(area / math.pi))
     yield Compared("p0", pressure, "Hertz", peak)

@@ -126,7 +126,7 @@ def hertz(size: float) -> Iterator[Compared]:
     """A quarter of the ball; its peak is recovered at the corners of facets."""
     with _run_of(_balls(size, 1, steps=2)) as run:
         peak = max(surface.corner_pressure.max() for surface in run.contact().values())
-        yield from balls.hertz(run, balls.MODULUS / 2, symmetry=4, peak=peak)
+        yield from balls.hertz(run, balls.MODULUS / 2, peak=peak)
 
 
 def mindlin(size: float) -> Iterator[Compared]:

@@ -77,6 +77,19 @@ def test_a_force_moves_a_straight_edge_as_far_as_it_takes(pressed):
     assert found["clamp x"] == pytest.approx(-pressed["press force"], rel=1e-6)
 
 
+def test_half_a_lug_tells_of_the_whole(pressed):
+    """Forces and contact lengths are those of the lug that is drawn whole."""
+    held = {"name": "held", "on": "flat", "fixed": ["y"]}
+    whole = solved(
+        [load(displacement=0.1)], interactions=[CONTACT], supports=[CLAMP, held], half=False
+    )[1]
+    for name in ("press force", "clamp x", "contact force x"):
+        assert pressed[name] == pytest.approx(whole[name], rel=0.01), name
+    length = "contact contact length"
+    assert whole[length] > 10
+    assert pressed[length] == pytest.approx(whole[length], rel=0.05)
+
+
 def test_loads_in_turn_end_where_loads_together_do():
     """Of an elastic body without contact."""
     on = {"pin": "none", "supports": [CLAMP], "half": False}
