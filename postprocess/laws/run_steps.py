@@ -83,9 +83,19 @@ class RunSteps:
             "pressure": self.pressure,
             "length_unit": length_unit,
             "force_unit": force_unit,
-            "pin_length": self.run.scene.thickness,
+            "pin_length": self.pin_length,
             "radius": self.radius,
         }
+
+    @property
+    def pin_length(self) -> float:
+        """The length of the pin that carries the forces: the thickness of what it lies in; 1 for
+        forces per unit length, and in space on an own mesh, which does not tell it."""
+        scene = self.run.scene
+        shape = None if scene.has_laws else scene.mesh.shape
+        if shape is None or shape.space is None:
+            return scene.thickness
+        return shape.inner.thickness if shape.kind == "clevis" else shape.space.thickness
 
     def require_rising(self, steps: np.ndarray) -> None:
         """Raise `InputError` if the force does not rise from each of the ``steps`` to the next."""
@@ -121,6 +131,8 @@ class RunSteps:
         units = ", ".join(f"{name} in {run.units.get(name, '-')}" for name in self.names)
         thick = scene.analysis.thickness
         of = "per unit thickness" if thick is None else f"of a thickness of {thick:g}"
+        if scene.analysis.plane == "space":
+            of = "of the whole"
         error = "unknown: the scene asks for no analysis.accuracy"
         if self.accuracy is not None:
             error = f"{self.accuracy:.2g} of the largest (estimated)"
@@ -195,8 +207,8 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
 
 
 def _is_of_joint(run: Run) -> bool:
-    """Whether the run tells force and displacement of a joint, not of loads by name."""
-    return "P" in run.columns
+    """Whether the run is of a joint in a plane, not of loads by name."""
+    return run.scene.has_laws
 
 
 def _columns_of_load(run: Run, of: str | None) -> list[str]:

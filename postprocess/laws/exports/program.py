@@ -67,15 +67,26 @@ class Program:
     def units(self) -> str:
         """The units of the law, and the length of the pin that its forces are of."""
         of = "per unit length of the pin"
+        length = f"a pin of length PIN_LENGTH = {self.pin_length:g}"
         rule = "multiply them by the pin's length"
         if self.pin_length != 1:
             of = f"total, of a pin of length {self.pin_length:g} ({self.length_unit})"
             rule = "do not multiply them by the length"
+        elif self._is_total:
+            of = "total"
+            length = "the whole pin, for which PIN_LENGTH = 1 stands"
+            rule = "do not multiply them by the length"
         return (
             f"UNITS: displacements in {self.length_unit}; force P in {self.force_unit}, {of}: P, "
-            "stiffness and expected error are for a pin of length PIN_LENGTH = "
-            f"{self.pin_length:g}; {rule}."
+            f"stiffness and expected error are for {length}; {rule}."
         )
+
+    @property
+    def _is_total(self) -> bool:
+        """Whether the unit of force is named, and not of a force per length."""
+        per_length = tuple(f"{sign}{self.length_unit}" for sign in ("/", " "))
+        is_named = not self.force_unit.startswith(("unit of", "-"))
+        return is_named and not self.force_unit.endswith(per_length)
 
     @property
     def header(self) -> str:

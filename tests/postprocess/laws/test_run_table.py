@@ -4,6 +4,7 @@ is refused."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,13 +13,14 @@ import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
+from archord.postprocess.laws.exports.program import Program
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.run_table import _left_out, _steps_asked, run_table
 from archord.postprocess.run import Run
 from archord.report.errors import InputError
-from archord.scene.file import load_scene
+from archord.scene.file import load_scene, parse_any
 from tests.output.run_files import solved
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -201,6 +203,35 @@ def test_a_load_of_a_general_scene_has_a_table_too() -> None:
     assert curve.residual([0.8])[0] == pytest.approx(0.13, abs=0.002)
     assert run_table(run).about == curve.about
     assert np.isnan(curve.at([0.5]).peak_pressure)
+
+
+@pytest.mark.parametrize(
+    ("file", "load", "length"),
+    [
+        ("lug_in_space", "pull", 12.0),
+        ("joint_in_space", "press", 10.0),
+        ("clevis_in_space", "", 16.0),
+    ],
+)
+def test_forces_in_space_are_total(file, load, length) -> None:
+    """Of the thickness that the pin lies in; exports say that nothing is to be multiplied by it."""
+    given = load_scene(SCENES / f"{file}.toml")
+    run = general()
+    run.scene = parse_any(given.general()) if file == "joint_in_space" else given
+    name = load or run.scene.load[0].name
+    run.columns |= {
+        f"{name} {what}": run.columns[f"pull {what}"] for what in ("displacement", "force")
+    }
+    run.columns = {column: values[1:] for column, values in run.columns.items()}
+    run.units = {f"{name} displacement": "mm", f"{name} force": "N"}
+    run.columns |= {f"{part.name} largest pressure": [0.0] * 20 for part in run.scene.interaction}
+    curve = run_table(run, name)
+    assert curve.pin_length == length
+    assert "do not multiply" in Program.of(curve).units
+    of_own_mesh = Program.of(replace(curve, pin_length=1.0))
+    assert "total: " in of_own_mesh.units
+    assert "do not multiply" in of_own_mesh.units
+    assert "multiply them by" in Program.of(replace(curve, pin_length=1.0, force_unit="N/mm")).units
 
 
 falling = list(synthetic(path(END), yields=False).columns["P"])
