@@ -74,7 +74,8 @@ def identify(
     begun = law_scene(scene, overrides)
     if begun.joint.is_ring:
         raise InputError(f"{scene}: is a ring, and the law is of a pin in a block.")
-    measured = read_curve(curve, delta, load)
+    units = begun.units.length, begun.units.force_of(begun.analysis.thickness)
+    measured = read_curve(curve, delta, load, units)
     at = _number("--offset", offset)
     stiff = None if stiffness == _FREE else _stiffness(stiffness)
     found = fit(begun, measured, frees, at, stiff)

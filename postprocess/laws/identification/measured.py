@@ -41,12 +41,18 @@ class MeasuredCurve:
         return float(self.load.max())
 
 
-def read_curve(path: Path, delta: str | None = None, load: str | None = None) -> MeasuredCurve:
+def read_curve(
+    path: Path,
+    delta: str | None = None,
+    load: str | None = None,
+    units: tuple[str, str] | None = None,
+) -> MeasuredCurve:
     """The curve in the file ``path``: its first two columns, or those of these headings.
 
     Columns are separated by semicolons, tabs, commas or blanks; but for commas, numbers may have a
     decimal comma. Lines that begin with # are comments. Rows without one of the numbers are left
-    out. Raises `InputError`.
+    out. It is said where a heading has another unit in brackets than ``units``, of displacement and
+    force. Raises `InputError`.
     """
     lines = [line for line in read_text(path).splitlines() if line.strip() and line[0] != "#"]
     separator = next((sign for sign in _SEPARATORS if lines and sign in lines[0]), None)
@@ -56,15 +62,20 @@ def read_curve(path: Path, delta: str | None = None, load: str | None = None) ->
     begin = next((k for k, row in enumerate(cells) if _is_number(row[0])), len(cells))
     heads = cells[0] if begin else []
     columns = [_column(path, heads, name, k) for k, name in enumerate((delta, load))]
+    if columns[0] == columns[1]:
+        fault = f"column {columns[0] + 1} is taken for displacement and force"
+        raise InputError(f"{path}: {fault}; name both, by --delta and --load.")
     numbers = np.array([_numbers(path, row, columns) for row in cells[begin:]]).reshape(-1, 2)
     whole = np.isfinite(numbers).all(axis=1)
     if whole.sum() < FEWEST:
-        said = f"has {whole.sum()} rows with two numbers, and a fit needs {FEWEST} and more"
-        raise InputError(f"{path}: {said}.")
-    left_out = []
+        fault = f"has {whole.sum()} rows with two numbers, and a fit needs {FEWEST} and more"
+        raise InputError(f"{path}: {fault}.")
+    said = []
+    if units and heads:
+        said += _other_units(path, [heads[column] for column in columns], units)
     if not whole.all():
-        left_out.append(f"{path}: {(~whole).sum()} of {len(whole)} rows lack a number; left out")
-    return _compressed(path, numbers[whole, 0], numbers[whole, 1], left_out)
+        said.append(f"{path}: {(~whole).sum()} of {len(whole)} rows lack a number; left out")
+    return _compressed(path, numbers[whole, 0], numbers[whole, 1], said)
 
 
 def _is_number(cell: str) -> bool:
@@ -86,6 +97,17 @@ def _column(path: Path, heads: list[str], name: str | None, default: int) -> int
             return known.index(name)
     there = f"its headings are {', '.join(heads)}" if heads else "it has no headings"
     raise InputError(f"{path}: has no column {name!r}; {there}.")
+
+
+def _other_units(path: Path, heads: list[str], units: tuple[str, str]) -> list[str]:
+    """What there is to say of ``heads`` whose unit in brackets is none of the ``units``."""
+    said = []
+    for head, unit in zip(heads, units, strict=True):
+        found = re.search(r"[\[(]([^\])]*)[\])]", head)
+        if found and found[1].strip() != unit:
+            other = f"{path}: {head!r} has another unit than the scene, {unit}"
+            said.append(f"{other}; its numbers are taken as they are")
+    return said
 
 
 def _numbers(path: Path, row: list[str], columns: list[int]) -> list[float]:

@@ -161,6 +161,35 @@ def test_files_without_a_curve_are_refused(tmp_path, text, words):
         read_curve(path, load="force")
 
 
+@pytest.mark.parametrize("names", [{"delta": "u"}, {"load": "F"}])
+def test_one_column_is_not_displacement_and_force(tmp_path, names):
+    """Where one of two columns is named, and the other is taken by its place."""
+    path = tmp_path / "curve.csv"
+    path.write_text("F,u\n" + "".join(f"{k},{2 * k}\n" for k in range(9)))
+    with pytest.raises(InputError, match="is taken for displacement and force"):
+        read_curve(path, **names)
+
+
+def test_units_of_headings_are_compared_with_those_of_the_scene(tmp_path, capsys):
+    """A force in kN, and a force of the whole beside a scene without thickness."""
+    path = tmp_path / "curve.csv"
+    rows = "".join(f"{k},{2 * k}\n" for k in range(9))
+    path.write_text(f"u [mm],F (kN)\n{rows}")
+    (said,) = read_curve(path, units=("mm", "N")).said
+    assert "'F (kN)' has another unit than the scene, N" in said
+    path.write_text(f"u [mm],F [N/mm]\n{rows}")
+    assert not read_curve(path, units=("mm", "N/mm")).said
+    curve = measured(ELASTIC, {}, 5, n=40)
+    table = np.column_stack([curve.displacement, curve.load])
+    np.savetxt(path, table, delimiter=",", header="delta [m],P [N]", comments="")
+    words = ["identify", str(path), "--scene", ELASTIC, "--free", "joint.clearance"]
+    assert run([*words, "--no-confirm", "-o", str(tmp_path / "out")]) == 0
+    error = " ".join(capsys.readouterr().err.split())
+    units = archord.load_scene(ELASTIC).units
+    assert f"'delta [m]' has another unit than the scene, {units.length}" in error
+    assert f"'P [N]' has another unit than the scene, {units.force_of(None)}" in error
+
+
 def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
     curve = measured(ELASTIC, {"joint.clearance": 0.006}, 5, turns=(-0.1, 1.5), n=100, soft=0.0)
     path = tmp_path / "curve.csv"
