@@ -13,6 +13,7 @@ from archord.postprocess.probes.probed import Along, Probed, nodal
 from archord.report.errors import InputError
 
 _SAMPLES = 201  # on a line
+_BESIDE = 1e-6  # of a triangle's height, by which a point beside it still lies on it
 
 
 def along_line(run: Probed, line: Sequence[float], quantity: str, step: int) -> Along:
@@ -55,30 +56,50 @@ def _in_cells(
 
 
 def _between_nodes(fields: Fields, x: Array, values: Array) -> Array:
-    """Nodal ``values`` at ``x`` ``(k, 2)``, NaN outside the bodies."""
-    from matplotlib.tri import LinearTriInterpolator, Triangulation
-
+    """Nodal ``values`` at ``x`` ``(k, 2)``, linear in the triangles that cells are drawn by, NaN
+    outside the bodies."""
     found: Array = np.full(len(x), np.nan)
     for body in fields.bodies.values():
-        triangles = fields.triangles[fields.body == body].reshape(-1, 3)
-        interpolator = LinearTriInterpolator(
-            Triangulation(*fields.coordinates.T, triangles), values
-        )
-        here = np.ma.filled(interpolator(*x.T), np.nan)
-        found = np.where(np.isnan(found), here, found)
+        nodes = fields.triangles[fields.body == body].reshape(-1, 3)
+        triangle, weights = _in_triangles(fields.coordinates[nodes], x)
+        here = (weights * values[nodes[triangle]]).sum(axis=1)
+        found = np.where(np.isnan(found) & (triangle >= 0), here, found)
     return found
 
 
 def _of_cells(fields: Fields, x: Array, values: Array) -> Array:
     """The ``values`` of the cells in which ``x`` ``(k, 2)`` lie, NaN outside the bodies."""
-    from matplotlib.tri import Triangulation
-
     found: Array = np.full(len(x), np.nan)
     for body in fields.bodies.values():
         cells = np.flatnonzero(fields.body == body)
         triangles = fields.triangles[cells]
-        finder = Triangulation(*fields.coordinates.T, triangles.reshape(-1, 3)).get_trifinder()
-        triangle = finder(*x.T)
+        corners = fields.coordinates[triangles.reshape(-1, 3)]
+        triangle, _ = _in_triangles(corners, x)
         here = values[cells[triangle // triangles.shape[1]]]
         found = np.where(np.isnan(found) & (triangle >= 0), here, found)
     return found
+
+
+def _in_triangles(corners: Array, x: Array) -> tuple[np.ndarray, Array]:
+    """For each point ``x`` ``(k, 2)`` the triangle ``(k,)`` of these ``corners`` ``(m, 3, 2)`` that
+    it lies in or on, -1 for none, and the weights ``(k, 3)`` of the corners.
+
+    A point may be off a triangle by round-off: a line may begin at the edge of a hole, or run along
+    a straight edge."""
+    first, second, third = corners.swapaxes(0, 1)
+    one = second - first
+    other = third - first
+    twice_area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    triangle = np.full(len(x), -1)
+    weights = np.zeros((len(x), 3))
+    for k, point in enumerate(x):
+        to = point - first
+        by_second = (to[:, 0] * other[:, 1] - to[:, 1] * other[:, 0]) / twice_area
+        by_third = (one[:, 0] * to[:, 1] - one[:, 1] * to[:, 0]) / twice_area
+        of_corners = np.stack([1 - by_second - by_third, by_second, by_third], axis=1)
+        least = of_corners.min(axis=1)
+        best = int(least.argmax())
+        if least[best] > -_BESIDE:
+            triangle[k] = best
+            weights[k] = of_corners[best]
+    return triangle, weights

@@ -142,6 +142,19 @@ def test_a_line_crosses_bodies_and_leaves_gaps_out(lug):
     assert np.trapezoid(up.values, up.s) < lug.columns["pull force"][-1]
 
 
+def test_a_line_has_its_points_on_the_edges_of_bodies(lug):
+    """A line that begins at the edge of the hole has the peak of the stress there; one along the
+    straight axis of symmetry, whose nodes are off it by round-off, has all its points."""
+    hoop = lug.probe("hole", "stress_xx")
+    peak = hoop.at(90)
+    up = lug.probe(line=(0.0, 10.0, 0.0, 20.0), quantity="stress_xx")
+    assert (up.s[0], up.s[-1]) == (0.0, 10.0)
+    assert up.values[0] == up.values.max() == pytest.approx(peak, rel=1e-2)
+    along = lug.probe(line=(-10.0, 0.0, -60.0, 0.0), quantity="von_mises")
+    assert len(along.s) == len(up.s) == 201
+    assert len(lug.probe(line=(0.0, 10.0, 0.0, 20.0), quantity="mean_stress").s) == 201
+
+
 def test_a_whole_hole_runs_round_once(tmp_path):
     """From 0 to 360 degrees, symmetric about the axis of the load. Of several arcs on it stresses
     and pressures begin at the same one, behind the largest gap, wherever the x axis is."""
