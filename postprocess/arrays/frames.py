@@ -68,10 +68,12 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
     undeformed.
 
     ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both
-    positive in compression; ``weight`` is arc length, in space area; ``gap`` is positive when
-    open. Slip, shear and the normal have components in space.
+    positive in compression; ``weight`` is arc length, around an axis and in space area; ``gap`` is
+    positive when open. Slip, shear and the normal have components in space.
     """
     units = dict.fromkeys(_LENGTHS, scene.units.length)
+    if scene.analysis.plane in ("axisymmetric", "space"):
+        units["weight"] = f"{scene.units.length}2"
     units["angle"] = "rad"
     units |= dict.fromkeys(_STRESSES, scene.units.stress)
     parts = []
@@ -84,7 +86,6 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
         columns |= {name: getattr(arc, name) for name in _OF_POINTS if hasattr(arc, name)}
         vectors = {"": X, "u": u}
         if len(axes) == 3:
-            units["weight"] = f"{scene.units.length}2"
             given = {f"{name}_": getattr(arc, name) for name in _VECTORS}
             vectors |= {name: values for name, values in given.items() if values is not None}
         for name, values in vectors.items():

@@ -223,6 +223,11 @@ def test_the_arc_of_a_ball_is_a_quarter_of_a_circle(tmp_path):
         assert probe.values.argmax() < len(probe.values) / 3
     with pytest.raises(archord.InputError, match="no factor over a length"):
         probe.over(4.0)
+    points = run.pressure()
+    assert points.attrs["units"]["weight"] == run.units["contact contact area"] == "mm2"
+    touching = points[points["raw_pressure"] > 0]
+    area = touching.groupby("side")["weight"].sum().mean()
+    assert area == pytest.approx(run.columns["contact contact area"][0], rel=1e-9)
 
 
 @pytest.mark.parametrize(
