@@ -128,7 +128,10 @@ def shown_columns(there: Iterable[str]) -> list[str]:
     if "load_factor" in known:
         of_parts = [name for name in known if name.endswith(_OF_A_PART)]
     names = ["step", "load_factor", *of_parts, "delta", *_OF_A_JOINT, *_COSTS]
-    return [name for name in dict.fromkeys(names) if name in known]
+    chosen = [
+        column for name in names for column in known if column.partition(" [")[0] == name
+    ]  # with its unit, where a sweep has several
+    return list(dict.fromkeys(chosen))
 
 
 def spread(table: Table, most: int) -> int:

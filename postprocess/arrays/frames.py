@@ -46,9 +46,9 @@ def write_frame(frame: pd.DataFrame, target: Path) -> Path:
 
 
 def read_frame(path: Path) -> pd.DataFrame:
-    """The table in a CSV file whose columns are headed ``name [unit]``, by names; a last row that
-    does not end in a line break (a copy cut short) is ignored. Raises `OSError`, and `ValueError`
-    if it is no table."""
+    """The table in a CSV file whose columns are headed ``name [unit]``, by names; columns of one
+    name in several units keep their headings. A last row that does not end in a line break (a copy
+    cut short) is ignored. Raises `OSError`, and `ValueError` if it is no table."""
     text = require_file(path).read_bytes().decode()
     whole = io.StringIO(text[: text.rfind("\n") + 1])
     table = pd.read_csv(
@@ -58,9 +58,11 @@ def read_frame(path: Path) -> pd.DataFrame:
         raise ValueError("rows are longer than the headings")
     if "message" in table:
         table["message"] = table["message"].fillna("")
-    parts = [heading.partition(" [") for heading in table]
-    table.columns = pd.Index([name for name, _, _ in parts])
-    return frame_of(table, {name: unit.removesuffix("]") for name, _, unit in parts})
+    parts = {heading: heading.partition(" [") for heading in table}
+    names = [name for name, _, _ in parts.values()]
+    known = {heading: part for heading, part in parts.items() if names.count(part[0]) == 1}
+    table = table.rename(columns={heading: name for heading, (name, _, _) in known.items()})
+    return frame_of(table, {name: unit.removesuffix("]") for name, _, unit in known.values()})
 
 
 def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:

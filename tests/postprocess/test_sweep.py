@@ -56,6 +56,22 @@ def test_names_of_runs_may_look_like_numbers(tmp_path):
     assert table.attrs["units"] == {"P": "N"}
 
 
+def test_columns_of_one_name_keep_their_units(tmp_path, capsys):
+    """A joint without a thickness and one with it have forces in other units."""
+    design = "list = [{}, {analysis.thickness = 10.0}]\n"
+    parts.sweep(parts.written(tmp_path, design), "-o", tmp_path / "out", "-q")
+    sweep = archord.load(tmp_path / "out")
+    per_length = sweep.cases["P [E* R]"]
+    total = sweep.cases["P [E* R2]"]
+    assert np.isnan([per_length[1], total[0]]).all()
+    assert total[1] == pytest.approx(10 * per_length[0])
+    assert "P" not in sweep.cases.attrs["units"]
+    assert command(["show", str(tmp_path / "out"), "--no-pictures"]) == 0
+    headings, *rows = capsys.readouterr().out.splitlines()[2:5]
+    assert headings.index("P [E* R]") < headings.index("P [E* R2]")
+    assert f"{total[1]:.6g}" in rows[1]
+
+
 def test_show_prints_the_cases_and_draws_them(sweep, tmp_path, capsys):
     """Varied keys, last values, why one stopped; and a picture, of the runs that can be read."""
     copy = shutil.copytree(sweep, tmp_path / "sweep")
