@@ -81,10 +81,14 @@ def _spring_lines(model: DeckModel) -> list[str]:
         return []
     lines = []
     element = 1 + sum(map(len, model.mesh.elements.values()))
+    # a modulus is a stiffness per unit thickness; of a ring and in space it takes a length
+    length = 1.0
+    if not model.problem.kinematics.is_plane:
+        length = float(np.ptp(model.mesh.x, axis=0).max())
     for body in springs.rigid.loose:
         nodes = np.unique(model.mesh.elements[body.name])
         ends = nodes[_apart(model.mesh.x[nodes])]
-        stiffness = number(_WEAK * body.material.E * model.thick)
+        stiffness = number(_WEAK * body.material.E * model.thick * length)
         for axis in range(1, 1 + model.mesh.x.shape[1]):
             name = f"{label(body.name)}_SPRINGS_{axis}"
             lines.append(f"*ELEMENT, TYPE=SPRING1, ELSET={name}")

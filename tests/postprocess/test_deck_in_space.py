@@ -186,6 +186,28 @@ def test_a_rigid_coupling_hangs_on_nodes_of_its_own(kind):
     assert n_equations >= len(problem.mesh.dofs_in(system.V, "lid"))
 
 
+@pytest.mark.parametrize("length", [1e-3, 1e3])
+def test_springs_of_a_deck_are_as_weak_in_any_unit(length):
+    """What nothing but contact holds hangs on springs of the same part of the stiffness of the
+    bodies, a modulus times a length."""
+
+    def springs(length: float) -> list[float]:
+        problem = blocks(
+            CellType.tetrahedron,
+            supports=[Support("base")],
+            loads=[Load("press", on="upper", direction="z", force=-length * length)],
+        )
+        problem.mesh.mesh.geometry.x[:] *= length
+        system = System(problem)
+        lines = deck(system, deck_mesh(system), problem.targets).splitlines()
+        at = [k for k, line in enumerate(lines) if line.startswith("*SPRING,")]
+        return [float(lines[k + 2]) for k in at]
+
+    usual = springs(1.0)
+    assert len(usual) == 3
+    np.testing.assert_allclose(springs(length), np.multiply(usual, length), rtol=1e-9)
+
+
 def test_finite_rotations_are_refused():
     coupling = Coupling("grip", facets="lid", point=(0.5, 0.5, 1.0))
     problem = blocks(
