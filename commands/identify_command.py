@@ -77,6 +77,8 @@ def identify(
     units = begun.units.length, begun.units.force_of(begun.analysis.thickness)
     measured = read_curve(curve, delta, load, units)
     at = _number("--offset", offset)
+    if at and measured.turned:
+        at = -at  # it is a reading of the file
     stiff = None if stiffness == _FREE else _stiffness(stiffness)
     found = fit(begun, measured, frees, at, stiff)
     folder = output or Path("runs") / f"{curve.stem}_identified"

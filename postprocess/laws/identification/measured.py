@@ -24,11 +24,13 @@ class MeasuredCurve:
     - ``displacement`` ``(n,)``: readings of the displacement
     - ``load`` ``(n,)``: readings of the force
     - ``said``: what was changed of the file's numbers
+    - ``turned``: whether the displacements have the other sign in the file
     """
 
     displacement: Array
     load: Array
     said: tuple[str, ...] = ()
+    turned: bool = False
 
     @property
     def deepest(self) -> Array:
@@ -128,7 +130,8 @@ def _compressed(path: Path, displacement: Array, load: Array, said: list[str]) -
     if -load.min() > load.max():
         load = -load
         said.append(f"{path}: its forces are negative, and are taken as compression")
-    if np.corrcoef(displacement, load)[0, 1] < 0:
+    turned = bool(np.corrcoef(displacement, load)[0, 1] < 0)
+    if turned:
         displacement = -displacement
         said.append(f"{path}: its displacements fall while forces rise, and are turned round")
-    return MeasuredCurve(displacement, load, tuple(said))
+    return MeasuredCurve(displacement, load, tuple(said), turned)

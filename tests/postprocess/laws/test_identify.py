@@ -190,6 +190,24 @@ def test_units_of_headings_are_compared_with_those_of_the_scene(tmp_path, capsys
     assert f"'P [N]' has another unit than the scene, {units.force_of(None)}" in error
 
 
+def test_an_offset_is_a_reading_of_the_file(tmp_path):
+    """Of a file whose displacements have the other sign, too: the joint is the same."""
+    curve = measured(ELASTIC, {"joint.clearance": 0.006}, 5, turns=(-0.1, 1.5), n=100, soft=0.0)
+    found = []
+    for sign in (1, -1):
+        path = tmp_path / "curve.csv"
+        table = np.column_stack([sign * curve.displacement, curve.load])
+        np.savetxt(path, table, delimiter=",", header="delta,P", comments="")
+        out = tmp_path / f"out {sign}"
+        words = ["identify", str(path), "--scene", ELASTIC, "--free", "joint.clearance"]
+        words += ["--machine-stiffness", "rigid", "--offset", str(sign * OFF), "--no-confirm"]
+        assert run([*words, "-o", str(out)]) == 0
+        data = json.loads((out / "identified.json").read_text())
+        found.append(data["estimates"][0]["value"])
+        assert data["fixed"][OFFSET] == OFF
+    assert found[1] == found[0] == pytest.approx(0.006, rel=0.03)
+
+
 def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
     curve = measured(ELASTIC, {"joint.clearance": 0.006}, 5, turns=(-0.1, 1.5), n=100, soft=0.0)
     path = tmp_path / "curve.csv"
