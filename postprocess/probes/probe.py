@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from archord.materials.kinematics import AXISYMMETRIC
+from archord.materials.kinematics import PLANE_STRAIN, SPACE
 from archord.materials.material import Array
 from archord.report.errors import InputError
 
@@ -112,11 +112,15 @@ class Probe:
 
     def over(self, length: float) -> Probe:
         """This over P / ``length``, the mean stress that the force makes in a section. Raises
-        `InputError`, also for a body of revolution, whose force is of the whole ring."""
-        if self.axes == AXISYMMETRIC.axes:
+        `InputError`, also for a body of revolution, whose force is of the whole ring, and in space,
+        where the force is not per unit thickness."""
+        if self.axes != PLANE_STRAIN.axes:
+            whole = "a body of revolution is of the whole ring"
+            if self.axes == SPACE.axes:
+                whole = "a body in space is not per unit thickness"
             raise InputError(
-                f"{self.place}: has no factor over a length, as the force of a body of revolution "
-                "is of the whole ring; divide by the mean stress of the section's area."
+                f"{self.place}: has no factor over a length, as the force of {whole}; "
+                "divide by the mean stress of the section's area."
             )
         if not (self.force and length > 0):
             section = f"a section of {length:g} under a force of {self.force:g}"

@@ -230,6 +230,22 @@ def test_the_arc_of_a_ball_is_a_quarter_of_a_circle(tmp_path):
     assert area == pytest.approx(run.columns["contact contact area"][0], rel=1e-9)
 
 
+def test_a_force_in_space_makes_no_stress_over_a_length(tmp_path):
+    """It is of the whole body: over a length it is no stress."""
+    bar = archord.Problem(
+        archord.boxes({"bar": (0.0, 0.0, 0.0, 4.0, 1.0, 2.0)}, size=1.0),
+        bodies=[archord.Body("bar", archord.Elastic(1e3, 0.3))],
+        supports=[archord.Support("bar left")],
+        loads=[archord.Load("pull", on="bar right", direction="x", force=8.0)],
+        steps=1,
+    )
+    run = archord.solve(bar, tmp_path / "run")
+    probe = run.probe(line=(0.5, 0.5, 1.0, 3.5, 0.5, 1.0), quantity="stress_xx")
+    assert probe.force == 8.0
+    with pytest.raises(archord.InputError, match="in space is not per unit thickness"):
+        probe.over(2.0)
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
