@@ -204,14 +204,15 @@ class YieldModel:
         is not ``asked`` ``(k,)``."""
         u = np.log(x / x0)
         begun = asked & (u > _AT[0])  # the others are not computed, which takes half the time
+        # of all x alike, or P would jump where one node more is known
+        known = min(np.searchsorted(np.log(MULTIPLES), u.max()) + 1, len(MULTIPLES))
         u = u[begun]
-        most = np.broadcast_to(x[-1] / x0, x.shape)[begun]
         each = np.broadcast_to(inputs, (len(x), inputs.shape[-1]))[begun]
         rows = each if inputs.ndim > 1 else inputs[None]
         force, deviation = self.processes["force"].predict(rows)
         shape = self.processes["shape"].means(rows)
         nodes = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=-1)
-        force, slope, peak, angle, deviation = _between(nodes, u, most).T
+        force, slope, peak, angle, deviation = _curves(nodes[:, :known], u).T
         way, uncertain = self.processes["back"].predict(np.column_stack([each, u]))
         travel, toe, misfit, again = way.T
         errors = [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again]
@@ -307,26 +308,14 @@ def total_loss(
     return total
 
 
-def _between(nodes: Array, u: Array, most: Array) -> Array:
-    """The first of four curves of ``nodes`` ``(1 or k, multiples, 4)`` at ``ln(x/x0) = u``
-    ``(k,)``, its slope by u, and the others ``(k, 5)``: smooth between nodes; only nodes up to
-    ``most`` x0 ``(k,)`` and one beyond are known."""
-    known = np.minimum(np.searchsorted(MULTIPLES, most) + 1, len(MULTIPLES))
-    found = np.zeros((len(u), 5))
-    for count in np.unique(known):
-        own = known == count
-        rows = nodes if len(nodes) == 1 else nodes[own]
-        found[own] = _curves(rows[:, :count], u[own])
-    return found
-
-
 def _curves(nodes: Array, u: Array) -> Array:
-    """The numbers of `_between` by all ``nodes`` ``(1 or k, known, 4)``."""
+    """The first of four curves of ``nodes`` ``(1 or k, known, 4)`` at ``ln(x/x0) = u`` ``(k,)``,
+    its slope by u, and the others ``(k, 5)``: smooth between nodes."""
     values = np.insert(nodes, 0, 0.0, axis=1)
     at = _AT[: values.shape[1]]
     slopes = _spline(len(at)) @ values
     i = interval(at, u)
-    row = np.arange(len(u)) if len(nodes) > 1 else 0
+    row = np.arange(len(u)) if len(nodes) == len(u) else 0
     width = (at[i + 1] - at[i])[:, None]
     t = (u - at[i])[:, None] / width
     first = values[row, i]

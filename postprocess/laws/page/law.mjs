@@ -376,7 +376,7 @@ function splineAt(nodes, f, df, x) {
 /** What the model of one side says at the nodes x, where the bodies have these stresses (one for all, or one a node). */
 function sideLoss(data, side, elastic, stresses, x, onset) {
     const told = (data.processes[side] ??= processesOf(data, side));
-    const end = x[x.length - 1];
+    const most = Math.max(...x.map((place, i) => place / onset(stresses[i]).x0));
     let curves = null;
     let inputs = null;
     return x.map((place, i) => {
@@ -384,7 +384,7 @@ function sideLoss(data, side, elastic, stresses, x, onset) {
         const { x0, lost } = onset(own);
         if (own !== stresses[i - 1]) {
             inputs = features(side, elastic, own, lost);
-            curves = curvesOf(data, told, inputs, end / x0);
+            curves = curvesOf(data, told, inputs, most);
         }
         const u = Math.log(place / x0);
         const [[travel, toe, misfit, again], [uncertain]] = told.back([...inputs, u]);
