@@ -114,8 +114,10 @@ def curves_of(runs: Sequence[Run]) -> Curves:
 
 
 def _common_columns(runs: Sequence[Run]) -> Curves:
-    """The quantities of parts that all general runs have, but what the loads prescribe."""
+    """The quantities of parts that all general runs have, but what the loads prescribe. Where only
+    some of them begin with a stage of fits, loads count from its end on."""
     first = runs[0]
+    fitted = {run.scene.fits for run in runs}
     shared = set.intersection(*(set(run.columns) for run in runs))
     shared -= {f"{load.name} {load.kind}" for load in first.scene.load}
     names = [name for name in first.columns if name.endswith(COMMON) and name in shared]
@@ -124,11 +126,16 @@ def _common_columns(runs: Sequence[Run]) -> Curves:
         run.number(None)
         if any(run.units.get(name) != first.units.get(name) for name in names):
             raise InputError(f"{run.folder}: has other units than {first.folder}.")
-        table = {"load": np.array(run.path)}
-        tables.append(table | {name: np.array(run.columns[name]) for name in names})
-    if not names:
+        before = float(run.scene.fits and len(fitted) > 1)
+        load = np.array(run.path) - before
+        loaded = load > _SAME
+        table = {"load": load[loaded]}
+        tables.append(table | {name: np.array(run.columns[name])[loaded] for name in names})
+    if not names or not all(len(table["load"]) for table in tables):
         raise InputError(f"{first.folder}: shares no load with the others.")
-    labels = {"load": "load factor"} | {name: first.heading(name) for name in names}
+    after_fits = ", after press fits" if len(fitted) > 1 else ""
+    labels = {"load": f"load factor{after_fits}"}
+    labels |= {name: first.heading(name) for name in names}
     return tables, labels, np.ones(len(runs))
 
 

@@ -127,6 +127,32 @@ def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
     np.testing.assert_allclose(found.relative("pin in lug largest pressure")[1], 2.0, rtol=1e-6)
 
 
+def test_a_press_fit_is_compared_from_its_end_on(tmp_path):
+    """A bushing that is pressed in and one that is not, under the same displacements: the stage of
+    the fit is none of the loads'."""
+    runs = []
+    for name, bore in (("loose", 14.0), ("pressed", 13.98)):
+        steel = {"E": 210000.0, "nu": 0.3}
+        scene = parse_any(
+            {
+                "bushing": {"radius": 10.0, "element_size": 3.0, "growth": 0.5},
+                "pin": steel,
+                "sleeve": [{"bore": 10.05, "outer": 14.0} | steel],
+                "housing": {"bore": bore, "outer": 30.0} | steel,
+                "load": {"displacement": 0.2, "steps": 2},
+            }
+        )
+        runs.append(archord.solve(scene, tmp_path / name))
+    found = compare_runs(runs)
+    assert [run.steps for run in runs] == [2, 3]
+    assert found.labels["load"] == "load factor, after press fits"
+    assert found.step_by_step
+    np.testing.assert_allclose(found.load, [0.5, 1.0])
+    for values, run in zip(found.values["pull force"], runs, strict=True):
+        np.testing.assert_array_equal(values, run.columns["pull force"][-2:])
+    assert compare_runs(runs[1:] * 2).labels["load"] == "load factor"
+
+
 def test_joints_under_the_same_forces_are_compared_by_the_displacement(tmp_path):
     """At the forces, step by step, unloading included: twice as stiff a joint goes as deep under
     twice the force. With one that a displacement loads it is P over delta as ever."""
