@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.general.joint import LARGE, Array, LawJoint
+from archord.postprocess.laws.general.joint import (
+    FIXED_PAIRS,
+    Array,
+    LawJoint,
+    LawRangeWarning,
+)
 
-_FELT = 1e-3  # share of P by which a small block must change it to be worth a word
 ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
 _FAR = 1e150  # no displacement, and its square is still a number
-
-
-class LawRangeWarning(UserWarning):
-    """A law was asked outside its range; the message tells the range."""
 
 
 NOTHING: Array = np.array(np.nan)  # a quantity that a law does not give
@@ -190,19 +190,7 @@ class Law:
                 "be about twice too "
                 "high. Of a ring only hertz and persson hold, which give no displacement."
             )
-        said = []
-        (about, most) = joint.softer
-        if joint.block_size and about > _FELT and self.gives_displacement:
-            said.append(
-                f"for a block of {LARGE:g} R; in this one of {joint.block_size / joint.radius:.4g} "
-                f"R the joint is softer, and its P about {about:.1%} smaller than the law's (up to "
-                f"{most:.1%} with a rigid pin, or beyond yield)"
-            )
-        if joint.whole and self.gives_displacement:
-            said.append(
-                "for half a pin, cut where it is pressed; of a whole one P is higher: 2 %, beyond "
-                "yield 10 %"
-            )
+        said = joint.other_shapes if self.gives_displacement else []
         if joint.hardens and self.plastic and not self.solved:
             said.append(
                 "of perfect plasticity; of bodies that harden its P is too low beyond yield"
@@ -218,11 +206,7 @@ class Law:
                 "at 2 %"
             )
         if joint.fixed_pairs and self.solved:
-            said.append(
-                'of closest points on the deformed curves; with analysis.kinematics = "reference" '
-                "P of a run is lower: "
-                "in the paper's elastic joint at 2 dR by 0.15 %"
-            )
+            said.append(FIXED_PAIRS)
         for kind in said:
             warnings.warn(LawRangeWarning(f"{self.name}: is a law {kind}"), stacklevel=4)
 

@@ -21,6 +21,15 @@ LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
 # fall of P in a block of W, times (W/R)^2
 _SOFTER = 1.4  # of like elastic bodies
 _SOFTEST = 2.5  # of any
+_FELT = 1e-3  # share of P by which a small block must change it to be worth a word
+FIXED_PAIRS = (
+    'of closest points on the deformed curves; with analysis.kinematics = "reference" P of a run '
+    "is lower: in the paper's elastic joint at 2 dR by 0.15 %"
+)
+
+
+class LawRangeWarning(UserWarning):
+    """A law was asked outside its range; the message tells the range."""
 
 
 @dataclass(frozen=True)
@@ -226,6 +235,25 @@ class LawJoint:
         yield."""
         narrow = 0.0 if self.block_size is None else (self.radius / self.block_size) ** 2
         return _SOFTER * narrow, _SOFTEST * narrow
+
+    @property
+    def other_shapes(self) -> list[str]:
+        """What of its shape makes its P another one than that of laws, and by how much, in words
+        that follow "is a law"."""
+        said = []
+        about, most = self.softer
+        if self.block_size and about > _FELT:
+            said.append(
+                f"for a block of {LARGE:g} R; in this one of {self.block_size / self.radius:.4g} "
+                f"R the joint is softer, and its P about {about:.1%} smaller than the law's (up to "
+                f"{most:.1%} with a rigid pin, or beyond yield)"
+            )
+        if self.whole:
+            said.append(
+                "for half a pin, cut where it is pressed; of a whole one P is higher: 2 %, beyond "
+                "yield 10 %"
+            )
+        return said
 
     @property
     def onset(self) -> float:

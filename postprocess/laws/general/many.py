@@ -3,7 +3,9 @@ alone."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -12,10 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.postprocess.laws.general.general_law import general_law
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import (
+    FIXED_PAIRS,
+    Array,
+    LawJoint,
+    LawRangeWarning,
+)
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.report.doubts import kind
 
 KNOWN = tuple(field.name for field in fields(LawJoint))
+# parameters by which forces are others than the law's, and which the law does not know
+_OTHERS = ("block_size", "whole", "fixed_pairs")
 
 
 class Loads(NamedTuple):
@@ -53,6 +63,12 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     ValueError
         For columns that no joint has, and for arrays of different lengths.
 
+    Warns
+    -----
+    LawRangeWarning
+        Once of each kind of joints that are softer or stiffer than the law's, as those in a small
+        block or with a whole pin: their rows have forces.
+
     Examples
     --------
     >>> from archord.postprocess.laws.general.many import loads
@@ -73,6 +89,7 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     load = np.full(shape, np.nan)
     error = np.full(shape, np.nan)
     reason = np.full(n, "", dtype=object)
+    _warn_of(rows)
     for row, given in enumerate(rows):
         try:
             law = _law(given)
@@ -87,6 +104,24 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
         load[row] = state.load
         error[row] = state.error
     return Loads(load, error, reason)
+
+
+def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:
+    """Warn of each kind of joints, at the first of the ``rows``, whose forces are others than the
+    law's."""
+    first: dict[str, str] = {}
+    for row, given in enumerate(rows):
+        if not any(name in _OTHERS and value for name, value in given):
+            continue
+        with suppress(TypeError, ValueError):  # its row tells why it is no joint
+            joint = LawJoint(**dict(given))
+            said = joint.other_shapes
+            if joint.fixed_pairs:
+                said.append(FIXED_PAIRS)
+            for what in said:
+                first.setdefault(kind(what), f"joint {row}: archord: is a law {what}")
+    for text in first.values():
+        warnings.warn(LawRangeWarning(text), stacklevel=3)
 
 
 def _rows(joints: Mapping[str, Any]) -> list[tuple[tuple[str, Any], ...]]:

@@ -1,10 +1,12 @@
 """Forces of many joints at once."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from archord.postprocess.laws.general.general_law import general_law
-from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.many import loads
 
 SAME = {"radius": 10.0, "E_star": 115e3, "plane": "strain", "nu": 0.3}
@@ -54,3 +56,19 @@ def test_unknown_columns_and_lengths_are_refused():
         loads(SAME | {"clearance": 0.05, "gap": 1.0}, 0.05)
     with pytest.raises(ValueError, match="different lengths"):
         loads(SAME | {"clearance": [0.05, 0.06], "nu": [0.1, 0.2, 0.3]}, 0.05)
+
+
+def test_joints_whose_forces_are_others_are_warned_of_once():
+    """A small block makes a joint softer, a whole pin stiffer: a row keeps the law's force, and a
+    warning tells by how much it is off."""
+    table = SAME | {"clearance": 0.05, "block_size": [1000.0, 25.0, 30.0], "whole": [0, 0, True]}
+    with pytest.warns(LawRangeWarning) as caught:
+        found = loads(table, 0.08)
+    said = [str(warning.message) for warning in caught]
+    assert len(said) == 2
+    assert said[0].startswith("joint 1: archord: is a law for a block of 100 R; in this one of 2.5")
+    assert said[1].startswith("joint 2: archord: is a law for half a pin")
+    assert not np.isnan(found.load).any()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        loads(SAME | {"clearance": 0.05, "block_size": [1000.0, np.nan]}, 0.08)
