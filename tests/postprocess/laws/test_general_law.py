@@ -383,9 +383,9 @@ def test_curves_that_rise_in_steep_steps_are_refused() -> None:
 def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
     plane: str, share: float, hardens: str
 ) -> None:
-    """One body hardens until it is the stronger one. All that yielding does is smooth in x: from
-    one of 300 points to the next its slope changes by less than 0.1 %, the travel's by less than
-    1 %."""
+    """One body hardens until it is the stronger one. All that yielding does is smooth in x: what it
+    changes by from one of 300 points to the next changes by less than 0.2 %, of the travel by less
+    than 1 %."""
     clearance = 0.005
     first = 0.17
     second = {"strain": 1.17, "stress": 1.45}[plane] * first
@@ -405,7 +405,7 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
     lost = hardened_loss(numbers, flows, x)
     for name in ("force", "peak", "angle", "deviation"):
         bends = np.diff(getattr(lost, name), 2)
-        assert np.abs(bends).max() < 1e-3, name
+        assert np.abs(bends).max() < 2e-3, name
     assert np.abs(np.diff(lost.travel, 2)).max() < 1e-2
 
 
