@@ -16,7 +16,7 @@ import basix
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import Curve, Index
+from archord.geometry.curve import Curve, Index, Projection
 from archord.geometry.overlay import broken_facets, coincide, piece_rule, quartered
 from archord.geometry.patches import Patches
 
@@ -61,8 +61,7 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
         ends = np.array([_halved(ends, n_parts) for ends in breaks])
         n_points = own.degree + 3
     else:
-        n_faced = met.found.sum() / max(len(np.unique(met.facet[met.found])), 1)
-        n_parts = max(_PARTS * max(round(n_faced), 1), n_parts)
+        n_parts = max(_PARTS * max(round(_n_faced(met)), 1), n_parts)
         ends = np.array([_divided(ends, n_parts) for ends in breaks])
         # exact for a linear pressure against the shape functions of a facet that is hardly curved
         n_points = own.degree + 1
@@ -70,6 +69,15 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
     return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
+
+
+def _n_faced(met: Projection) -> float:
+    """How many facets a facet faces, on average, by the vertices of the opposite curve that are
+    ``met``. Of vertices that lie at ends of facets round-off decides on which: each counts on the
+    one before."""
+    place = (met.facet + met.xi)[met.found]
+    before = np.floor(place - _SHORTEST).clip(0)
+    return len(place) / max(len(np.unique(before)), 1)
 
 
 def _halved(ends: Array, n_parts: int) -> Array:

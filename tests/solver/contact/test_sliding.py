@@ -47,6 +47,17 @@ def forces_of_uniform_pressure(own: Curve, opposite: Curve, slide: float) -> np.
     return np.bincount(partners.nodes.ravel(), force.ravel(), len(opposite.X))
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_points_do_not_depend_on_round_off_where_nodes_coincide(seed):
+    """Of a node that lies where two facets meet round-off decides on which of them."""
+    own = line(8)
+    opposite = line(8, backward=True)
+    expected, _ = segment_rule(own, opposite)
+    moved = opposite.X + 1e-14 * np.random.default_rng(seed).normal(size=opposite.X.shape)
+    xi, _ = segment_rule(own, Curve(moved, 2))
+    np.testing.assert_allclose(xi, expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("n_own", [10, 12, 30])
 def test_nodes_get_their_share_of_a_uniform_pressure(n_own):
     """To round-off without slip, and within a hundredth wherever the facets have slid to."""
