@@ -118,7 +118,17 @@ def proof_strength(solid: Solid) -> float:
 
 
 def tensile_strength(solid: Solid) -> float:
-    """The largest engineering stress of the hardening curve; beyond it a bar necks (Considere)."""
-    peeq = np.append(solid.law.knots(), PROOF)
+    """The largest engineering stress of the hardening curve; beyond it a bar necks (Considere).
+
+    It is at a knot of the curve, or within a straight line between two, where the true stress
+    ``s`` has risen to ``h (1 - s/E)``, ``h`` being the slope of the line.
+    """
+    knots = np.unique([*solid.law.knots(), PROOF])
+    stress = solid.law.stress(knots)
+    slope = np.diff(stress) / np.diff(knots)
+    at_necking = slope / (1 + slope / solid.E)
+    beyond = (at_necking - stress[:-1]) / np.where(slope > 0, slope, 1.0)
+    within = np.clip(knots[:-1] + beyond, knots[:-1], knots[1:])
+    peeq = np.append(knots, within)
     true = solid.law.stress(peeq)
     return max(proof_strength(solid), float((true * np.exp(-peeq - true / solid.E)).max()))

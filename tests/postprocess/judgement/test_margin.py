@@ -97,6 +97,12 @@ def test_strengths_are_those_of_the_tension_test_behind_the_curve():
         metal = BodySection(name="lug", material=name)
         assert proof_strength(metal) == pytest.approx(proof, rel=1e-3)
         assert tensile_strength(metal) == pytest.approx(tensile, rel=2e-3)
+    line = BodySection(name="lug", **STEEL, yield_stress=300.0, hardening=1000.0)
+    highest = 1000 / (1 + 1000 / 210e3)
+    expected = pytest.approx(highest * math.exp(-(highest - 300) / 1000 - highest / 210e3))
+    assert tensile_strength(line) == expected  # within the line, at no knot
+    table = BodySection(name="lug", **STEEL, hardening=[[0.0, 300.0], [0.9, 1200.0]])
+    assert tensile_strength(table) == expected
     flat = BodySection(name="lug", **STEEL, yield_stress=200.0)
     assert (proof_strength(flat), tensile_strength(flat)) == (200.0, 200.0)
 
