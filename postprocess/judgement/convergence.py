@@ -133,7 +133,8 @@ def _without_mesh(scene: Scene) -> tuple:
     stages = (*scene.load.stage_steps, "to", *scene.load.stages)
     bodies = (scene.pin.model_dump_json(), scene.block.model_dump_json())
     how = (analysis.plane, analysis.strain, analysis.kinematics, analysis.integration)
-    return (*shown, *stages, *bodies, *how)
+    method = (analysis.degree, analysis.gamma_factor, g.edge_angle, g.edge_ratio)
+    return (*shown, *stages, *bodies, *how, *method)
 
 
 def difference(one: Curve, other: Curve, largest: float) -> float:

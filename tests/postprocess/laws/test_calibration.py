@@ -198,6 +198,15 @@ def test_solved_runs(runs):
     assert plastic.c.value == pytest.approx(1.03, rel=0.15)
 
 
+@pytest.mark.parametrize("other", [{"degree": 3}, {"gamma_factor": 2.0}])
+def test_another_method_is_no_finer_mesh(other):
+    """Its difference is not of the size of the elements, so no run is left out for the other."""
+    runs = [curve(0.83), curve(0.85, h=0.1, name="other", analysis=other)]
+    found = calibrate(runs)
+    assert [refined.run for refined in found.scenes] == runs
+    assert found.joint.k.discretisation_error is None
+
+
 def test_a_thickness_leaves_the_law_and_a_whole_pin_has_one_of_its_own(runs, tmp_path):
     """P in history.csv is that of the thickness, P of a law never; k of a whole pin is told to be
     so."""
