@@ -90,17 +90,19 @@ class Drives:
 
     def _stiffest(self) -> float:
         moduli = [body.material.elastic_tangent[0, 0] for body in self.problem.bodies]
-        depth = np.max(self.kinematics.measure(self._x), initial=0.0)
         if self.dimension == 3:
-            depth = self._farthest_from_middle()
+            return float(max(moduli)) * self._shortest_extent()
+        depth = np.max(self.kinematics.measure(self._x), initial=0.0)
         return float(max(moduli)) * self.comm.allreduce(float(depth), op=MPI.MAX)
 
-    def _farthest_from_middle(self) -> float:
-        """The largest distance of a node of this rank from the middle of all nodes. Collective."""
-        owned = self._x[: self.n_owned]
-        total = self.comm.allreduce(np.append(owned.sum(axis=0), len(owned)))
-        middle = total[:-1] / total[-1]
-        return float(np.linalg.norm(self._x - middle, axis=1).max(initial=0.0))
+    def _shortest_extent(self) -> float:
+        """The shortest extent of the mesh along an axis, such as the thickness of a plate.
+        Collective."""
+        lowest = self._x.min(axis=0, initial=np.inf)
+        highest = self._x.max(axis=0, initial=-np.inf)
+        extents = np.append(-lowest, highest)
+        self.comm.Allreduce(MPI.IN_PLACE, extents, op=MPI.MAX)
+        return float((extents[:3] + extents[3:]).min())
 
     def _bodies_of_prescribed_means(self) -> list[Body]:
         """The bodies of means whose motion is prescribed, each once."""
