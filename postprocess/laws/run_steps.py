@@ -31,6 +31,7 @@ class RunSteps:
     - ``dissipated`` ``(n,)``: energy over both units
     - ``peak`` ``(n,)``: largest pressure over ``pressure``, nan if unknown
     - ``angle`` ``(n,)``: semi-angle [rad], nan if unknown
+    - ``begin``: how many steps of the run are before, in which an interference arises
     """
 
     run: Run
@@ -43,6 +44,7 @@ class RunSteps:
     length: float
     force: float
     pressure: float
+    begin: int = 0
 
     @property
     def closed(self) -> np.ndarray:
@@ -101,7 +103,8 @@ class RunSteps:
         """Raise `InputError` if the force does not rise from each of the ``steps`` to the next."""
         for a, b in pairwise(steps):
             if not self.y[a] < self.y[b]:
-                ends = [f"{self.at(self.x[i])} (step {i + 1})" for i in (a, b)]
+                before = self.begin + 1
+                ends = [f"{self.at(self.x[i])} (step {before + i})" for i in (a, b)]
                 raise InputError(
                     f"{self.run.folder}: the force does not rise from {' to '.join(ends)}, from "
                     f"{self.load(self.y[a])} to {self.load(self.y[b])}; in a table it must."
@@ -203,6 +206,7 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
         length=length,
         force=force,
         pressure=pressure,
+        begin=begin,
     )
 
 

@@ -236,6 +236,8 @@ def test_forces_in_space_are_total(file, load, length) -> None:
 
 falling = list(synthetic(path(END), yields=False).columns["P"])
 falling[12] = falling[11]
+after_a_fit = list(general().columns["pull force"])
+after_a_fit[13] = after_a_fit[12]
 
 
 @pytest.mark.parametrize(
@@ -258,6 +260,8 @@ falling[12] = falling[11]
         (synthetic(path(END)), "pull", "which has one load"),
         (general(), "press", "--of must name one of its loads: pull."),
         (general(**{"pull force": [-1.0] * 21}), None, "before the load moves"),
+        # the step of the fit counts
+        (general(**{"pull force": after_a_fit}), None, "from 0.48 mm (step 13) to 0.52 mm (step 14)"),
     ],
 )
 def test_what_makes_no_table_is_refused(run, of, said) -> None:
