@@ -261,7 +261,7 @@ after_a_fit[13] = after_a_fit[12]
         (general(), "press", "--of must name one of its loads: pull."),
         (general(**{"pull force": [-1.0] * 21}), None, "before the load moves"),
         # the step of the fit counts
-        (general(**{"pull force": after_a_fit}), None, "from 0.48 mm (step 13) to 0.52 mm (step 14)"),
+        (general(**{"pull force": after_a_fit}), None, "(step 13) to 0.52 mm (step 14)"),
     ],
 )
 def test_what_makes_no_table_is_refused(run, of, said) -> None:
