@@ -17,7 +17,7 @@ _SAME = 1e-6  # relative difference of two forces that are the same but for what
 @dataclass(frozen=True)
 class RunCurve:
     """Accepted steps of a run, in the scene's units: arrays ``(n,)`` over the steps. Forces are per
-    unit thickness."""
+    unit thickness. ``step`` holds the numbers of the steps in the run, 1 to n if absent."""
 
     name: str
     scene: Scene
@@ -27,6 +27,12 @@ class RunCurve:
     eps: Array
     peeq_max: Array
     folder: Path | None = None
+    step: np.ndarray | None = None
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Number of each step in the run ``(n,)``."""
+        return np.arange(1, len(self.delta) + 1) if self.step is None else self.step
 
     @property
     def E_star(self) -> float:
@@ -63,7 +69,8 @@ class RunCurve:
         ever before, too.
         """
         first = on_first_loading(self.delta, self.P)
-        return replace(self, **{name: getattr(self, name)[first] for name in CURVES})
+        chosen = {name: getattr(self, name)[first] for name in CURVES}
+        return replace(self, **chosen, step=self.numbers[first])
 
 
 def on_first_loading(delta: Array, P: Array) -> np.ndarray:

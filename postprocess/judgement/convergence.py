@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -84,8 +85,7 @@ class Refined:
         or do not shrink."""
         found = math.inf
         if len(curves) > 2:
-            n = min(map(len, curves[:3]))
-            fine, middle, coarse = (curve[:n] for curve in curves[:3])
+            fine, middle, coarse = self._at_common_steps(curves[:3])[1]
             finer = middle - fine
             coarser = coarse - middle
             if finer @ coarser > 0:
@@ -99,13 +99,39 @@ class Refined:
 
     def shift(self, curves: Sequence[Array]) -> Array:
         """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the
-        next coarser run; steps that run does not have get the relative shift of its last one."""
-        fine, coarse = curves[:2]
+        next coarser run; steps that run does not have get the relative shift of its steps beside
+        them."""
+        common, (fine, coarse) = self._at_common_steps(curves[:2])
         ratio = self.coarser[0].scene.joint.h / self.run.scene.joint.h
-        n = min(len(fine), len(coarse))
-        shift = richardson(fine[:n] - coarse[:n], ratio, self.order(curves).value)
-        relative = shift / np.where(fine[:n] == 0, 1.0, fine[:n])
-        return fine * np.append(relative, np.full(len(fine) - n, relative[-1]))
+        shift = richardson(fine - coarse, ratio, self.order(curves).value)
+        relative = shift / np.where(fine == 0, 1.0, fine)
+        return curves[0] * np.interp(self.run.numbers, common, relative)
+
+    def _at_common_steps(self, curves: Sequence[Array]) -> tuple[Array, list[Array]]:
+        """The numbers of the steps ``(m,)`` that the finest runs have in common, and the values of
+        their ``curves`` there, each ``(m,)``. Under a force, delta differs from mesh to mesh: the
+        values are those at the delta of the finest run, along the tangent of each curve."""
+        runs = self.runs[: len(curves)]
+        common = reduce(np.intersect1d, [run.numbers for run in runs])
+        delta = self.run.delta[np.isin(self.run.numbers, common)]
+        values = []
+        for run, curve in zip(runs, curves, strict=True):
+            chosen = np.isin(run.numbers, common)
+            value = curve[chosen]
+            apart = delta - run.delta[chosen]
+            if apart.any():
+                value = value + _slope(run.delta, curve)[chosen] * apart
+            values.append(value)
+        return common, values
+
+
+def _slope(delta: Array, curve: Array) -> Array:
+    """Slope ``(n,)`` of a ``curve`` ``(n,)`` that begins at the origin and rises in ``delta``."""
+    along = [0.0, *delta]
+    values = [0.0, *curve]
+    if len(delta) == 1:
+        return np.gradient(values, along)[1:]
+    return np.gradient(values, along, edge_order=2)[1:]
 
 
 def group(runs: list[RunCurve]) -> list[Refined]:
@@ -132,6 +158,8 @@ def _without_mesh(scene: Scene) -> tuple:
     shown = [f"{size:.9g}" for size in (*sizes, analysis.friction)]
     stages = (*scene.load.stage_steps, "to", *scene.load.stages)
     bodies = (scene.pin.model_dump_json(), scene.block.model_dump_json())
+    if scene.force_controlled:
+        shown.append(f"{scene.thickness:.9g}")
     how = (analysis.plane, analysis.strain, analysis.kinematics, analysis.integration)
     method = (analysis.degree, analysis.gamma_factor, g.edge_angle, g.edge_ratio)
     return (*shown, *stages, *bodies, *how, *method)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from archord.postprocess.judgement.convergence import group
 from archord.postprocess.laws.calibration import calibrate, fit_curve
@@ -154,6 +155,58 @@ def test_a_mesh_error_of_first_order_is_found_and_carried():
     assert calibrate([stopped, fine]).joint.k.discretisation_error == pytest.approx(
         0.83 * 0.04, rel=1e-6
     )
+
+
+@pytest.mark.parametrize("lost", [(7, 4), (4, 7), (7, 19)])
+def test_the_steps_of_two_meshes_are_met_by_their_numbers(lost):
+    """After an unloading the two curves may begin to count at different steps: the same error."""
+    fine, coarse = (
+        only(curve(0.83 * (1 + 2 * h), h=h, name=f"h{h}"), np.arange(20) != step)
+        for h, step in zip((0.02, 0.05), lost, strict=True)
+    )
+    found = calibrate([coarse, fine]).joint.k
+    assert found.discretisation_error == pytest.approx(0.83 * 0.04, rel=1e-6)
+
+
+def only(run, chosen):
+    """These steps of a run."""
+    names = ("delta", "P", "p0", "eps", "peeq_max")
+    return replace(
+        run, **{name: getattr(run, name)[chosen] for name in names}, step=run.numbers[chosen]
+    )
+
+
+@pytest.mark.parametrize("quantity", ["P", "p0"])
+def test_under_a_force_two_meshes_differ_in_delta(quantity):
+    """The error is that of P and p0 at a common delta: P at a common step is the force itself."""
+    fine, coarse = (
+        under_forces(curve(0.83 * (1 + 2 * h), h=h, name=f"h{h}")) for h in (0.002, 0.005)
+    )
+    np.testing.assert_allclose(fine.P, coarse.P, rtol=1e-12)
+    found = fit_curve(group([coarse, fine]), quantity=quantity).k
+    assert found.value == pytest.approx(0.83 * 1.004, rel=1e-5)  # of the spline
+    assert found.discretisation_error == pytest.approx(0.83 * 0.004, rel=0.02)
+
+
+def under_forces(run):
+    """The run under forces that are the same on every mesh."""
+    forces = np.linspace(0.05, 0.95, 15) * curve(0.83).P[-1]
+    at = {
+        name: CubicSpline([0.0, *run.P], [0.0, *getattr(run, name)])(forces)
+        for name in ("delta", "p0", "eps", "peeq_max")
+    }
+    return replace(run, P=forces, **at)
+
+
+@pytest.mark.parametrize(("other", "scenes"), [(1.0, 1), (2.0, 2)])
+def test_one_force_on_another_thickness_is_no_finer_mesh(other, scenes):
+    """Forces per thickness differ then at every step."""
+    forces = {"load": {"displacement": None, "force": 1e-3, "steps": 20}}
+    runs = [
+        replace(curve(0.83), scene=scene(h, analysis={"thickness": thickness}, **forces))
+        for h, thickness in ((0.05, 1.0), (0.1, other))
+    ]
+    assert len(group(runs)) == scenes
 
 
 def test_three_meshes_tell_the_order():
