@@ -98,6 +98,8 @@ class Equilibrium:
         self.restore(load, state)
         self.largest_reaction = largest_reaction
         self.contact.search()
+        # the slip of rigid discs counts from where they are
+        self.contact.move(self.unknowns.levels, self.problem.fitted(load))
         self.contact.begin(self.displacement())
         self.evaluate()
         self.linear.follow_pattern()

@@ -39,6 +39,10 @@ CASES = {
         1,
     ),
     "rigid pin": (scene(0.2, 4, **PLASTIC, pin={"rigid": True}), 2),
+    "rigid pin, friction": (
+        scene(0.2, 4, **PLASTIC, pin={"rigid": True}, analysis={"friction": 0.3}),
+        2,
+    ),
     "one side": (scene(0.2, 3, **PLASTIC, analysis={"integration": "block"}), 2),
     "back stresses": (
         scene(
