@@ -95,6 +95,28 @@ def test_a_run_goes_on_with_its_objects_on_any_number_of_ranks(comm, tmp_path, m
         np.testing.assert_allclose(run.columns[name], alone.columns[name], atol=1e-9 * scale)
 
 
+def test_the_halted_step_keeps_its_contact(tmp_path, monkeypatch):
+    """A law that takes its wear from the beginning of the step has another pressure where the
+    accepted state is evaluated once more."""
+
+    def stop(self, m):
+        if m.step == 3:
+            signal.raise_signal(signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Progress, "step", stop)
+        with pytest.raises(KeyboardInterrupt):
+            archord.solve(sliding(MPI.COMM_SELF), tmp_path / "run", comm=MPI.COMM_SELF)
+    before = archord.load(tmp_path / "run")
+    contact = before.contact(3)
+    field = before.fields(3).cell["contact_pressure"]
+    problem = sliding(MPI.COMM_SELF)
+    after = archord.solve(problem, tmp_path / "run", restart=True, comm=MPI.COMM_SELF)
+    for side, profile in contact.items():
+        np.testing.assert_array_equal(after.contact(3)[side].pressure, profile.pressure)
+    np.testing.assert_array_equal(after.fields(3).cell["contact_pressure"], field)
+
+
 def test_the_folder_tells_of_the_objects(run):
     """By class and representation, without addresses, which differ in every process."""
     said = (run.folder / "scene.toml").read_text()

@@ -34,12 +34,17 @@ class StepFile:
     version or version 0.1 wrote them. Raises `OSError`, and `InputError` if a file that should go
     on is missing, damaged or does not hold these steps. ``loads`` and ``names`` are of all
     steps and their arrays.
+
+    A file that holds one more step keeps it where `write` adds a step at the same load: arrays that
+    are evaluated from an accepted state once more differ from those of the step itself, where laws
+    and materials depend on the length of the step or on their state at its beginning.
     """
 
     def __init__(self, path: Path, fixed: Arrays, after: int = 0, *, apart: bool = False) -> None:
         self.path, self._apart = path, apart
         self.loads: list[float] = []
         self.names: list[set[str]] = []
+        self._next = self._read_next(after) if path.exists() else None
         earlier = self._read(fixed, after) if after else []
         self._file = hdf5_in_memory()
         self._file["accepted"] = 0
@@ -51,8 +56,17 @@ class StepFile:
     def write(self, load: float, arrays: Arrays) -> None:
         """Add a step, reached at ``load``. Raises `OSError`: then the file is what it was, this
         object of no use."""
-        self._add_step(load, arrays)
+        self._add_step(load, self._kept(load, arrays))
         replace_file(self.path, image(self._file))
+
+    def _kept(self, load: float, arrays: Arrays) -> Arrays:
+        """The ``arrays``, those that the file has of this step as they are there."""
+        there, self._next = self._next, None
+        if there is None or there[0] != load:
+            return arrays
+        kept = {name: there[1].get(name, array) for name, array in arrays.items()}
+        same = all(kept[name].shape == np.shape(array) for name, array in arrays.items())
+        return kept if same else arrays
 
     def _add_step(self, load: float, arrays: Arrays) -> None:
         self.loads.append(load)
@@ -77,6 +91,23 @@ class StepFile:
         replace_file(self.path.parent / beside, content)
         for name in arrays:
             self._file[_dataset(name, step)] = h5py.ExternalLink(beside, name)
+
+    def _read_next(self, after: int) -> tuple[float, Arrays] | None:
+        """Load and arrays of the step ``after`` so many, None where the file has no whole one."""
+        ending = f"/{step_name(after + 1)}"
+        try:
+            with h5py.File(self.path) as file:
+                if file["accepted"][()] <= after:
+                    return None
+                load = float(file["load"][after])
+                found = {
+                    path.removesuffix(ending): array
+                    for path, array in all_arrays(file)
+                    if path.endswith(ending)
+                }
+                return load, found
+        except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError):
+            return None
 
     def _read(self, fixed: Arrays, after: int) -> list[tuple[float, Arrays]]:
         """Load and arrays of the first steps, as many as ``after``."""

@@ -146,6 +146,18 @@ def test_a_restarted_run_equals_the_uninterrupted_one(whole, halted_after, name)
         assert sum(m.cutbacks for m in outcome.steps[step:]) > 0
 
 
+@pytest.mark.parametrize("name", ["plastic", "rigid pin, friction", "friction, unloading"])
+def test_a_step_that_only_the_checkpoint_has_is_evaluated_once_more(whole, halted_after, name):
+    """Where a kill left the other files a step behind they get the same numbers."""
+    problem, step = CASES[name]
+    halted = halted_after(problem, step)
+    before = whole(problem).with_name(f"{step - 1}")
+    for file in ("fields.h5", "contact.h5", "history.csv", "run.json", "fields.xdmf"):
+        shutil.copy(before / file, halted / file)
+    go_on(problem, halted)
+    same_run(whole(problem), halted, 1e-12)
+
+
 def test_a_run_of_version_0_2_goes_on_with_its_contact_points(tmp_path):
     """Through two halts. That version did not write by which rule its points lie."""
     problem = scene(0.2, 4, **PLASTIC, analysis={"friction": 0.3})

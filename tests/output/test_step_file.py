@@ -78,6 +78,17 @@ def test_steps_are_kept_and_continued(file, apart):
     assert not list(file.path.parent.rglob("*.new"))
 
 
+def test_the_next_step_stays_at_the_same_load_and_not_at_another(file, apart):
+    """A run that goes on keeps what its halted step wrote."""
+    for step in (1, 2):
+        file.write(0.1 * step, values(step))
+    StepFile(file.path, FIXED, 1, apart=apart).write(0.1 * 2, values(7))
+    holds(file.path, 2)
+    StepFile(file.path, FIXED, 1, apart=apart).write(0.3, values(7))
+    with h5py.File(file.path) as reader:
+        assert np.array_equal(reader["pin/b/0002"][()], values(7)["pin/b"])
+
+
 def test_a_file_of_version_0_1_goes_on(tmp_path):
     """It has room for steps to come, and all in one file."""
     path = tmp_path / "x.h5"
