@@ -20,6 +20,7 @@ from archord.output.folder import CHECKPOINT, report_of
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
+from archord.scene.parts import LoadSection
 from archord.scene.sections.errors import toml_value
 
 _TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
@@ -155,11 +156,22 @@ def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None
         raise InputError(
             f"{folder}: was loaded by {own.loading}; {scene.loading} cannot continue it."
         )
-    a, b = scene_keys(own), scene_keys(scene)
+    a, b = (_without_targets(scene_keys(each)) for each in (own, scene))
     for key in sorted({*a, *b}):
-        if a.get(key) != b.get(key) and key != "load" and not key.startswith(_MAY_DIFFER):
+        if a.get(key) != b.get(key) and not key.startswith(_MAY_DIFFER):
             there, here = (toml_value(keys[key]) if key in keys else "absent" for keys in (a, b))
             raise InputError(
                 f"{folder}: was solved with {key} = {there}, the scene says {here}; only "
                 "[stepping], analysis.max_iterations and the load's further targets may change."
             )
+
+
+def _without_targets(keys: dict[str, Any]) -> dict[str, Any]:
+    """The ``keys`` of a scene, its loads without their values."""
+    if "load" not in keys:
+        return keys
+    loads = [
+        {key: value for key, value in load.items() if key not in LoadSection.kinds}
+        for load in keys["load"]
+    ]
+    return keys | {"load": loads}

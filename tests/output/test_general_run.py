@@ -179,6 +179,20 @@ def test_another_load_is_refused(run):
         plan_restart(run.folder, other, extend=True)
 
 
+def test_another_core_is_refused(tmp_path):
+    """The force would act elsewhere from there on."""
+
+    def pushed(radius: float, *forces: float):
+        core = {"centre": [0.0, 0.0], "radius": radius}
+        push = {"name": "push", "on": "pin", "direction": "x", "force": list(forces), "core": core}
+        return scene(load=[push], path={"steps": 1})
+
+    solve_scene(pushed(2.0, 500.0), tmp_path, MPI.COMM_SELF)
+    with pytest.raises(InputError, match=r'was solved with load = .*"radius": 2.0.*; only '):
+        plan_restart(tmp_path, pushed(4.0, 500.0, 1000.0), extend=True)
+    assert plan_restart(tmp_path, pushed(2.0, 500.0, 1000.0), extend=True).start
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
