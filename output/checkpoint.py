@@ -76,6 +76,7 @@ def halt(
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": levels.tolist(),
         "contact_points": RULE.get(),
+        "sets": order.sets_digest,
     }
     arrays = order.collect_history() | {"fields/displacement": order.collect(u)}
     if position.increment is not None:
@@ -94,9 +95,13 @@ def resume(
     is of another mesh. Collective."""
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
+    fault = ""
     if not same_mesh:
-        said = "belongs to another mesh than the scene makes here (another version of gmsh?)"
-        raise InputError(f"{path}: {said}, so that the run cannot be continued.")
+        fault = "belongs to another mesh than the scene makes here (another version of gmsh?)"
+    elif "sets" in scalars and scalars["sets"] != order.system.comm.bcast(order.sets_digest):
+        fault = "belongs to other bodies, supports, loads or surfaces of this mesh: its sets differ"
+    if fault:
+        raise InputError(f"{path}: {fault}, so that the run cannot be continued.")
     order.spread_history(checkpoint.arrays if checkpoint else None)
 
     def state(name: str, level: str) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
+from functools import cached_property
 
 import basix
 import numpy as np
@@ -45,6 +46,7 @@ class Gather:
         return ordered
 
 
+_SOME = 1e-6  # of the largest load on a node: what is less is round-off
 _NEWER = {"volume_work"}  # histories that checkpoints of 0.2 lack, and begin at rest then
 
 
@@ -122,6 +124,28 @@ class MeshOrder:
         return hashlib.sha256(
             self.coordinates.tobytes() + self.nodes_of_cell.astype("<i8").tobytes()
         ).hexdigest()
+
+    @cached_property
+    def sets_digest(self) -> str:
+        """SHA-256 of the cells of the bodies, and of the nodes that are held, moved, loaded and in
+        contact, on rank 0. Collective."""
+        drives = self.system.equilibrium.drives
+        first = self.system.V.dofmap.index_map.local_range[0]
+        n_drives = len(drives.names)
+        is_anchor = (drives.rate[n_drives:] != 0).any(axis=0)
+        marks = [drives.fixed & ~is_anchor]
+        for of_drive in (*drives.rate[:n_drives], *drives.applied[:n_drives]):
+            size = np.abs(of_drive)
+            largest = self.system.comm.allreduce(size.max(initial=0.0), op=MPI.MAX)
+            marks.append(size > _SOME * largest)
+        for surface in self.system.contact.surfaces:
+            touches = np.zeros((self._n_owned, 1), dtype=bool)
+            own = surface.curve_dofs - first
+            touches[own[(own >= 0) & (own < self._n_owned)]] = True
+            marks.append(touches)
+        arrays = [self.collect(mark).astype(np.uint8) for mark in marks]
+        arrays.append(self.bodies().astype("<i4"))
+        return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""

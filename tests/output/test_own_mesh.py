@@ -4,6 +4,7 @@ again."""
 import json
 import shutil
 import signal
+from dataclasses import replace
 
 import basix.ufl
 import numpy as np
@@ -211,3 +212,18 @@ def test_a_run_of_a_file_named_from_the_current_folder_goes_on(tmp_path, monkeyp
     assert len(forces("run")) == 2 * 2
     assert run.status == "done"
     assert archord.load_scene("run/scene.toml").mesh.file == str(tmp_path / "bar.npz")
+
+
+def test_other_sets_of_the_same_mesh_do_not_continue_a_run(tmp_path):
+    """The same triangles, held and pulled at the other sides: cells and coordinates are equal."""
+    mesh, cells, facets = square(MPI.COMM_SELF)
+    other = meshtags(mesh, 1, facets.indices, np.where(facets.values == 3, 8, 3).astype(np.int32))
+    archord.solve(problem((mesh, cells, facets)), tmp_path / "run")
+    pull = archord.Load("pull", on="8", direction="x", displacement=[0.02, 0.0, 0.01])
+
+    def longer(tags):
+        return replace(problem((mesh, cells, tags), steps=[3, 1, 1]), loads=[pull])
+
+    with pytest.raises(archord.InputError, match="its sets differ, so that the run cannot be"):
+        archord.solve(longer(other), tmp_path / "run", restart=True)
+    assert archord.solve(longer(facets), tmp_path / "run", restart=True).steps == 5
