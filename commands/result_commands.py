@@ -193,6 +193,8 @@ def probe(
     from archord.postprocess.run import Run
     from archord.postprocess.tables import probe_text
 
+    if along and asked["line"]:
+        raise click.UsageError("choose one of --line and --along")
     asked["line"] = along or asked["line"]
     found = Run(folder).probe(**asked)
     found = found.over(over) if over is not None else found

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from archord.materials.material import Array
+from archord.output.cell_fields import row_of
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.probes.located import located
 from archord.postprocess.probes.probed import Along, Probed, nodal
 from archord.report.errors import InputError
 
+_ANGLE = "principal_angle"
 _SAMPLES = 201  # on a line
 _BESIDE = 1e-6  # of a triangle's height, by which a point beside it still lies on it
 
@@ -27,19 +29,36 @@ def along_line(run: Probed, line: Sequence[float], quantity: str, step: int) -> 
     share = np.linspace(0, 1, _SAMPLES)
     x = start + share[:, None] * (end - start)
     fields = run.fields(step)
-    of_cells = fields.cell.get(quantity)
-    if quantity in fields.nodal_fields():
-        of_cells = None
-    if d == 3:
-        found = _in_cells(run, fields, x, quantity, of_cells)
-    elif of_cells is None:
-        found = _between_nodes(fields, x, nodal(run, fields, quantity))
+    if quantity == _ANGLE and fields.stress is not None:
+        # an angle itself jumps by half a turn between nodes
+        xx, yy, xy = (_values(run, fields, x, f"stress_{name}") for name in ("xx", "yy", "xy"))
+        found = np.arctan2(2 * xy, xx - yy) / 2
     else:
-        found = _of_cells(fields, x, of_cells)
+        found = np.maximum(_values(run, fields, x, quantity), _least(quantity))
     inside = ~np.isnan(found)
     if not inside.any():
         raise InputError(f"{run.folder}: no body lies on the line.")
     return Along(x[inside], share[inside] * np.linalg.norm(end - start), found[inside])
+
+
+def _values(run: Probed, fields: Fields, x: Array, quantity: str) -> Array:
+    """The quantity at ``x`` ``(k, d)``, NaN outside the bodies."""
+    of_cells = fields.cell.get(quantity)
+    if quantity in fields.nodal_fields():
+        of_cells = None
+    if x.shape[1] == 3:
+        return _in_cells(run, fields, x, quantity, of_cells)
+    if of_cells is None:
+        return _between_nodes(fields, x, nodal(run, fields, quantity))
+    return _of_cells(fields, x, of_cells)
+
+
+def _least(quantity: str) -> float:
+    """What a quantity is at least: parabolas between nodes swing below it."""
+    if quantity == "von_mises":
+        return 0.0
+    row = row_of(quantity)
+    return row.least if row else -np.inf
 
 
 def _in_cells(

@@ -107,7 +107,12 @@ class Probe:
             order = np.argsort(off)
             spacing = np.median(np.diff(off[order]))
             if np.abs(off).min() < 2 * spacing + _ROUND_OFF:
-                return float(np.interp(0.0, off[order], self.values[order]))
+                values = self.values[order]
+                if self.unit == "rad":  # an angle of stress, which jumps by half a turn
+                    values = np.unwrap(values, period=np.pi)
+                    between = float(np.interp(0.0, off[order], values))
+                    return (between + np.pi / 2) % np.pi - np.pi / 2
+                return float(np.interp(0.0, off[order], values))
         raise InputError(f"{self.place}: has no point at {angle:g} degrees.")
 
     def over(self, length: float) -> Probe:

@@ -397,3 +397,38 @@ def test_the_largest_force_is_that_of_the_largest_size(tmp_path):
     run.columns["pull force"] = [-force for force in run.columns["pull force"]]
     text = run_text(run)
     assert f"pull force = {run.columns['pull force'][1]:.6g} N/mm at step 2" in text
+
+
+def test_the_angle_of_a_stress_does_not_swing_between_nodes(tmp_path):
+    """A plate that is pulled along y between clamps: the angle is near 90 or -90 degrees,
+    whichever way the shear is, and not between them where it jumps."""
+    mesh = archord.rectangles({"plate": (-1, 0, 2, 2)}, size=0.5)
+    plate = archord.Problem(
+        mesh,
+        bodies=[archord.Body("plate", archord.Elastic(1000.0, 0.3))],
+        supports=[archord.Support("plate bottom"), archord.Support("plate top", fixed="x")],
+        loads=[archord.Load("pull", on="plate top", direction="y", displacement=0.01)],
+        steps=1,
+    )
+    run = archord.solve(plate, tmp_path / "run")
+    angle = run.probe(line=(-0.9, 0.4, 0.9, 0.4), quantity="principal_angle").values
+    assert angle.min() < -1.2
+    assert angle.max() > 1.2
+    assert np.abs(angle).min() > 1.2
+
+
+def test_no_plastic_strain_below_none_between_nodes_in_space(tmp_path):
+    """Parabolas between nodes of which one has yielded swing below 0."""
+    mesh = archord.boxes({"bar": (0, 0, 0, 4, 1, 1)}, size=0.7)
+    steel = archord.J2Material(1000.0, 0.3, hardening=archord.LinearHardening(2.0, 10.0))
+    bar = archord.Problem(
+        mesh,
+        bodies=[archord.Body("bar", steel)],
+        supports=[archord.Support("bar left")],
+        loads=[archord.Load("bend", on="bar right", direction="y", displacement=0.05)],
+        steps=1,
+    )
+    run = archord.solve(bar, tmp_path / "run")
+    line = (0.0, 0.95, 0.5, 4.0, 0.95, 0.5)
+    for quantity in ("peeq", "von_mises"):
+        assert run.probe(line=line, quantity=quantity).values.min() >= 0
