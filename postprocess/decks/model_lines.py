@@ -12,6 +12,7 @@ from archord.materials.j2 import J2Material
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.rows import block, number, pair
+from archord.postprocess.decks.ties import Ties
 from archord.solver.contact.laws.coulomb import Coulomb
 from archord.solver.contact.laws.named import Frictionless, Tied, contact_law
 from archord.solver.problem import Interaction, Problem, Rigid
@@ -35,8 +36,9 @@ def model_lines(model: DeckModel) -> list[str]:
         lines.append(f"*SOLID SECTION, ELSET={label(name)}, MATERIAL={label(name)}")
         if problem.kinematics.is_plane:
             lines.append(number(model.thick))
+    ties = Ties(model)
     for interaction in problem.interactions:
-        lines += _contact_lines(model, interaction)
+        lines += _contact_lines(model, interaction, ties)
     lines += _spring_lines(model)
     for m in model.hung:
         for k, node in enumerate(m.nodes):
@@ -50,11 +52,13 @@ def model_lines(model: DeckModel) -> list[str]:
     return lines + block("*BOUNDARY", held)
 
 
-def _contact_lines(model: DeckModel, interaction: Interaction) -> list[str]:
+def _contact_lines(model: DeckModel, interaction: Interaction, ties: Ties) -> list[str]:
     """How the surfaces of an ``interaction`` act on each other."""
     law = contact_law(interaction.law, interaction.friction)
     name = label(interaction.name)
     if isinstance(law, Tied):
+        if model.mesh.x.shape[1] == 2:
+            return ties.lines(interaction)
         return [f"*TIE, NAME={name}, ADJUST=NO", pair(interaction)]
     if not isinstance(law, Frictionless | Coulomb):
         raise ValueError(

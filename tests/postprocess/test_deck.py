@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import archord
 from archord.benchmarks.case import paper_joint
-from archord.benchmarks.peers.calculix import areas
+from archord.benchmarks.peers.calculix import areas, drive_forces, read_printed
 from archord.cli import run
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
@@ -396,6 +396,39 @@ def test_a_ring_has_axisymmetric_elements_and_the_force_on_all_of_it(quads, tmp_
         float(line.split()[1]) for line in printed if line.split()[:1] == [str(len(mesh.x) + 1)]
     ]
     assert moved == pytest.approx([force * 8 / (2e5 * area) for force in (4000, 8000)], rel=1e-6)
+
+
+@pytest.mark.parametrize("kinematics", ["plane strain", "plane stress", "axisymmetric"])
+def test_tied_blocks_are_one_column(kinematics, tmp_path):
+    """A column of two tied blocks without lateral contraction, on meshes that do not match, is a
+    bar of two materials. `*TIE` of CalculiX leaves most nodes of plane elements loose."""
+    heights = {"low": 1.0, "high": 0.5}
+    moduli = {"low": 1e3, "high": 2e3}
+    mesh = rectangles({"low": (1, 0, 2, 1), "high": (1, 1, 2, 0.5)}, 0.3, MPI.COMM_SELF)
+    problem = Problem(
+        mesh,
+        [Body(name, Elastic(E, 0.0)) for name, E in moduli.items()],
+        [Interaction("tie", ("high bottom", "low top"), law="tied")],
+        supports=[Support("low bottom")],
+        loads=[Load("pull", on="high top", direction="y", displacement=0.01)],
+        steps=1,
+        kinematics=kinematics,
+    )
+    system = System(problem)
+    decks_mesh = deck_mesh(system)
+    text = deck(system, decks_mesh, [1.0])
+    assert "*TIE" not in text
+    tied = np.unique(decks_mesh.surfaces["high bottom"].nodes)
+    assert text.count("*EQUATION") == 2 * len(tied)
+    if ccx is None:
+        pytest.skip("CalculiX is not installed (image target peers)")
+    (tmp_path / "tied.inp").write_text(text)
+    subprocess.run([ccx, "-i", "tied"], cwd=tmp_path, check=True, capture_output=True)
+    printed = read_printed((tmp_path / "tied.dat").read_text())
+    compliance = sum(heights[name] / moduli[name] for name in heights)
+    area = math.pi * (3**2 - 1**2) if kinematics == "axisymmetric" else 2.0
+    forces = drive_forces(system, decks_mesh, printed)
+    assert forces["pull"] == pytest.approx(area * 0.01 / compliance, rel=1e-6)
 
 
 def test_a_rigid_disc_around_an_axis_is_refused():

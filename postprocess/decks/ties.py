@@ -1,0 +1,102 @@
+"""The lines of a deck that tie surfaces in a plane or around an axis: an equation a node.
+
+CalculiX makes bricks of plane elements, and ``*TIE`` cannot take most of the nodes that it adds. It
+says so in warnings, and goes on with what is left. (CalculiX CrunchiX 2.20, found with two blocks
+under tension.)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.postprocess.decks.mesh import DeckMesh, DeckSurface, surface_name
+from archord.postprocess.decks.model import DeckModel
+from archord.postprocess.decks.numbering import Ints
+from archord.postprocess.decks.rows import number
+from archord.solver.problem import Interaction
+
+_ITERATIONS = 30
+_BEYOND = 1e-6  # how far beyond the end of an edge a node is on it, in half its length
+_SMALL = 1e-12  # a weight that is round-off
+
+
+class Ties:
+    """Nodes of a surface of every tie as parts of the edges that they are tied to.
+
+    Attributes
+    ----------
+    dependent : dict
+        By a tied (node, axis) the nodes that its equation has.
+    """
+
+    def __init__(self, model: DeckModel) -> None:
+        self._model = model
+        self._taken = {(int(node), m.axis) for m in model.moved for node in m.nodes}
+        self.dependent: dict[tuple[int, int], Ints] = {}
+
+    def lines(self, interaction: Interaction) -> list[str]:
+        """The equations of a tied ``interaction``. What is held or moved already is not tied."""
+        mesh = self._model.mesh
+        tied, opposite = sorted(
+            (mesh.surfaces[surface_name(interaction, side)] for side in (0, 1)),
+            key=lambda surface: (self._n_taken(surface), _mean_length(mesh, surface)),
+        )
+        nodes = np.unique(tied.nodes)
+        edge, weights = closest_on_edges(mesh.x[nodes], mesh.x[opposite.nodes])
+        lines = []
+        for k in np.flatnonzero(edge >= 0):
+            node = int(nodes[k])
+            large = np.abs(weights[k]) > _SMALL
+            others = opposite.nodes[edge[k]][large]
+            for axis in (0, 1):
+                if self._is_free(node, axis, others):
+                    self.dependent[node, axis] = others
+                    lines += _equation(node, axis, others, weights[k][large])
+        return lines
+
+    def _n_taken(self, surface: DeckSurface) -> int:
+        nodes = np.unique(surface.nodes)
+        return sum((int(node), axis) in self._taken for node in nodes for axis in (0, 1))
+
+    def _is_free(self, node: int, axis: int, others: Ints) -> bool:
+        """Whether the node can be made to depend on ``others``, none of which depends on it."""
+        if (node, axis) in self._taken or (node, axis) in self.dependent:
+            return False
+        return not any(node in self.dependent.get((int(n), axis), ()) for n in others)
+
+
+def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:
+    """The closest of ``edges`` ``(m, 3, 2)`` (start, end, midpoint) to each point ``x`` ``(n, 2)``:
+    its number ``(n,)``, -1 where a point lies beyond all ends, and the ``weights`` ``(n, 3)`` of
+    its nodes at the closest point."""
+    start, end, middle = (edges[None, :, k] for k in range(3))
+    slope = (end - start) / 2
+    bend = (start + end) / 2 - middle
+    t = np.clip(np.vecdot(x[:, None] - middle, slope) / np.vecdot(slope, slope), -2, 2)
+    for _ in range(_ITERATIONS):
+        along = slope + 2 * t[..., None] * bend
+        off = middle + t[..., None] * slope + t[..., None] ** 2 * bend - x[:, None]
+        t = np.clip(t - np.vecdot(off, along) / np.vecdot(along, along), -2, 2)
+    off = middle + t[..., None] * slope + t[..., None] ** 2 * bend - x[:, None]
+    distance = np.linalg.norm(off, axis=-1)
+    distance[np.abs(t) > 1 + _BEYOND] = np.inf
+    nearest = distance.argmin(axis=1)
+    every = np.arange(len(x))
+    at = t[every, nearest]
+    weights = np.stack([at * (at - 1) / 2, at * (at + 1) / 2, 1 - at**2], axis=1)
+    return np.where(np.isfinite(distance[every, nearest]), nearest, -1), weights
+
+
+def _mean_length(mesh: DeckMesh, surface: DeckSurface) -> float:
+    ends = mesh.x[surface.nodes[:, :2]]
+    return float(np.linalg.norm(np.diff(ends, axis=1), axis=2).mean())
+
+
+def _equation(node: int, axis: int, others: Ints, weights: Array) -> list[str]:
+    words = [f"{node + 1}, {axis + 1}, {number(1)}"]
+    words += [
+        f"{other + 1}, {axis + 1}, {number(-weight)}"
+        for other, weight in zip(others, weights, strict=True)
+    ]
+    return ["*EQUATION", str(len(words)), ", ".join(words)]
