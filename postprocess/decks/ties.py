@@ -73,11 +73,11 @@ def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:
     start, end, middle = (edges[None, :, k] for k in range(3))
     slope = (end - start) / 2
     bend = (start + end) / 2 - middle
-    t = np.clip(np.vecdot(x[:, None] - middle, slope) / np.vecdot(slope, slope), -2, 2)
+    t = np.clip(_dot(x[:, None] - middle, slope) / _dot(slope, slope), -2, 2)
     for _ in range(_ITERATIONS):
         along = slope + 2 * t[..., None] * bend
         off = middle + t[..., None] * slope + t[..., None] ** 2 * bend - x[:, None]
-        t = np.clip(t - np.vecdot(off, along) / np.vecdot(along, along), -2, 2)
+        t = np.clip(t - _dot(off, along) / _dot(along, along), -2, 2)
     off = middle + t[..., None] * slope + t[..., None] ** 2 * bend - x[:, None]
     distance = np.linalg.norm(off, axis=-1)
     distance[np.abs(t) > 1 + _BEYOND] = np.inf
@@ -86,6 +86,10 @@ def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:
     at = t[every, nearest]
     weights = np.stack([at * (at - 1) / 2, at * (at + 1) / 2, 1 - at**2], axis=1)
     return np.where(np.isfinite(distance[every, nearest]), nearest, -1), weights
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return (a * b).sum(axis=-1)
 
 
 def _mean_length(mesh: DeckMesh, surface: DeckSurface) -> float:
