@@ -272,6 +272,11 @@ class ProblemScene(Checked):
         return [[float(v) for v in row] for row in np.column_stack([self.targets, *table])]
 
     @property
+    def has_friction(self) -> bool:
+        """Whether there is friction in a contact."""
+        return any(part.has_friction for part in self.interaction)
+
+    @property
     def accurate(self) -> str:
         """Name of what an accuracy is asked of."""
         load = self.load[-1]

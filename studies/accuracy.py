@@ -2,8 +2,8 @@
 error is below it.
 
 What is estimated is the error of P at the output steps, over the largest; of delta, if the load is
-a force. Mesh and steps err independently. The steps of a plastic joint are chosen first, where that
-is cheap, on the coarsest mesh; then meshes follow until both errors together are small enough. Each
+a force. Mesh and steps err independently. The steps of a plastic joint, and of one with friction,
+are chosen first, where that is cheap, on the coarsest mesh; then meshes follow until both errors together are small enough. Each
 mesh is an ordinary run, and the last one stays.
 """
 
@@ -25,7 +25,7 @@ from archord.output.files.seal import read_report, report_text
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
-from archord.postprocess.judgement.convergence import Curve, mesh_error, step_error
+from archord.postprocess.judgement.convergence import Curve, mesh_error, richardson, step_error
 from archord.presets.joint_doubts import UNSEEN
 from archord.presets.views import view_of
 from archord.report.errors import InputError
@@ -33,6 +33,7 @@ from archord.scene.file import AnyScene
 from archord.solver.path.system import System
 
 MOST_SUBSTEPS = 64
+_ORDER_WITH_FRICTION = 0.5  # of the error of steps, at least (docs/accuracy.md)
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,8 @@ class _Search:
         self.asked = self.scene.analysis.accuracy or 0.0
         self.begun = perf_counter()
         self.levels = list[Level]()
-        self.step_error = None if self.scene.plastic else 0.0
+        depends_on_steps = self.scene.plastic or self.scene.has_friction
+        self.step_error = None if depends_on_steps else 0.0
         self.family = view_of(self.scene).mesh_family(self.asked)
 
     def refine(self) -> None:
@@ -149,14 +151,24 @@ class _Search:
 
     def _choose_steps(self, mesh: int, curve: Curve, level: Level) -> tuple[Curve, Level]:
         """Halve the steps until what they err by is at most half of what was asked; the curve with
-        these steps."""
+        these steps.
+
+        With friction errors fall more slowly than steps, and the first differences may grow: only
+        one that is smaller than the one before says how large the error is.
+        """
+        has_friction = self.scene.has_friction
+        order = _ORDER_WITH_FRICTION if has_friction else 1.0
+        before = 0.0
         while True:
             finer, finer_level = self._solve(mesh, 2 * self.substeps)
             if finer is None:
                 raise _End
-            error = step_error(curve, finer)
-            self.step_error = 2 * error
-            if 2 * self.step_error <= self.asked:
+            apart = step_error(curve, finer)
+            is_evidence = apart <= before or not has_friction
+            before = apart
+            error = richardson(apart, 2.0, order)
+            self.step_error = 2.0**order * error
+            if is_evidence and 2 * self.step_error <= self.asked:
                 self._tell(replace(finer_level, step_error=error))
                 return curve, replace(level, step_error=self.step_error)
             self._tell(replace(level, step_error=self.step_error))
@@ -164,7 +176,7 @@ class _Search:
             level = finer_level
             self.substeps = 2 * self.substeps
             self.step_error = error
-            if 2 * error <= self.asked or self.substeps >= MOST_SUBSTEPS:
+            if (is_evidence and 2 * error <= self.asked) or self.substeps >= MOST_SUBSTEPS:
                 return curve, replace(level, step_error=error)
 
     def _solve(self, mesh: int, substeps: int) -> tuple[Curve | None, Level]:

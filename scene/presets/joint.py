@@ -185,6 +185,11 @@ class Scene(Checked):
         return data
 
     @property
+    def has_friction(self) -> bool:
+        """Whether there is friction in a contact."""
+        return self.analysis.friction > 0
+
+    @property
     def fits(self) -> bool:
         """Whether pin and hole are pressed into each other before they are loaded."""
         return self.joint.dR < 0

@@ -128,6 +128,22 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
     assert outcome.accuracy.levels[-1].last == outcome.steps[-1]["delta"]
 
 
+@pytest.mark.parametrize("steps", [1, 4])
+def test_steps_err_with_friction_too(tmp_path, steps):
+    """An elastic joint that sticks and slides: the error of the steps is that of many steps, where
+    one step and two differ by a twentieth of it, too."""
+    rough = {"friction": 0.5}
+    outcome = accurate(open_scene(3e-3, steps, analysis=rough), tmp_path / "run")
+    found = outcome.accuracy
+    assert 0 < found.step_error <= 1.5e-3
+    assert found.substeps > 1
+    short = {"initial": 1 / 64, "maximum": 1 / 64}
+    own = load_scene(tmp_path / "run" / "scene.toml")
+    many = own.model_copy(update={"stepping": own.stepping.model_copy(update=short)})
+    known = Case("many", many).solve(tmp_path).steps[-1]["P"]
+    assert abs(outcome.steps[-1]["P"] / known - 1) < found.step_error
+
+
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
     """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer
     to that of many."""
