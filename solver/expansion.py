@@ -20,6 +20,7 @@ from archord.solver.core_load import core_density, require_core
 from archord.solver.parts import Coupling, Load, Support, freedoms
 from archord.solver.problem import Problem
 
+_ALONG_AXIS = "y"  # the direction along the axis of rings
 _TWO_MIRRORS = 4  # parts of a whole in space, from which on nothing turns
 _STRETCHED = 10.0  # sizes of the mesh that large strain may displace by
 _TURNS = {2: PLANE_STRAIN.turns, 3: SPACE.turns}  # of a coupling, which turns a ring like a plane
@@ -115,6 +116,14 @@ class _Expansion:
             if freedom is not None and freedom not in self.freedoms:
                 known = ", ".join(self.freedoms)
                 raise ValueError(f"the {part} has the direction {freedom!r}, but here are {known}")
+        rigid = {c.name for c in self.stated.couplings if c.kind == "rigid"}.union(self.discs)
+        for load in self.given_loads:
+            if load.on in rigid and load.direction not in self._rigid_motions():
+                raise ValueError(
+                    f"the load {load.name!r} has the direction {load.direction!r}, in which no "
+                    f"rigid ring such as {load.on!r} moves: it moves along its axis, "
+                    f"{_ALONG_AXIS!r}; a set of facets can be widened"
+                )
         points = [(f"coupling {c.name!r}", "point", c.point) for c in self.stated.couplings]
         for load in self.given_loads:
             if load.core is not None:
@@ -265,7 +274,7 @@ class _Expansion:
     def _rigid_point(self, coupling: Coupling) -> None:
         for axis in range(self.dimension):
             self.supports.append(Dirichlet(coupling.name, coupling.facets, axis))
-        for freedom in self.freedoms:
+        for freedom in self._rigid_motions():
             if (coupling.name, freedom) in self.held:
                 continue
             drive = self._drive(coupling.name, freedom, "force")
@@ -273,6 +282,10 @@ class _Expansion:
                 self.supports.append(Dirichlet(coupling.name, coupling.facets, axis, rate, drive))
         if self.dimension == 3 and self._is_large():
             self._turn_finitely(coupling)
+
+    def _rigid_motions(self) -> list[str]:
+        """The directions in which rigid couplings and discs can move: a ring along its axis."""
+        return [_ALONG_AXIS] if self.stated.kinematics.has_hoop else [*self.freedoms]
 
     def _turn_finitely(self, coupling: Coupling) -> None:
         """Let the rotations of a ``coupling`` be finite, where all of them are prescribed."""

@@ -11,6 +11,7 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematics import AXISYMMETRIC
 from archord.measures.doubts import stiff_quadrilaterals
+from archord.solver.parts import Coupling, Load, Support
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
 from archord.solver.problem import Body, DeadLoad, Dirichlet, Drive, Mean, Problem
@@ -114,6 +115,34 @@ def test_rings_have_no_rotation():
     assert bars().reaction_moment("feet", (0.0, 0.0)) == 0
     with pytest.raises(ValueError, match="rotation"):
         bars(means=[Mean("lid", "lid", 2, drive="lid")], drives=[Drive("lid", control="force")])
+
+
+@pytest.mark.mpi
+def test_a_rigid_ring_moves_along_its_axis_alone():
+    """A plate on the head of a short bar, whose feet are clamped, widens as little as the feet, and
+    the bar is stiffer than under a plate that slides."""
+    plate = [Coupling("plate", "lid", (RADIUS, 1.0))]
+    feet = [Support("feet", "base"), Support("feet", "upper bottom")]
+    press = [Load("press", "plate", "y", displacement=-DOWN)]
+    pushed = [Load("press", "lid", "y", displacement=-DOWN)]
+    held = Support("guide", "lid", "x")
+    system = solved(supports=feet, couplings=plate, loads=press)
+    same = solved(supports=[*feet, held], loads=pushed)
+    sliding = solved(supports=feet, loads=pushed)
+    force = system.drive_force("press")
+    assert force == pytest.approx(same.drive_force("press"), rel=1e-9)
+    assert force < 1.02 * sliding.drive_force("press") < 0
+    x, u = displacements(system)
+    assert not u[x[:, 1] > 1 - 1e-9, 0].any()
+
+
+@pytest.mark.parametrize("direction", ["x", "rotation"])
+def test_no_load_widens_or_turns_a_rigid_ring(direction):
+    plate = [Coupling("plate", "lid", (RADIUS, 1.0))]
+    load = Load("twist", "plate", direction, displacement=DOWN)
+    feet = [Support("feet", "base"), Support("feet", "upper bottom")]
+    with pytest.raises(ValueError, match="no rigid ring such as 'plate' moves"):
+        bars(supports=feet, couplings=plate, loads=[load])
 
 
 INNER, OUTER, YIELD_STRESS = 1.0, 2.0, 0.001
