@@ -12,6 +12,7 @@ from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arrays.fields import Fields
+from archord.postprocess.pictures.abscissa import abscissa
 from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.report.errors import InputError
@@ -243,10 +244,12 @@ def draw_outline(axes: Any, fields: Fields, x: Array, **style: Any) -> None:
 
 def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     """Mean contact pressure of each facet at ``steps`` (up to four), over the angle where all
-    surfaces are arcs: the colour tells the step, the style the surface."""
+    surfaces are arcs: the colour tells the step, the style the surface. Ties can be in tension."""
     edge_panel(axes, run, list(run.contact()), "facet_pressure", steps)
     unit = run.scene.units.stress
-    axes.set(title="contact pressure", ylabel=f"pressure [{unit}]", ylim=(0, None))
+    axes.set(title="contact pressure", ylabel=f"pressure [{unit}]")
+    if all(part.law != "tied" for part in run.scene.interaction):
+        axes.set(ylim=(0, None))
 
 
 def edge_panel(
@@ -273,15 +276,13 @@ def edge_panel(
 
 
 def draw_probes(axes: Any, probes: Sequence[Probe], styles: Sequence[dict[str, Any]]) -> None:
-    """Quantities over the angle, or over the arc length where one of the edges is no arc; each in
-    its style."""
-    arcs = all(probe.angle is not None for probe in probes)
-    for probe, style in zip(probes, styles, strict=True):
-        along: Any = probe.angle if arcs else probe.s
+    """Quantities over their `abscissa`, each in its style."""
+    places, label = abscissa(probes)
+    for probe, along, style in zip(probes, places, styles, strict=True):
         order = np.argsort(along, kind="stable")
         axes.plot(along[order], probe.values[order], lw=1.3, **style)
     first = probes[0]
-    axes.set(xlabel="angle [°]" if arcs else f"arc length [{first.length}]")
+    axes.set(xlabel=label)
     axes.set(ylabel=f"{first.quantity.replace('_', ' ')} [{first.unit or '-'}]")
     axes.legend(frameon=False, fontsize="small")
     axes.grid(alpha=0.3)

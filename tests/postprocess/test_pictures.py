@@ -11,7 +11,9 @@ import pytest
 
 import archord
 from archord.cli import run as command
-from archord.postprocess.pictures.problems import draw_field, shown_step
+from archord.postprocess.pictures.abscissa import abscissa
+from archord.postprocess.pictures.problems import contact_panel, draw_field, shown_step
+from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.tables import run_text
 from archord.report.figure import new_figure
@@ -84,6 +86,54 @@ def test_numbers_that_are_none_do_not_spoil_the_others(unloaded):
     values[:3] = np.nan
     axes, _ = _drawn(unloaded, replace(fields, cell={"von_mises": values}))
     assert axes.collections[0].get_clim() == (0, pytest.approx(np.nanmax(values)))
+
+
+def _probe(place, x, s, angle=None):
+    values = np.zeros(len(s))
+    x = np.array(x, float)
+    return Probe(place, "pressure", "MPa", 1, 1.0, "pull", x, np.array(s), values, "mm", angle)
+
+
+def test_surfaces_that_touch_are_drawn_over_one_scale():
+    """Two that run against each other over their coordinate; a whole hole beside half a pin that
+    presses it at 0 degrees from -180 to 180. One edge alone has its arc length."""
+    low = _probe("low", [(4, 2), (2, 2), (0, 2)], [0.0, 2.0, 4.0])
+    high = _probe("high", [(1, 2), (3, 2)], [0.0, 2.0])
+    places, label = abscissa([low, high])
+    assert label == "x [mm]"
+    assert [place.tolist() for place in places] == [[4, 2, 0], [1, 3]]
+    (place,), label = abscissa([low])
+    assert label == "arc length [mm]"
+    assert place.tolist() == low.s.tolist()
+
+    half = np.arange(275.0, 450.0, 10.0)
+    whole = np.arange(5.0, 360.0, 10.0)
+    pin, hole = (
+        _probe(name, np.zeros((len(angle), 2)), angle, angle)
+        for name, angle in (("pin", half), ("hole", whole))
+    )
+    (of_pin, of_hole), label = abscissa([pin, hole])
+    assert label == "angle [°]"
+    assert of_pin.tolist() == (half - 360).tolist()
+    np.testing.assert_allclose(np.sort(of_hole), np.arange(-175.0, 180.0, 10.0), atol=1e-12)
+    np.testing.assert_allclose((of_hole - whole) % 360, 0, atol=1e-12)
+
+
+def test_a_tie_in_tension_is_drawn(tmp_path):
+    """Below zero, and not an empty panel."""
+    problem = archord.Problem(
+        archord.rectangles({"low": (0, 0, 1, 1), "high": (0, 1, 1, 1)}, size=0.5),
+        [archord.Body(name, archord.Elastic(1e3, 0.3)) for name in ("low", "high")],
+        [archord.Interaction("tie", ("high bottom", "low top"), law="tied")],
+        supports=[archord.Support("low bottom")],
+        loads=[archord.Load("pull", on="high top", direction="y", displacement=0.01)],
+        steps=1,
+    )
+    axes = new_figure(5.0, 4.0).subplots()
+    contact_panel(axes, archord.solve(problem, tmp_path / "run"))
+    drawn = np.concatenate([line.get_ydata() for line in axes.lines])
+    assert drawn.max() < 0
+    assert axes.get_ylim()[0] < drawn.min()
 
 
 def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, capsys):
