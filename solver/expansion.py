@@ -117,8 +117,9 @@ class _Expansion:
                 known = ", ".join(self.freedoms)
                 raise ValueError(f"the {part} has the direction {freedom!r}, but here are {known}")
         rigid = {c.name for c in self.stated.couplings if c.kind == "rigid"}.union(self.discs)
+        others = {*self.freedoms}.difference(self._rigid_motions())
         for load in self.given_loads:
-            if load.on in rigid and load.direction not in self._rigid_motions():
+            if load.on in rigid and load.direction in others:
                 raise ValueError(
                     f"the load {load.name!r} has the direction {load.direction!r}, in which no "
                     f"rigid ring such as {load.on!r} moves: it moves along its axis, "

@@ -3,8 +3,8 @@ error is below it.
 
 What is estimated is the error of P at the output steps, over the largest; of delta, if the load is
 a force. Mesh and steps err independently. The steps of a plastic joint, and of one with friction,
-are chosen first, where that is cheap, on the coarsest mesh; then meshes follow until both errors together are small enough. Each
-mesh is an ordinary run, and the last one stays.
+are chosen first, where that is cheap, on the coarsest mesh; then meshes follow until both errors
+together are small enough. Each mesh is an ordinary run, and the last one stays.
 """
 
 from __future__ import annotations
@@ -167,11 +167,12 @@ class _Search:
             is_evidence = apart <= before or not has_friction
             before = apart
             error = richardson(apart, 2.0, order)
-            self.step_error = 2.0**order * error
-            if is_evidence and 2 * self.step_error <= self.asked:
+            error_before = 2.0**order * error
+            self.step_error = error_before
+            if is_evidence and 2 * error_before <= self.asked:
                 self._tell(replace(finer_level, step_error=error))
-                return curve, replace(level, step_error=self.step_error)
-            self._tell(replace(level, step_error=self.step_error))
+                return curve, replace(level, step_error=error_before)
+            self._tell(replace(level, step_error=error_before))
             curve = finer
             level = finer_level
             self.substeps = 2 * self.substeps
