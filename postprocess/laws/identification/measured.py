@@ -54,7 +54,8 @@ def read_curve(
     Columns are separated by semicolons, tabs, commas or blanks; but for commas, numbers may have a
     decimal comma. Lines that begin with # are comments. Rows without one of the numbers are left
     out. It is said where a heading has another unit in brackets than ``units``, of displacement and
-    force. Raises `InputError`.
+    force, or the line of units below the headings. Raises `InputError`, also for rows with more
+    cells than there are columns, and for commas beside points in numbers.
     """
     lines = [line for line in read_text(path).splitlines() if line.strip() and line[0] != "#"]
     separator = next((sign for sign in _SEPARATORS if lines and sign in lines[0]), None)
@@ -67,14 +68,17 @@ def read_curve(
     if columns[0] == columns[1]:
         fault = f"column {columns[0] + 1} is taken for displacement and force"
         raise InputError(f"{path}: {fault}; name both, by --delta and --load.")
+    _require_one_reading(path, separator, lines, cells, begin, columns)
     numbers = np.array([_numbers(path, row, columns) for row in cells[begin:]]).reshape(-1, 2)
     whole = np.isfinite(numbers).all(axis=1)
     if whole.sum() < FEWEST:
         fault = f"has {whole.sum()} rows with two numbers, and a fit needs {FEWEST} and more"
         raise InputError(f"{path}: {fault}.")
     said = []
-    if units and heads:
-        said += _other_units(path, [heads[column] for column in columns], units)
+    for k, row in enumerate(cells[:begin]):
+        named = [row[column] if column < len(row) else "" for column in columns]
+        if units:
+            said += _other_units(path, named, units, are_units=k > 0)
     if not whole.all():
         said.append(f"{path}: {(~whole).sum()} of {len(whole)} rows lack a number; left out")
     return _compressed(path, numbers[whole, 0], numbers[whole, 1], said)
@@ -101,12 +105,42 @@ def _column(path: Path, heads: list[str], name: str | None, default: int) -> int
     raise InputError(f"{path}: has no column {name!r}; {there}.")
 
 
-def _other_units(path: Path, heads: list[str], units: tuple[str, str]) -> list[str]:
-    """What there is to say of ``heads`` whose unit in brackets is none of the ``units``."""
+def _require_one_reading(
+    path: Path,
+    separator: str | None,
+    lines: list[str],
+    cells: list[list[str]],
+    begin: int,
+    columns: list[int],
+) -> None:
+    """Raise `InputError` where a comma or a point can be a decimal one and one of thousands."""
+    rows = cells[begin:]
+    width = max(map(len, cells[: max(begin, 1)]), default=0)
+    longer = [k for k, row in enumerate(rows) if any(row[width:])]
+    if longer:
+        k = longer[0]
+        fault = f"has {len(rows[k])} cells in the line {shown(lines[begin + k])}"
+        cure = "a decimal comma needs columns that are separated by semicolons or tabs"
+        raise InputError(f"{path}: {fault}, and no more than {width} before; {cure}.")
+    if separator == ",":
+        return
+    given = [line.split(separator) for line in lines[begin:]]
+    numbers = [row[column] for row in given for column in columns if column < len(row)]
+    if any("," in number for number in numbers) and any("." in number for number in numbers):
+        fault = "has numbers with a comma and numbers with a point"
+        raise InputError(f"{path}: {fault}; write them without signs between thousands.")
+
+
+def _other_units(
+    path: Path, heads: list[str], units: tuple[str, str], *, are_units: bool = False
+) -> list[str]:
+    """What there is to say of ``heads`` whose unit in brackets is none of the ``units``, or which
+    ``are_units`` themselves, with or without brackets."""
     said = []
     for head, unit in zip(heads, units, strict=True):
         found = re.search(r"[\[(]([^\])]*)[\])]", head)
-        if found and found[1].strip() != unit:
+        named = found[1].strip() if found else head * are_units
+        if named and named != unit:
             other = f"{path}: {head!r} has another unit than the scene, {unit}"
             said.append(f"{other}; its numbers are taken as they are")
     return said

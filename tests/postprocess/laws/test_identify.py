@@ -161,6 +161,36 @@ def test_files_without_a_curve_are_refused(tmp_path, text, words):
         read_curve(path, load="force")
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("u,F\n" + "".join(f"{k},05,{2 * k},5\n" for k in range(9)), "has 4 cells in the line"),
+        ("u,F\n" + "".join(f"{k},1,{k}00\n" for k in range(9)), "has 3 cells in the line"),
+        ("".join(f"{k},{k}\n" for k in range(9)) + '"9","1,000"\n', "has 3 cells in the line"),
+        ("u\tF\n" + "".join(f"0.0{k}\t1,{k}00\n" for k in range(9)), "a comma and numbers with a"),
+        ("u;F\n" + "".join(f"0,0{k};1.{k}00\n" for k in range(9)), "a comma and numbers with a"),
+    ],
+)
+def test_a_comma_of_two_meanings_is_refused(tmp_path, text, words):
+    """Between columns, before decimals and between thousands: half a number is none."""
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_curve(path)
+
+
+def test_units_below_the_headings_are_compared(tmp_path):
+    """As test machines write them, with or without brackets."""
+    path = tmp_path / "curve.csv"
+    rows = "".join(f"0;{k},5;{k}\n" for k in range(9))
+    for said in ("(s);(mm);(kN)", "s;mm;kN"):
+        path.write_text(f"time;u;F\n{said}\n{rows}")
+        (warned,) = read_curve(path, "u", "F", units=("mm", "N")).said
+        assert "kN" in warned
+        assert "has another unit than the scene, N" in warned
+        assert not read_curve(path, "u", "F", units=("mm", "kN")).said
+
+
 @pytest.mark.parametrize("names", [{"delta": "u"}, {"load": "F"}])
 def test_one_column_is_not_displacement_and_force(tmp_path, names):
     """Where one of two columns is named, and the other is taken by its place."""
