@@ -31,6 +31,8 @@ from archord.report.timer import Timer
 from archord.scene.columns import supporting
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.analysis import friction_doubts
+from archord.solver.contact.laws.law import ContactLaw
+from archord.solver.contact.laws.named import contact_law
 from archord.solver.expansion import expanded
 from archord.solver.path.system import System
 from archord.solver.problem import Problem
@@ -92,9 +94,19 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         checks=step_checks(scene, system),
         refusal=partial(refusal, system),
         ending=partial(ending, scene, system),
-        fit=scene.path.fit_steps if scene.fits else 0,
+        fit=_steps_without_work(scene, system),
         copies=system.problem.symmetry,
     )
+
+
+def _steps_without_work(scene: ProblemScene, system: System) -> int:
+    """The first steps, in which energy is stored that loads do not bring: bodies are pressed into
+    each other, or touch softly from the start."""
+    if scene.fits:
+        return scene.path.fit_steps
+    parts = system.problem.interactions
+    laws = [contact_law(part.law, part.friction) for part in parts]
+    return int(any(type(law).stored is not ContactLaw.stored for law in laws))
 
 
 def _last_columns(scene: ProblemScene, system: System) -> list[Column]:

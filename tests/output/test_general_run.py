@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.postprocess.run import Run
@@ -217,3 +218,25 @@ def test_what_never_touches_is_told(tmp_path):
     assert outcome.status == "done"
     assert "no surfaces ever touched" in outcome.warnings[-1]
     assert json.loads((tmp_path / "run.json").read_text())["warnings"] == outcome.warnings
+
+
+def test_the_energies_of_soft_contact_count_from_the_first_step_on(tmp_path):
+    """Surfaces that touch softly are pressed against each other before a load does any work."""
+    mesh = archord.rectangles({"lower": (0, 0, 1, 1), "upper": (0, 1, 1, 1)}, size=0.5)
+    soft = archord.Exponential(pressure=2.0, clearance=0.01)
+
+    def imbalance(steps: int) -> float:
+        problem = archord.Problem(
+            mesh,
+            bodies=[archord.Body(name, archord.Elastic(1e3, 0.0)) for name in ("lower", "upper")],
+            interactions=[archord.Interaction("joint", ("lower top", "upper bottom"), law=soft)],
+            supports=[archord.Support("lower bottom"), archord.Support("guide", "upper top", "x")],
+            loads=[archord.Load("press", "upper top", "y", displacement=-0.02)],
+            steps=steps,
+        )
+        run = archord.solve(problem, tmp_path, force=True)
+        assert not any("work of the loads" in warning for warning in run.warnings)
+        report = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
+        return report["error_estimates"]["energy_balance"]
+
+    assert 10 * imbalance(20) < imbalance(4) < 0.005
