@@ -102,8 +102,13 @@ def _value(value: Value, part: str, state: Accepted) -> float:
 
 
 def _of_law(quantity: str) -> Value:
-    """What the law of an interaction tells by this name."""
-    return lambda state, contact: state.quantities(contact)[quantity][0]
+    """What the law of an interaction tells by this name, of the whole, as the force is."""
+
+    def of_whole(state: Accepted, contact: str) -> float:
+        modelled, _ = state.quantities(contact)[quantity]
+        return state.system.problem.symmetry * modelled
+
+    return of_whole
 
 
 def _most_pressed(state: Accepted, contact: str) -> AnyProfile:

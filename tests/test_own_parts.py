@@ -95,6 +95,13 @@ def test_a_run_goes_on_with_its_objects_on_any_number_of_ranks(comm, tmp_path, m
         np.testing.assert_allclose(run.columns[name], alone.columns[name], atol=1e-9 * scale)
 
 
+def test_a_quantity_of_a_law_is_of_the_whole(run, tmp_path):
+    """As the forces are: what is worn off is k times force times slip, whatever part is modelled."""
+    twice = archord.solve(sliding(MPI.COMM_SELF, symmetry=2), tmp_path / "run")
+    for name in ("press force", "rub worn volume", "rub contact length"):
+        np.testing.assert_allclose(twice.columns[name], 2 * np.array(run.columns[name]), rtol=1e-9)
+
+
 def test_the_halted_step_keeps_its_contact(tmp_path, monkeypatch):
     """A law that takes its wear from the beginning of the step has another pressure where the
     accepted state is evaluated once more."""
