@@ -371,11 +371,12 @@ def run_name(scene: AnyScene) -> str:
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> AnyScene:
     """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
+    ordered = in_order(f"{key}={toml_value(value)}" for key, value in overrides.items())
     if "joint" not in data and any(name in data for name in ("mesh", *PRESETS)):
-        for key, value in overrides.items():
-            override_key(data, f"{key}={toml_value(value)}")
+        for override in ordered:
+            override_key(data, override)
         return parse_any(data, str(path))
-    for override in in_order(f"{key}={toml_value(value)}" for key, value in overrides.items()):
+    for override in ordered:
         key = override.partition("=")[0]
         section, _, name = key.partition(".")
         put(data, section, name, overrides[key], key)

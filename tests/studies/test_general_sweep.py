@@ -61,6 +61,19 @@ def test_a_general_sweep_is_shown_and_gone_on_with(swept, capsys):
     assert [row["pull force [N/mm]"] for row in again] == [row["pull force [N/mm]"] for row in rows]
 
 
+@pytest.mark.parametrize("keys", [("yield_stress", "material"), ("material", "yield_stress")])
+def test_a_material_leaves_what_else_a_sweep_varies(tmp_path, keys):
+    """Whichever key is first, as with ``--set``: a material drops what the base says alone."""
+    values = {"yield_stress": "[300.0, 400.0]", "material": '["S355"]'}
+    grid = "".join(f"plate.{key} = {values[key]}\n" for key in keys)
+    file = tmp_path / "steels.sweep.toml"
+    file.write_text(LUG.replace("[grid]\n", f"[grid]\n{grid}"))
+    cases = read_sweep(file).cases
+    plates = [case.scene.solids["lug"] for case in cases]
+    assert {plate.yield_stress for plate in plates} == {300.0, 400.0}
+    assert len({case.run for case in cases}) == len(cases) == 8
+
+
 def test_keys_of_named_parts_vary(tmp_path):
     """As ``--set`` names them; a name that is none is refused once."""
     general = tmp_path / "g.toml"
