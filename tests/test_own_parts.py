@@ -96,7 +96,7 @@ def test_a_run_goes_on_with_its_objects_on_any_number_of_ranks(comm, tmp_path, m
 
 
 def test_a_quantity_of_a_law_is_of_the_whole(run, tmp_path):
-    """As the forces are: what is worn off is k times force times slip, whatever part is modelled."""
+    """As the forces are: k times force times slip is worn off, whatever part is modelled."""
     twice = archord.solve(sliding(MPI.COMM_SELF, symmetry=2), tmp_path / "run")
     for name in ("press force", "rub worn volume", "rub contact length"):
         np.testing.assert_allclose(twice.columns[name], 2 * np.array(run.columns[name]), rtol=1e-9)
