@@ -12,7 +12,7 @@ from archord.materials.j2 import J2Material
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.rows import block, number, pair
-from archord.postprocess.decks.ties import Ties
+from archord.postprocess.decks.ties import Ties, reach
 from archord.solver.contact.laws.coulomb import Coulomb
 from archord.solver.contact.laws.named import Frictionless, Tied, contact_law
 from archord.solver.problem import Interaction, Problem, Rigid
@@ -59,7 +59,7 @@ def _contact_lines(model: DeckModel, interaction: Interaction, ties: Ties) -> li
     if isinstance(law, Tied):
         if model.mesh.x.shape[1] == 2:
             return ties.lines(interaction)
-        return [f"*TIE, NAME={name}, ADJUST=NO", pair(interaction)]
+        return [f"*TIE, NAME={name}, ADJUST=NO{reach(model, interaction)}", pair(interaction)]
     if not isinstance(law, Frictionless | Coulomb):
         raise ValueError(
             f"the law of {interaction.name!r} cannot be exported; contact with and without "

@@ -1,4 +1,5 @@
-"""The lines of a deck that tie surfaces in a plane or around an axis: an equation a node.
+"""The lines of a deck that tie surfaces: in a plane or around an axis an equation a node, in space
+how far ``*TIE`` reaches.
 
 CalculiX makes bricks of plane elements, and ``*TIE`` cannot take most of the nodes that it adds. It
 says so in warnings, and goes on with what is left. (CalculiX CrunchiX 2.20, found with two blocks
@@ -19,6 +20,8 @@ from archord.solver.problem import Interaction
 _ITERATIONS = 30
 _BEYOND = 1e-6  # how far beyond the end of an edge a node is on it, in half its length
 _SMALL = 1e-12  # a weight that is round-off
+_TOUCHING = 1e-3  # of the shortest edge: a gap within the default reach, 0.025 of a typical one
+_REACH = 2.0  # over the largest gap at contact points, as nodes can be farther apart
 
 
 class Ties:
@@ -64,6 +67,25 @@ class Ties:
         if (node, axis) in self._taken or (node, axis) in self.dependent:
             return False
         return not any(node in self.dependent.get((int(n), axis), ()) for n in others)
+
+
+def reach(model: DeckModel, interaction: Interaction) -> str:
+    """The parameter of ``*TIE`` in space that lets it tie surfaces over the gap that they are drawn
+    with; empty where they touch. Without it nodes are left loose, and warnings alone say so."""
+    gaps = [
+        np.abs((pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found])
+        for pair in model.system.contact.interface(interaction.name).pairs
+    ]
+    gap = float(np.concatenate(gaps).max(initial=0.0))
+    shortest = np.inf
+    for side in (0, 1):
+        nodes = model.mesh.surfaces[surface_name(interaction, side)].nodes
+        corners = model.mesh.x[nodes[:, : nodes.shape[1] // 2]]
+        edges = np.roll(corners, 1, axis=1) - corners
+        shortest = min(shortest, float(np.linalg.norm(edges, axis=2).min()))
+    if gap <= _TOUCHING * shortest:
+        return ""
+    return f", POSITION TOLERANCE={number(_REACH * gap)}"
 
 
 def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:

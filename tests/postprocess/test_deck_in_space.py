@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import basix
@@ -151,6 +152,28 @@ def test_calculix_solves_blocks_to_what_archord_finds(kind, changes, tmp_path):
     np.testing.assert_allclose(found.displacement, own, atol=2e-3 * np.abs(own).max())
     if "loads" not in changes:
         assert pytest.approx(system.drive_force("press"), rel=2e-3) == found.P
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02])
+def test_a_tie_over_a_gap_is_told_how_far_it_reaches(gap, tmp_path):
+    """CalculiX leaves nodes loose that are farther away than 0.025 of an element, here all."""
+    problem = blocks(
+        CellType.tetrahedron,
+        interactions=[Interaction("joint", ("upper", "lower"), law="tied")],
+        loads=[Load("pull", on="lid", direction="z", displacement=PRESSED)],
+    )
+    mesh = problem.mesh.mesh
+    upper = np.unique(mesh.geometry.dofmap[problem.mesh.cells_in("upper")])
+    mesh.geometry.x[upper, 2] += gap
+    system = System(problem)
+    (tie,) = re.findall(r"\*TIE.*", deck(system, deck_mesh(system), [1.0]))
+    reach = tie.partition("POSITION TOLERANCE=")[2]
+    assert float(reach or 0.0) == pytest.approx(2 * gap)
+    if ccx is None:
+        pytest.skip("CalculiX is not installed (image target peers)")
+    system.solve([1.0], StepRules(minimum=1.0))
+    found = opinion(problem, tmp_path / "calculix")
+    assert pytest.approx(system.drive_force("pull"), rel=3e-3) == found.P
 
 
 @needs_calculix
