@@ -30,7 +30,7 @@ from archord.output.folder import claim_folder
 from archord.output.user_file import check_target, writing
 from archord.postprocess.run import Run
 
-_OF_CONTACT = ("pressure", "raw_pressure", "gap", "angle", "s")
+_OF_CONTACT = ("pressure", "raw_pressure", "gap", "angle", "s", "slip", "shear", "sticks")
 
 
 def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:

@@ -15,11 +15,16 @@ from archord.postprocess.arrays.arc import undeformed
 from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
+_OF_FRICTION = ("slip", "shear", "sticks")  # at points in a plane and around an axis
 _VECTORS = ("normal", "slip", "traction", "shear")  # at points in space
-_LENGTHS = ("s", "weight", "gap", "x", "y", "z", "ux", "uy", "uz", "slip_x", "slip_y", "slip_z")
+_LENGTHS = (
+    *("s", "weight", "gap", "slip"),
+    *(f"{name}{axis}" for name in ("", "u", "slip_") for axis in "xyz"),
+)
 _STRESSES = (
     "pressure",
     "raw_pressure",
+    "shear",
     *(f"{name}_{axis}" for name in ("traction", "shear") for axis in "xyz"),
 )
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
@@ -71,7 +76,8 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
 
     ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both
     positive in compression; ``weight`` is arc length, around an axis and in space area; ``gap`` is
-    positive when open. Slip, shear and the normal have components in space.
+    positive when open. With friction there are slip and shear, positive along ``s``, and where the
+    points stick. Slip, shear and the normal have components in space.
     """
     units = dict.fromkeys(_LENGTHS, scene.units.length)
     if scene.analysis.plane in ("axisymmetric", "space"):
@@ -90,6 +96,8 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
         if len(axes) == 3:
             given = {f"{name}_": getattr(arc, name) for name in _VECTORS}
             vectors |= {name: values for name, values in given.items() if values is not None}
+        elif getattr(arc, "shear", None) is not None:
+            columns |= {name: getattr(arc, name) for name in _OF_FRICTION if hasattr(arc, name)}
         for name, values in vectors.items():
             columns |= {f"{name}{axis}": values[..., k] for k, axis in enumerate(axes)}
         flat = {name: values.ravel() for name, values in columns.items()}

@@ -7,12 +7,14 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import archord
 from archord.benchmarks.case import paper_joint
 from archord.postprocess.arrays.fields import BODIES
 from archord.postprocess.chord import read_chord_pressure
+from archord.postprocess.export import export_csv
 from archord.postprocess.pictures.joint import magnification, magnified
 from tests.output.run_files import rewrite_report
 
@@ -149,3 +151,35 @@ def test_the_factor_shows_the_clearance_and_no_more(runs, clearance):
         assert factor * clearance <= 0.1 * (1 + 1e-9)
         assert factor * np.abs(scaled.displacement).max() <= 0.2
         assert factor * clearance > 0.02
+
+
+def test_a_table_of_points_has_the_shear_of_friction(tmp_path):
+    """Which adds up to the force and is no larger than friction allows; in contact.csv,
+    too."""
+    problem = archord.Problem(
+        archord.rectangles({"low": (0, 0, 3, 1), "high": (1, 1, 1, 1)}, size=0.5),
+        [archord.Body(name, archord.Elastic(1e3, 0.3)) for name in ("low", "high")],
+        [
+            archord.Interaction(
+                "rub", ("high bottom", "low top"), friction=0.2, integrated="high bottom"
+            )
+        ],
+        supports=[archord.Support("low bottom")],
+        loads=[
+            archord.Load("press", on="high top", direction="y", displacement=[-0.01, -0.01]),
+            archord.Load("slide", on="high top", direction="x", displacement=[0.0, 0.02]),
+        ],
+        steps=[1, 2],
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    table = run.pressure(side="high bottom")
+    assert table.attrs["units"]["shear"] == run.scene.units.stress
+    force = (table["shear"] * table["weight"]).sum()
+    assert abs(force) == pytest.approx(abs(run.columns["rub force x"][-1]), rel=0.01)  # it tilts
+    assert (table["shear"].abs() <= 0.2 * table["raw_pressure"] * (1 + 1e-9)).all()
+    slides = table["sticks"] == 0
+    assert table["slip"][slides & (table["raw_pressure"] > 0)].abs().min() > 0
+    export_csv(run, tmp_path / "csv")
+    assert {"slip [mm]", "shear [MPa]", "sticks"} <= {
+        *pd.read_csv(tmp_path / "csv" / "contact.csv")
+    }
