@@ -243,13 +243,15 @@ def _refuse_contradictions() -> None:
         clash = [typed[name] for name in idle if name in typed]
         if option in typed and clash:
             raise InputError(f"{typed[option]}: does not go with {' or '.join(clash)}.")
-    if "exports" in typed:
-        return
-    if "force" in typed:
+    exports = context.params["exports"]
+    if "force" in typed and not exports:
         raise InputError("--force: overwrites exports, and there is no --export.")
+    if any(export.suffix != ".json" for export in exports):
+        return
+    missing = "a .json file has none" if exports else "there is no --export"
     for name in _CONTACT:
         if name in typed:
-            raise InputError(f"{typed[name]}: is of an export's element, and there is no --export.")
+            raise InputError(f"{typed[name]}: is of an export's element, and {missing}.")
 
 
 def _refuse_unused(chosen: list[Law], given: dict[str, Any]) -> None:

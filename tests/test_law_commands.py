@@ -382,6 +382,10 @@ def test_a_rigid_pin_keeps_its_nu(capsys):
         ),
         (["--scene", ELASTIC, "--force"], "--force: overwrites exports, and there is no --export"),
         (
+            ["--scene", ELASTIC, "--export", "x.json", "--mu-static", "0.1"],
+            "--mu-static: is of an export's element, and a .json file has none",
+        ),
+        (
             ["lankarani-nikravesh", "--scene", ELASTIC],
             "lankarani-nikravesh: this law needs length. Give --length",
         ),
