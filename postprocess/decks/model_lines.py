@@ -12,7 +12,7 @@ from archord.materials.j2 import J2Material
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.rows import block, number, pair
-from archord.postprocess.decks.ties import Ties, reach
+from archord.postprocess.decks.ties import Ties
 from archord.solver.contact.laws.coulomb import Coulomb
 from archord.solver.contact.laws.named import Frictionless, Tied, contact_law
 from archord.solver.problem import Interaction, Problem, Rigid
@@ -57,9 +57,7 @@ def _contact_lines(model: DeckModel, interaction: Interaction, ties: Ties) -> li
     law = contact_law(interaction.law, interaction.friction)
     name = label(interaction.name)
     if isinstance(law, Tied):
-        if model.mesh.x.shape[1] == 2:
-            return ties.lines(interaction)
-        return [f"*TIE, NAME={name}, ADJUST=NO{reach(model, interaction)}", pair(interaction)]
+        return ties.lines(interaction)
     if not isinstance(law, Frictionless | Coulomb):
         raise ValueError(
             f"the law of {interaction.name!r} cannot be exported; contact with and without "

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.decks.mesh import DeckMesh, DeckSurface, surface_name
+from archord.postprocess.decks.mesh import DeckMesh, DeckSurface, label, surface_name
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import number
@@ -39,12 +39,23 @@ class Ties:
         self.dependent: dict[tuple[int, int], Ints] = {}
 
     def lines(self, interaction: Interaction) -> list[str]:
-        """The equations of a tied ``interaction``. What is held or moved already is not tied."""
+        """The lines of a tied ``interaction``. What is held or moved already is not tied, so that
+        the surface is tied to the other one that has less of it."""
         mesh = self._model.mesh
-        tied, opposite = sorted(
-            (mesh.surfaces[surface_name(interaction, side)] for side in (0, 1)),
-            key=lambda surface: (self._n_taken(surface), _mean_length(mesh, surface)),
+        names = sorted(
+            (surface_name(interaction, side) for side in (0, 1)),
+            key=lambda name: self._n_taken(mesh.surfaces[name]),
         )
+        if mesh.x.shape[1] == 2:
+            return self._equations([mesh.surfaces[name] for name in names])
+        tie = f"*TIE, NAME={label(interaction.name)}, ADJUST=NO{reach(self._model, interaction)}"
+        return [tie, ", ".join(f"{label(name)}_SURFACE" for name in names)]
+
+    def _equations(self, surfaces: list[DeckSurface]) -> list[str]:
+        """An equation for each free node and axis of the surface that is finer, if both have as
+        much that is held or moved, else the first of the ``surfaces``."""
+        mesh = self._model.mesh
+        tied, opposite = sorted(surfaces, key=lambda s: (self._n_taken(s), _mean_length(mesh, s)))
         nodes = np.unique(tied.nodes)
         edge, weights = closest_on_edges(mesh.x[nodes], mesh.x[opposite.nodes])
         lines = []
@@ -60,7 +71,8 @@ class Ties:
 
     def _n_taken(self, surface: DeckSurface) -> int:
         nodes = np.unique(surface.nodes)
-        return sum((int(node), axis) in self._taken for node in nodes for axis in (0, 1))
+        axes = range(self._model.mesh.x.shape[1])
+        return sum((int(node), axis) in self._taken for node in nodes for axis in axes)
 
     def _is_free(self, node: int, axis: int, others: Ints) -> bool:
         """Whether the node can be made to depend on ``others``, none of which depends on it."""

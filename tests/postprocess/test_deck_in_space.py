@@ -176,6 +176,25 @@ def test_a_tie_over_a_gap_is_told_how_far_it_reaches(gap, tmp_path):
     assert pytest.approx(system.drive_force("pull"), rel=3e-3) == found.P
 
 
+def test_a_body_that_moves_as_one_is_what_others_are_tied_to(tmp_path):
+    """Its nodes hang on the force already, and CalculiX leaves them loose as tied ones, with the
+    whole body."""
+    problem = blocks(
+        CellType.tetrahedron,
+        interactions=[Interaction("joint", ("upper", "lower"), law="tied")],
+        supports=[Support("base")],
+        loads=[Load("shear", on="upper", direction="x", force=50.0)],
+    )
+    system = System(problem)
+    assert "\nLOWER_SURFACE, UPPER_SURFACE\n" in deck(system, deck_mesh(system), [1.0])
+    if ccx is None:
+        pytest.skip("CalculiX is not installed (image target peers)")
+    system.solve([1.0], StepRules(minimum=1.0))
+    found = opinion(problem, tmp_path / "calculix")
+    own = system.equilibrium.displacement()[found.mesh.dofs]
+    np.testing.assert_allclose(found.displacement, own, atol=0.05 * np.abs(own).max())
+
+
 @needs_calculix
 def test_calculix_presses_the_quarter_of_a_joint_with_the_same_force(tmp_path):
     """On a coarse mesh of tetrahedra of 10 nodes, at two displacements."""
