@@ -223,6 +223,11 @@ def _columns_of_load(run: Run, of: str | None) -> list[str]:
     if of not in loads and (of or len(loads) > 1):
         raise InputError(f"{run.folder}: --of must name one of its loads: {', '.join(loads)}.")
     of = of or loads[0]
+    if next(load.kind for load in scene.load if load.name == of) == "pressure":
+        raise InputError(
+            f"{run.folder}: {of!r} is a pressure over a volume that it displaces; a table has "
+            "forces per length of a pin. history.csv has pressure over volume."
+        )
     names = [f"{of} displacement", f"{of} force"]
     if len(scene.interaction) == 1 and not scene.fits:
         names.append(f"{scene.interaction[0].name} largest pressure")

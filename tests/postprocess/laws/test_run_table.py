@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import archord
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
 from archord.postprocess.laws.exports.program import Program
@@ -267,6 +268,21 @@ after_a_fit[13] = after_a_fit[12]
 def test_what_makes_no_table_is_refused(run, of, said) -> None:
     with pytest.raises(InputError, match=said.replace("(", r"\(").replace(")", r"\)")):
         run_table(run, of)
+
+
+def test_a_pressure_is_no_force_per_length(tmp_path) -> None:
+    """Which exports would multiply by the length of a pin."""
+    problem = archord.Problem(
+        archord.rectangles({"low": (0, 0, 2, 1), "high": (0.5, 1, 1, 1)}, size=0.5),
+        [archord.Body(name, archord.Elastic(1e3, 0.3)) for name in ("low", "high")],
+        [archord.Interaction("contact", ("high bottom", "low top"))],
+        supports=[archord.Support("low bottom"), archord.Support("high left", fixed="x")],
+        loads=[archord.Load("press", on="high top", pressure=1.0)],
+        steps=6,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    with pytest.raises(InputError, match="'press' is a pressure over a volume"):
+        run_table(run)
 
 
 def test_runs_of_steel_that_hardens_become_laws(tmp_path, capsys, refused) -> None:
