@@ -32,8 +32,8 @@ def _chained(edges: np.ndarray, name: str) -> np.ndarray:
     """The ``edges`` ``(k, 3)`` in the order of one curve, each turned along it. Raises
     `InputError`."""
     vertices, count = np.unique(edges[:, [0, 2]], return_counts=True)
-    ends = vertices[count == 1]
-    at = int(ends[0]) if len(ends) else int(vertices.min(initial=0))
+    starts = [*vertices[count == 1], *vertices]  # a closed curve has no end
+    at = int(starts[0]) if starts else 0
     left = [(int(start), middle, int(end)) for start, middle, end in edges]
     chain = []
     while following := [edge for edge in left if at in (edge[0], edge[2])]:

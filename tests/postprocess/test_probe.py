@@ -432,3 +432,23 @@ def test_no_plastic_strain_below_none_between_nodes_in_space(tmp_path):
     line = (0.0, 0.95, 0.5, 4.0, 0.95, 0.5)
     for quantity in ("peeq", "von_mises"):
         assert run.probe(line=line, quantity=quantity).values.min() >= 0
+
+
+def test_a_closed_edge_in_space_runs_round_once(tmp_path):
+    """Around the top of a box, wherever its nodes are in the mesh."""
+    mesh = archord.boxes({"block": (0, 0, 0, 2, 1, 1)}, size=0.5)
+    walls = [mesh.facet_sets[f"block {side}"] for side in ("left", "right", "back", "front")]
+    around = {"around": tuple(tag for tags in walls for tag in tags)}
+    block = archord.Problem(
+        replace(mesh, facet_sets={**mesh.facet_sets, **around}),
+        bodies=[archord.Body("block", archord.Elastic(1000.0, 0.0))],
+        supports=[archord.Support("block bottom")],
+        loads=[archord.Load("press", on="block top", direction="y", displacement=-0.01)],
+        steps=1,
+    )
+    run = archord.solve(block, tmp_path / "run")
+    edge = run.probe("around & block top", "uy")
+    np.testing.assert_allclose(edge.x[:, 1], 1.0)
+    np.testing.assert_allclose(edge.values, -0.01)
+    assert edge.s[-1] == pytest.approx(6.0, rel=1e-9)
+    assert len(np.unique(edge.x.round(6), axis=0)) == 24  # of 12 facets
