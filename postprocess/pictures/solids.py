@@ -107,13 +107,15 @@ def field_panel(
     shown = np.where(skin.values == 0, np.nan, skin.values) if map_name == OF_PEEQ else skin.values
     normal = _normals(skin.corners)
     view = _best_view(normal, np.abs(np.nan_to_num(shown)), cut)
-    order = np.argsort(skin.corners.mean(axis=1) @ view.towards)
+    # Faces that look away are hidden, but their triangles can be nearer than those before them.
+    facing = np.flatnonzero(normal @ view.towards > 0)
+    order = facing[np.argsort(skin.corners[facing].mean(axis=1) @ view.towards)]
     known = shown[np.isfinite(shown)]
     colours = colours_for(known, map_name)
     painted = _painted(colours, shown[order], normal[order], view)
     polygons = view.flat(skin.corners[order])
     axes.add_collection(
-        PolyCollection(polygons, facecolors=painted, edgecolors=painted, linewidths=0.2)
+        PolyCollection(polygons, facecolors=painted, edgecolors=painted, linewidths=0.5)
     )
     axes.autoscale_view()
     axes.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
@@ -191,7 +193,7 @@ def _draw_axes(axes: Any, view: View) -> None:
 def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     """Mean contact pressure of the facets of the last surface that is a cylinder, over the angle
     and the place along its axis, at the first of ``steps`` (see `shown_step`); of other surfaces
-    the facets as they lie in the plane that shows most of them."""
+    the facets as they lie in the plane that shows most of them. A tie has tension, too."""
     from matplotlib.collections import PolyCollection
 
     step = steps[0] if steps else shown_step(run)
@@ -199,10 +201,13 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     name, places, words = _unrolled(surfaces)
     profile = surfaces[name]
     pressure = profile.facet_pressure
-    pressed = pressure > _PRESSED * pressure.max(initial=0.0)
+    is_tied = any(name in part.surfaces and part.law == "tied" for part in run.scene.interaction)
+    carried = np.abs(pressure) if is_tied else pressure
+    pressed = carried > _PRESSED * carried.max(initial=0.0)
     colours = colours_for(pressure, "viridis")
     drawn = PolyCollection(places, array=np.where(pressed, pressure, np.nan), cmap=colours.map)
-    drawn.set(clim=(0.0, colours.high), edgecolor="face", linewidth=0.2)
+    low = colours.low if is_tied else 0.0
+    drawn.set(clim=(low, colours.high), edgecolor="face", linewidth=0.2)
     axes.add_collection(drawn)
     axes.autoscale_view()
     length = run.scene.units.length

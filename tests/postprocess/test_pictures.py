@@ -8,9 +8,11 @@ from dataclasses import replace
 import matplotlib.image
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import archord
 from archord.cli import run as command
+from archord.postprocess.pictures import solids
 from archord.postprocess.pictures.abscissa import abscissa
 from archord.postprocess.pictures.problems import contact_panel, draw_field, shown_step
 from archord.postprocess.probes.probe import Probe
@@ -20,6 +22,7 @@ from archord.report.figure import new_figure
 from tests.output.run_files import rewrite_report
 from tests.output.test_user_file import full_disk
 from tests.postprocess.test_probe import solved
+from tests.solver.contact.blocks_in_space import bodies, tagged
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +137,34 @@ def test_a_tie_in_tension_is_drawn(tmp_path):
     drawn = np.concatenate([line.get_ydata() for line in axes.lines])
     assert drawn.max() < 0
     assert axes.get_ylim()[0] < drawn.min()
+
+
+def test_a_tie_in_tension_and_the_near_faces_are_drawn_in_space(tmp_path):
+    """A column of uniform stress: its tie is in tension; faces that look away are hidden, and
+    are not drawn over those before them."""
+    E = 1e3
+    mesh = tagged(bodies(MPI.COMM_SELF))
+    problem = archord.Problem(
+        mesh,
+        [archord.Body(name, archord.Elastic(E, 0.0)) for name in ("lower", "upper")],
+        [archord.Interaction("tie", ("upper", "lower"), law="tied")],
+        supports=[archord.Support("base")],
+        loads=[archord.Load("pull", on="lid", direction="z", displacement=0.02)],
+        steps=1,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    axes = new_figure(5.0, 4.0).subplots()
+    solids.contact_panel(axes, run)
+    (drawn,) = axes.collections
+    np.testing.assert_allclose(drawn.get_array(), -0.02 / 2 * E, rtol=1e-6)
+    assert drawn.get_clim() == pytest.approx((-0.02 / 2 * E, 0.0))
+
+    axes = new_figure(5.0, 4.0).subplots()
+    solids.field_panel(axes, run)
+    (drawn,) = axes.collections
+    x, y = np.moveaxis(np.array([path.vertices[:3] for path in drawn.get_paths()]), -1, 0)
+    twice = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    assert twice.min() > 0
 
 
 def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, capsys):
