@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import tomli_w
 from pydantic import (
+    BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -48,6 +49,7 @@ MOST_CASES = 100_000
 # what the base scene of a sweep holds where it says nothing: P differs by 1e-7 at most
 DEFAULTS = {"analysis.tolerance": 1e-6, "output.contact": False, "output.checkpoint": False}
 _MOST_SENTENCES = 20
+_TABLES = ("hardening", "parameters", "core")  # keys whose values are tables
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
 _SOLVED_ALIKE_SINCE = (
     "0.1.0"  # the version from which on scenes have the same solution, and sweeps go on
@@ -59,12 +61,13 @@ Factor = tuple[
 
 def flattened(table: Any, prefix: str = "") -> Any:
     """``table`` by dotted keys: ``{"joint": {"radius": 1}}`` and ``{"joint.radius": 1}`` mean the
-    same."""
+    same. A table that is the value of a key stays whole."""
     if not isinstance(table, dict):
         return table
     out: Overrides = {}
     for name, value in table.items():
-        if isinstance(value, dict) and not {"from", "to"} & value.keys():
+        is_value = name.rpartition(".")[2] in _TABLES
+        if isinstance(value, dict) and not is_value and not {"from", "to"} & value.keys():
             out |= flattened(value, f"{prefix}{name}.")
         else:
             out[f"{prefix}{name}"] = value
@@ -220,7 +223,8 @@ class Case:
 
     def value(self, key: str) -> Any:
         """What the case's scene says for the dotted ``key``; None if nothing."""
-        return self.scene.value(key, self.overrides.get(key))
+        found = self.scene.value(key, self.overrides.get(key))
+        return found.model_dump(exclude_none=True) if isinstance(found, BaseModel) else found
 
 
 @dataclass(frozen=True)

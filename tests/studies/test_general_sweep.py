@@ -1,5 +1,7 @@
 """Sweeps of general scenes and of presets: cases, names, tables, pictures."""
 
+from pathlib import Path
+
 import pytest
 
 import archord
@@ -72,6 +74,29 @@ def test_a_material_leaves_what_else_a_sweep_varies(tmp_path, keys):
     plates = [case.scene.solids["lug"] for case in cases]
     assert {plate.yield_stress for plate in plates} == {300.0, 400.0}
     assert len({case.run for case in cases}) == len(cases) == 8
+
+
+def test_a_hardening_law_is_a_value(tmp_path):
+    """Alone, and among the keys of a body."""
+    law = "{ saturation = 300.0, rate = 10.0 }"
+    steel = "E = 210000.0, nu = 0.3, yield_stress = 200.0"
+    grids = (
+        f"plate.yield_stress = [200.0]\nplate.hardening = [0.0, {law}]\n",
+        f"plate = [{{ {steel} }}, {{ {steel}, hardening = {law} }}]\n",
+    )
+    for grid in grids:
+        file = tmp_path / "laws.sweep.toml"
+        file.write_text(LUG.replace("[grid]\n", f"[grid]\n{grid}"))
+        cases = read_sweep(file).cases
+        assert len({case.run for case in cases}) == len(cases) == 8
+        hardened = [case for case in cases if case.scene.solids["lug"].hardening != 0]
+        assert len(hardened) == 4
+        assert hardened[0].value("plate.hardening") == {"saturation": 300.0, "rate": 10.0}
+    joint = tmp_path / "joint.sweep.toml"
+    steel_pin = Path("scenes/steel_pin.toml").resolve()
+    joint.write_text(f'base = "{steel_pin}"\n[grid]\npin.hardening = [{law}]\n')
+    (case,) = read_sweep(joint).cases
+    assert case.value("pin.hardening") == {"saturation": 300.0, "rate": 10.0}
 
 
 def test_keys_of_named_parts_vary(tmp_path):
