@@ -36,12 +36,6 @@ class Totals:
         forces = self.equilibrium.diagnostics.reaction(name)
         return self.problem.whole * self.comm.allreduce(forces.sum(axis=0))
 
-    def reaction_moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of these forces about z at ``point``, anticlockwise, on the whole; 0 around an
-        axis."""
-        moments = self.reaction_moments(name, point)
-        return float(moments[-1]) if len(moments) else 0.0
-
     def reaction_moments(self, name: str, point: Sequence[float]) -> Array:
         """Moments ``(t,)`` of these forces at ``point``: about z in a plane, about x, y and z in
         space, none around an axis. At large strain forces act where their nodes are now."""
@@ -58,12 +52,6 @@ class Totals:
     def contact_force(self, name: str = "") -> Array:
         """Force ``(d,)`` of the interaction ``name``, the first without, on its second surface."""
         return self.problem.whole * self.contact.resultant(name)
-
-    def contact_moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of that force about z at ``point``, anticlockwise, on the deformed whole; 0 around
-        an axis."""
-        moments = self.contact_moments(name, point)
-        return float(moments[-1]) if len(moments) else 0.0
 
     def contact_moments(self, name: str, point: Sequence[float]) -> Array:
         """Moments ``(t,)`` of that force at ``point``, on the deformed whole: about z in a plane,

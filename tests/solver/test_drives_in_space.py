@@ -54,7 +54,6 @@ def test_moments_on_a_side_balance_the_reactions(comm):
     system = coupled(comm, moments, "force", WALL)
     for point in ((0.0, 0.0, 0.0), (7.0, -3.0, 2.0)):
         np.testing.assert_allclose(system.reaction_moments("wall", point), -moments, atol=1e-9)
-        assert system.reaction_moment("wall", point) == pytest.approx(-3.0)
     np.testing.assert_allclose(system.reaction("wall"), 0, atol=1e-9)
     displacements, forces = system.driven()
     assert displacements @ forces / 2 == pytest.approx(system.energies()[0])
