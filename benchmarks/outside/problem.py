@@ -88,12 +88,9 @@ def stage_ends(run: Run, column: str) -> list[float]:
     return history.loc[history["load_factor"] % 1 == 0, column].to_list()
 
 
-def displacement_at(
-    run: Run, body: str, place: tuple[float, float], axis: int, step: int | None = None
-) -> float:
-    """The component of displacement at the node of the ``body`` that lies at the ``place``, at a
-    ``step`` (the last)."""
-    return float(run.fields(step).displacement[_node(run, body, place), axis])
+def displacement_at(run: Run, body: str, place: tuple[float, float], axis: int) -> float:
+    """The component of displacement at the node of the ``body`` that lies at the ``place``."""
+    return float(run.fields().displacement[_node(run, body, place), axis])
 
 
 def stress_at(run: Run, body: str, place: tuple[float, float], axis: int) -> float:

@@ -232,9 +232,7 @@ class YieldModel:
         return found._replace(travel=1 + found.travel)
 
 
-def loss(
-    numbers: Sequence[float], yielding: Yielding, x: Array, model: ElasticModel | None = None
-) -> Loss:
+def loss(numbers: Sequence[float], yielding: Yielding, x: Array) -> Loss:
     """What yielding does at ``x`` ``(k,)`` to a joint with these ``numbers`` (see `SolvedJoints`),
     but for its ``yielding``, with the processes that come with archord. The weaker body at each x
     tells of it; where bodies are nearly alike, the two processes are mixed, so that P does not jump
@@ -253,7 +251,7 @@ def loss(
         asked = share > 0
         if asked.any():
             models = {name: yield_model(name) for name in needed(side)}
-            told = total_loss(models, model or elastic_model(), joint, yielding, x, asked)
+            told = total_loss(models, elastic_model(), joint, yielding, x, asked)
             found = [total + share * own for total, own in zip(found, told, strict=True)]
     return Loss(*found)
 
