@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from archord.geometry.vectors import crossed
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arrays.fields import Fields
@@ -108,13 +109,13 @@ def _in_triangles(corners: Array, x: Array) -> tuple[np.ndarray, Array]:
     first, second, third = corners.swapaxes(0, 1)
     one = second - first
     other = third - first
-    twice_area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    twice_area = crossed(one, other)
     triangle = np.full(len(x), -1)
     weights = np.zeros((len(x), 3))
     for k, point in enumerate(x):
         to = point - first
-        by_second = (to[:, 0] * other[:, 1] - to[:, 1] * other[:, 0]) / twice_area
-        by_third = (one[:, 0] * to[:, 1] - one[:, 1] * to[:, 0]) / twice_area
+        by_second = crossed(to, other) / twice_area
+        by_third = crossed(one, to) / twice_area
         of_corners = np.stack([1 - by_second - by_third, by_second, by_third], axis=1)
         least = of_corners.min(axis=1)
         best = int(least.argmax())
