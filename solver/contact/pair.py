@@ -53,6 +53,7 @@ class Pair:
     by_trial, by_opening : (m, d, d) derivatives of the traction; the second is None without
     branch : (m,) branch of the law
     active : (m,) whether points carry anything
+    n_passing : number of points that have lost or found a partner in it
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class Pair:
         self.branch: Branches = np.full(len(x), OPEN)
         self.active: np.ndarray = np.zeros(len(x), dtype=bool)
         self.changes = 0  # points on another branch than in the evaluation before
+        self.n_passing = 0
         self._origin = SlipOrigin(np.zeros_like(x), at_rest, self.active)
 
     def use_gamma(self, factor: float) -> None:
@@ -160,12 +162,15 @@ class Pair:
         x = _flat(self.surface.point) + displacement
         curve = self.opposite.curve
         last = self.projection.facet
+        had_partner = self.projection.found
         if self.start == "held":
             self.projection = curve.continued(x, self._outward, motion, last)
+            self.projection.found[:] = had_partner
         else:
             near = None if self.start == "anywhere" else last
             self.projection = curve.closest_point(x, self._outward, motion, near)
             self.start = "near"
+        self.n_passing = int((self.projection.found != had_partner).sum())
         self.separation = x - self.projection.point
 
     def _opening(self) -> Array:

@@ -169,7 +169,8 @@ class Recovery:
         """Solve from ``guess``; where that circles, hold points on their facets.
 
         Where the residual circles though hardly any point opens or closes, points jump between two
-        facets that meet at an angle. Each facet is continued beyond its ends then.
+        facets that meet at an angle, or lose the end of a surface and find it again. Each facet is
+        continued beyond its ends then, and points keep the partner that they have, if any.
         """
         result = self._solve_carried(guess, line_search=line_search, goal=goal)
         pairs = self.equilibrium.contact.pairs
@@ -183,9 +184,13 @@ class Recovery:
         return result.converged
 
     def _circles(self, result: Newton) -> bool:
-        """Whether the active set stood still in the last iterations, but for a few points."""
+        """Whether the active set stood still in the last iterations, but for a few points, or for
+        as many as have just passed the end of a surface."""
+        at = self.equilibrium
+        n_passing = at.comm.allreduce(sum(pair.n_passing for pair in at.contact.pairs))
+        few = max(self.newton.few, n_passing)
         changes = result.active_set_changes
-        return len(changes) > CIRCLING and max(changes[-CIRCLING:]) <= self.newton.few
+        return len(changes) > CIRCLING and max(changes[-CIRCLING:]) <= few
 
     def _solve_carried(self, guess: Array | None, *, line_search: bool, goal: float) -> Newton:
         """Solve from ``guess``. What is found does not count if springs carry what pushes a body:

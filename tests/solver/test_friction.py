@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
@@ -312,3 +313,22 @@ def test_the_joint_of_the_paper_with_friction():
     arcs = arc_profiles(scene.joint, joint)
     pin, hole = (float((arc.weight * arc.shear).sum()) for arc in (arcs["pin"], arcs["hole"]))
     assert pin == pytest.approx(-hole, rel=0.02)
+
+
+def test_a_point_below_the_corner_of_a_block_may_come_and_go(comm, tmp_path):
+    """The corner moves out over a point of the lower block, and the force of this point moves it
+    back."""
+    boxes = {"lower": (0, 0, 2, 1), "upper": (0.3, 1, 1, 1)}
+    mesh = archord.rectangles(boxes, size=0.3, comm=comm)
+    problem = archord.Problem(
+        mesh,
+        bodies=[archord.Body(name, archord.Elastic(1000.0, 0.3)) for name in ("lower", "upper")],
+        interactions=[archord.Interaction("joint", ("lower top", "upper bottom"), friction=0.3)],
+        supports=[archord.Support("lower bottom"), archord.Support("guide", "upper top", "x")],
+        loads=[archord.Load("press", "upper top", "y", displacement=-0.02)],
+        steps=3,
+    )
+    run = archord.solve(problem, comm.bcast(tmp_path) / "run", comm=comm)
+    assert sum(run.columns["iterations"]) < 30
+    assert not any(run.columns["cutbacks"])
+    comm.barrier()
