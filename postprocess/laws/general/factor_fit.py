@@ -33,7 +33,6 @@ from archord.postprocess.laws.general.factor_model import (
 from archord.postprocess.laws.general.general_law import NODES, joint_numbers
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
-from archord.postprocess.run import Run
 from archord.report.table import Table
 
 _RANGE = (0.05, 3.05)  # x of the data
@@ -104,8 +103,7 @@ class Changed:
 
 def changed_in(folder: Path) -> list[Changed]:
     """The pairs of runs of the sweep in ``folder``."""
-    runs = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
-    solved = solved_joints(Run(run).curve for run in runs)
+    solved = solved_joints(folder)
     pairs = []
     for joint, (run, *_) in solved.items():
         bare = replace(joint, friction=0.0, large_strain=False)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -147,10 +147,13 @@ class NodeRun:
         return rest[: int(rises[0]) + 1] if len(rises) else rest
 
 
-def solved_joints(curves: Iterable[RunCurve]) -> dict[LawJoint, list[NodeRun]]:
-    """The runs that are complete by their joints."""
+def solved_joints(folder: Path) -> dict[LawJoint, list[NodeRun]]:
+    """The complete runs of the sweep in ``folder``, by their joints."""
     found = defaultdict(list)
-    for curve in curves:
+    for run in sorted((folder / "cases").iterdir()):
+        if not (run / "run.json").exists():
+            continue
+        curve = Run(run).curve
         if len(curve.delta) < sum(curve.scene.load.stage_steps):
             continue
         found[LawJoint.from_scene(curve.scene)].append(NodeRun.of(curve))
@@ -159,11 +162,11 @@ def solved_joints(curves: Iterable[RunCurve]) -> dict[LawJoint, list[NodeRun]]:
 
 def by_joint(folder: Path) -> dict[LawJoint, list[NodeRun]]:
     """The joints that are solved as far as the law needs them, of the sweep in ``folder``."""
-    runs = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
-    solved = solved_joints(Run(run).curve for run in runs)
-    return {
-        joint: nodes for joint, nodes in solved.items() if complete(joint_numbers(joint), nodes)
-    }
+    found = {}
+    for joint, nodes in solved_joints(folder).items():
+        if complete(joint_numbers(joint), nodes):
+            found[joint] = nodes
+    return found
 
 
 def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
