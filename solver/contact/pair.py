@@ -53,7 +53,7 @@ class Pair:
     by_trial, by_opening : (m, d, d) derivatives of the traction; the second is None without
     branch : (m,) branch of the law
     active : (m,) whether points carry anything
-    n_passing : number of points that have lost or found a partner in it
+    n_passing : number of points that lost or found a partner, as they pass the end of a surface
     """
 
     def __init__(
@@ -165,7 +165,7 @@ class Pair:
         had_partner = self.projection.found
         if self.start == "held":
             self.projection = curve.continued(x, self._outward, motion, last)
-            self.projection.found[:] = had_partner
+            self.projection.found[:] &= had_partner
         else:
             near = None if self.start == "anywhere" else last
             self.projection = curve.closest_point(x, self._outward, motion, near)

@@ -170,7 +170,7 @@ class Recovery:
 
         Where the residual circles though hardly any point opens or closes, points jump between two
         facets that meet at an angle, or lose the end of a surface and find it again. Each facet is
-        continued beyond its ends then, and points keep the partner that they have, if any.
+        continued beyond its ends then, and points without a partner get none.
         """
         result = self._solve_carried(guess, line_search=line_search, goal=goal)
         pairs = self.equilibrium.contact.pairs
