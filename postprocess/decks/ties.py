@@ -40,22 +40,24 @@ class Ties:
 
     def lines(self, interaction: Interaction) -> list[str]:
         """The lines of a tied ``interaction``. What is held or moved already is not tied, so that
-        the surface is tied to the other one that has less of it."""
+        the surface is tied to the other one that has less of it; in a plane the finer one, if both
+        have as much."""
         mesh = self._model.mesh
-        names = sorted(
-            (surface_name(interaction, side) for side in (0, 1)),
-            key=lambda name: self._n_taken(mesh.surfaces[name]),
-        )
-        if mesh.x.shape[1] == 2:
-            return self._equations([mesh.surfaces[name] for name in names])
+        in_plane = mesh.x.shape[1] == 2
+
+        def order(name: str) -> tuple[int, float]:
+            surface = mesh.surfaces[name]
+            return self._n_taken(surface), _mean_length(mesh, surface) if in_plane else 0.0
+
+        names = sorted((surface_name(interaction, side) for side in (0, 1)), key=order)
+        if in_plane:
+            return self._equations(*(mesh.surfaces[name] for name in names))
         tie = f"*TIE, NAME={label(interaction.name)}, ADJUST=NO{reach(self._model, interaction)}"
         return [tie, ", ".join(f"{label(name)}_SURFACE" for name in names)]
 
-    def _equations(self, surfaces: list[DeckSurface]) -> list[str]:
-        """An equation for each free node and axis of the surface that is finer, if both have as
-        much that is held or moved, else the first of the ``surfaces``."""
+    def _equations(self, tied: DeckSurface, opposite: DeckSurface) -> list[str]:
+        """An equation for each free node and axis of the surface that is ``tied``."""
         mesh = self._model.mesh
-        tied, opposite = sorted(surfaces, key=lambda s: (self._n_taken(s), _mean_length(mesh, s)))
         nodes = np.unique(tied.nodes)
         edge, weights = closest_on_edges(mesh.x[nodes], mesh.x[opposite.nodes])
         lines = []
