@@ -42,13 +42,11 @@ class Elastic(NamedTuple):
 
 
 class ElasticState(NamedTuple):
-    """Of a joint at ``x`` ``(k,)``, or of joints ``(m, k)``: y and dy/dx, F and dF/dx, p0 R/(E* dR)
-    and eps [rad]."""
+    """Of a joint at ``x`` ``(k,)``, or of joints ``(m, k)``: y and dy/dx, p0 R/(E* dR) and eps
+    [rad]."""
 
     y: Array
     slope: Array
-    F: Array
-    F_slope: Array
     peak: Array
     angle: Array
 
@@ -113,7 +111,7 @@ class ElasticModel:
         root = np.sqrt(y)
         peak = self.peak.value(joints, t) * root
         angle = self.angle.value(joints, t) * root
-        return ElasticState(y, slope, F, F_slope, peak, angle)
+        return ElasticState(y, slope, peak, angle)
 
     def pressure(self, joints: Elastic, x: Array) -> Array:
         """p0 R/(E* dR) alone, of ``joints`` at ``x > 0`` ``(k,)``."""

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.postprocess.laws.general.elastic_model import Elastic, ElasticState, elastic_model
+from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.factor_model import (
     FRICTION,
     LARGE_STRAIN,
@@ -22,7 +22,7 @@ from archord.postprocess.laws.general.factor_model import (
 )
 from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
 from archord.postprocess.laws.general.joint import Array, LawJoint
-from archord.postprocess.laws.general.joint_curve import JointCurve, bent
+from archord.postprocess.laws.general.joint_curve import JointCurve, bent, line_contact_level
 from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
     ELASTIC_BELOW,
@@ -147,8 +147,11 @@ def law_of_numbers(
     kinds = [FRICTION] * bool(friction) + [LARGE_STRAIN] * large_strain
     if not kinds:
         return reduce_joint(joint, lost)
-    plain = _plain(bool(strain), friction, joint, lost)
-    return reduce_joint(joint, lost, Gain.together([gain(plain, kind) for kind in kinds]))
+    added, of_elastic = (
+        Gain.together([gain(plain, kind) for kind in kinds])
+        for plain in (_plain(bool(strain), friction, joint, own) for own in (lost, None))
+    )
+    return reduce_joint(joint, lost, added, of_elastic)
 
 
 def _lost(numbers: Sequence[float], stresses: Array, given: Flows) -> Loss:
@@ -255,25 +258,33 @@ def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
     return tuple(numbers)
 
 
-def reduce_joint(joint: Elastic, lost: Loss | None = None, added: Gain | None = None) -> JointCurve:
+def reduce_joint(
+    joint: Elastic,
+    lost: Loss | None = None,
+    added: Gain | None = None,
+    of_elastic: Gain | None = None,
+) -> JointCurve:
     """The law of ``joint`` in units of dR, E* dR and E* dR/R, with what is ``lost`` to yielding
-    (None: elastic) and what friction and large strain have ``added`` (None: neither) at the nodes
-    above zero."""
+    (None: elastic) and what friction and large strain have ``added``, and add ``of_elastic``
+    bodies, whose curve ways back follow (None: neither), at the nodes above zero."""
     x = NODES[1:]
     base = elastic_model().at(joint, x)
-    y = base.y
-    dy = base.slope
+    back = base.y
+    dback = base.slope
+    if of_elastic is not None:
+        back, dback = _raised(x, back, dback, of_elastic)
+    y = back
+    dy = dback
     peak = base.peak
     angle = base.angle
     error = np.full_like(y, ELASTIC_ERROR)
     ratio = np.ones_like(y)
-    travel = x
     toe = np.zeros_like(y)
     back_error: Array = np.zeros(len(NODES))
     if lost is None:
         error[x >= _SMALL] = np.interp(joint.p * joint.m, _CORNER, _CORNER_ERRORS)
     else:
-        y = y * np.exp(lost.force)
+        y = base.y * np.exp(lost.force)
         dy = (base.slope / base.y + lost.slope) * y
         y, dy = _rising(x, y, dy)
         peak = peak * np.exp(lost.peak)
@@ -284,15 +295,14 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None, added: Gain | None = 
         travel = x - np.maximum.accumulate(x - travel)
         toe = np.clip(lost.toe * unit, 0.0, x - travel)
         back_error = _from(0.0, np.hypot(error, lost.way_error))
+        if added is not None:
+            y, dy = _raised(x, y, dy, added)
+        ratio = _ratio(x, back, dback, y, travel)
     if added is not None:
-        dy = (dy / y + spline_slopes(np.log(x), added.force) / x) * y * np.exp(added.force)
-        y, dy = _rising(x, y * np.exp(added.force), dy)
         peak = peak * np.exp(added.peak)
         angle = angle * np.exp(added.angle)
         error = np.hypot(error, added.deviation)
         back_error = np.hypot(back_error, _from(0.0, added.way_error))
-    if lost is not None or added is not None:
-        ratio = _ratio(x, base.y, base.slope, y, travel)
     root = np.sqrt(y)
     ratio = _from(1.0, ratio)
     peak = _from(peak[0] / root[0], peak / root)
@@ -302,12 +312,12 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None, added: Gain | None = 
         x=NODES,
         y=_from(0.0, y),
         dy=_from(0.0, dy),
-        back=_from(0.0, base.y),
-        dback=_from(0.0, base.slope),
+        back=_from(0.0, back),
+        dback=_from(0.0, dback),
         ratio=ratio,
         dratio=monotone_slopes(NODES, ratio),
         toe=_from(0.0, toe),
-        touch=_touch(joint, base),
+        touch=_touch(joint, back[0], dback[0]),
         peak=peak,
         dpeak=monotone_slopes(NODES, peak),
         angle=angle,
@@ -317,13 +327,20 @@ def reduce_joint(joint: Elastic, lost: Loss | None = None, added: Gain | None = 
     )
 
 
-def _touch(joint: Elastic, base: ElasticState) -> Array:
+def _raised(x: Array, y: Array, dy: Array, added: Gain) -> tuple[Array, Array]:
+    """``y`` and ``dy`` ``(n,)`` at ``x`` with what friction and large strain have ``added``."""
+    slope = spline_slopes(np.log(x), added.force) / x
+    raised = y * np.exp(added.force)
+    return _rising(x, raised, (dy / y + slope) * raised)
+
+
+def _touch(joint: Elastic, y: float, dy: float) -> Array:
     """a, b, c of the logarithmic law up to the first node: F at first touch, and F and its slope
-    there."""
+    at the node, where the force is ``y`` and its slope ``dy``."""
     (F0,), _ = elastic_model().F.at(joint, np.zeros(1))
     x = NODES[1]
-    rise = base.F[0] - F0
-    end = base.F_slope[0]
+    F, end = line_contact_level(x, y, dy)
+    rise = F - F0
     return np.array([F0, 2 * rise / x - end, end / x - rise / x**2])
 
 

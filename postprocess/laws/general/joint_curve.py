@@ -132,9 +132,10 @@ class JointCurve:
 
     @property
     def yields(self) -> bool:
-        """Whether the way back is another than first loading."""
+        """Whether the way back is another than first loading, or is known less well."""
         same = np.array_equal(self.y, self.back) and np.array_equal(self.dy, self.dback)
-        return not (same and (self.ratio == 1).all() and (self.dratio == 0).all())
+        known = not self.back_error.any() or np.array_equal(self.back_error, self.error)
+        return not (same and known and (self.ratio == 1).all() and (self.dratio == 0).all())
 
     @property
     def limit(self) -> float:
@@ -331,6 +332,14 @@ def line_contact(x: Array, F: Array, slope: Array) -> tuple[Array, Array]:
         miss = np.pi * x * t - np.log1p(t) - F
         t = t - miss / (np.pi * x - 1 / (1 + t))
     return 1 / t, (np.pi - slope / t) / (np.pi * x * t - t / (1 + t))
+
+
+def line_contact_level(x: float, y: float, dy: float) -> tuple[float, float]:
+    """F(x) and its slope where the logarithmic law is ``y`` with the slope ``dy``, at ``x > 0``:
+    what `line_contact` undoes."""
+    level = np.pi * x / y - np.log1p(1 / y)
+    slope = np.pi / y + dy / y * (1 / (1 + y) - np.pi * x / y)
+    return float(level), float(slope)
 
 
 def bent(a: Array, travel: Array, toe: Array) -> tuple[Array, Array]:

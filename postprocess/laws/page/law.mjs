@@ -176,7 +176,7 @@ function chebyshevSlope(c) {
     return slope;
 }
 
-/** The elastic joint: y, dy/dx, F, dF/dx, p0 R/(E* dR) and eps [rad] at x. */
+/** The elastic joint: y, dy/dx, p0 R/(E* dR) and eps [rad] at x. */
 function elasticJoint(tables, joint) {
     const [F, peak, angle] = ["F", "peak", "angle"].map((name) => seriesOf(tables[name], joint));
     const slope = chebyshevSlope(F);
@@ -188,7 +188,7 @@ function elasticJoint(tables, joint) {
         const rise = chebyshev(slope, t) * ((2 * (1 + FARTHEST)) / FARTHEST / (1 + x) ** 2);
         const [y, dy] = lineContact(x, level, rise);
         const root = Math.sqrt(y);
-        return { y, slope: dy, F: level, rise, peak: chebyshev(peak, t) * root, angle: chebyshev(angle, t) * root };
+        return { y, slope: dy, peak: chebyshev(peak, t) * root, angle: chebyshev(angle, t) * root };
     };
     return { ...joint, at, touch };
 }
@@ -706,30 +706,33 @@ export function generalLaw(data, joint) {
     else if (Math.min(stresses.pin, stresses.block) < Infinity) {
         lost = lossOf(data, numbers.strain, elastic, x.map(() => stresses), x);
     }
-    const tables = reduced(elastic, lost, addedBy(data, joint, { elastic, lost }, x));
+    const [added, ofElastic] = [lost, null].map((own) => addedBy(data, joint, { elastic, lost: own }, x));
+    const tables = reduced(elastic, lost, added, ofElastic);
     const force = joint.E_star * joint.clearance;
     const firstYield = joint.clearance * Math.min(begins(numbers.pin), begins(numbers.block));
     return new JointLaw({ ...tables, length: joint.clearance, force, pressure: numbers.unit, firstYield });
 }
 
 /** The tables of a joint in units of dR, E* dR and E* dR/R, with what is lost to yielding (null: elastic) and what
- * friction and large strain have added (null: neither). */
-function reduced(elastic, lost, added) {
+ * friction and large strain have added, and add to elastic bodies, whose curve ways back follow (null: neither). */
+function reduced(elastic, lost, added, ofElastic) {
     const x = NODES.slice(1);
     const base = x.map(elastic.at);
-    let y = base.map((state) => state.y);
-    let dy = base.map((state) => state.slope);
+    let back = base.map((state) => state.y);
+    let steep = base.map((state) => state.slope);
+    if (ofElastic) [back, steep] = raised(x, back, steep, ofElastic);
+    let y = back;
+    let dy = steep;
     let peak = base.map((state) => state.peak);
     let angle = base.map((state) => state.angle);
     const corner = straight(elastic.p * elastic.m, CORNER, CORNER_ERRORS);
     let error = x.map((place) => (lost || place < SMALL_X ? ELASTIC_ERROR : corner));
     let ratio = x.map(() => 1);
-    let travel = x;
     let toe = x.map(() => 0);
     let backError = x.map(() => 0);
     if (lost) {
-        y = y.map((own, i) => own * Math.exp(lost[i].force));
-        dy = dy.map((slope, i) => (slope / base[i].y + lost[i].slope) * y[i]);
+        y = base.map((state, i) => state.y * Math.exp(lost[i].force));
+        dy = base.map((state, i) => (state.slope / state.y + lost[i].slope) * y[i]);
         [y, dy] = rising(x, y, dy);
         peak = peak.map((own, i) => own * Math.exp(lost[i].peak));
         angle = angle.map((own, i) => own * Math.exp(lost[i].angle));
@@ -737,35 +740,31 @@ function reduced(elastic, lost, added) {
         const unit = x.map((place, i) => (place * y[i]) / base[i].y);
         const travels = x.map((place, i) => clip(lost[i].travel * unit[i], 1e-3 * place, place));
         const opens = accumulate(x.map((place, i) => place - travels[i]), maximum);
-        travel = x.map((place, i) => place - opens[i]);
+        const travel = x.map((place, i) => place - opens[i]);
         toe = x.map((place, i) => clip(lost[i].toe * unit[i], 0, place - travel[i]));
         backError = error.map((own, i) => Math.hypot(own, lost[i].wayError));
+        if (added) [y, dy] = raised(x, y, dy, added);
+        ratio = ratios(x, back, steep, y, travel);
     }
     if (added) {
-        const rises = splineSlopes(x.map(Math.log), added.map(({ force }) => force), false);
-        dy = dy.map((slope, i) => (slope / y[i] + rises[i] / x[i]) * y[i] * Math.exp(added[i].force));
-        y = y.map((own, i) => own * Math.exp(added[i].force));
-        [y, dy] = rising(x, y, dy);
         peak = peak.map((own, i) => own * Math.exp(added[i].peak));
         angle = angle.map((own, i) => own * Math.exp(added[i].angle));
         error = error.map((own, i) => Math.hypot(own, added[i].deviation));
         backError = backError.map((own, i) => Math.hypot(own, added[i].wayError));
     }
-    if (lost || added) ratio = ratios(x, base, y, travel);
     const roots = y.map(Math.sqrt);
     const peaks = peak.map((own, i) => own / roots[i]);
     const angles = angle.map((own, i) => Math.min(own, Math.PI / 2) / roots[i]);
     const first = { peak: peak[0] / roots[0], angle: angles[0] };
-    const rise = base[0].F - elastic.touch(0);
     const tables = {
         x: NODES,
         y: [0, ...y],
         dy: [0, ...dy],
-        back: [0, ...base.map((state) => state.y)],
-        dback: [0, ...base.map((state) => state.slope)],
+        back: [0, ...back],
+        dback: [0, ...steep],
         ratio: [1, ...ratio],
         toe: [0, ...toe],
-        touch: [elastic.touch(0), (2 * rise) / x[0] - base[0].rise, base[0].rise / x[0] - rise / x[0] ** 2],
+        touch: touchOf(elastic, x[0], back[0], steep[0]),
         peak: [first.peak, ...peaks],
         angle: [first.angle, ...angles],
         error: [error[0], ...error],
@@ -774,6 +773,21 @@ function reduced(elastic, lost, added) {
     };
     for (const name of ["ratio", "peak", "angle"]) tables[`d${name}`] = pchipSlopes(NODES, tables[name]);
     return tables;
+}
+
+/** y and dy with what friction and large strain have added. */
+function raised(x, y, dy, added) {
+    const rises = splineSlopes(x.map(Math.log), added.map(({ force }) => force), false);
+    const all = y.map((own, i) => own * Math.exp(added[i].force));
+    return rising(x, all, dy.map((slope, i) => (slope / y[i] + rises[i] / x[i]) * all[i]));
+}
+
+/** a, b, c of the logarithmic law up to the first node x, where it is y with the slope dy. */
+function touchOf(elastic, x, y, dy) {
+    const first = elastic.touch(0);
+    const rise = (Math.PI * x) / y - Math.log1p(1 / y) - first;
+    const end = Math.PI / y + (dy / y) * (1 / (1 + y) - (Math.PI * x) / y);
+    return [first, (2 * rise) / x - end, end / x - rise / x ** 2];
 }
 
 /** y and dy with as little changed as makes the cubics rise (Fritsch and Carlson 1980). */
@@ -787,16 +801,15 @@ function rising(x, y, dy) {
     return [rises, slopes];
 }
 
-/** The ratio r of ways back: with a = travel/r the elastic joint's base(a)/a is y/travel. */
-function ratios(x, base, y, travel) {
-    const end = base[base.length - 1];
-    const last = x[x.length - 1];
-    const secants = x.map((place, i) => base[i].y / place);
-    const off = end.slope * last - end.y;
+/** The ratio r of ways back: with a = travel/r the elastic joint's back(a)/a is y/travel. */
+function ratios(x, back, steep, y, travel) {
+    const end = x.length - 1;
+    const secants = x.map((place, i) => back[i] / place);
+    const off = steep[end] * x[end] - back[end];
     return y.map((largest, i) => {
         const secant = largest / travel[i];
-        const far = off / (end.slope - Math.min(secant, STEEPEST * end.slope));
-        return travel[i] / (secant > end.y / last ? far : straight(secant, secants, x));
+        const far = off / (steep[end] - Math.min(secant, STEEPEST * steep[end]));
+        return travel[i] / (secant > back[end] / x[end] ? far : straight(secant, secants, x));
     });
 }
 

@@ -18,7 +18,8 @@ JOINTS = 150
 
 
 def joints() -> Iterator[JointCurve]:
-    """Joints within the range of the general law of which a body yields."""
+    """Joints within the range of the general law that come back in another way than they went: a
+    body yields, or, in half of them each, contact has friction or strain is large."""
     rng = np.random.default_rng(3)
     while True:
         unit = 1e4
@@ -33,6 +34,8 @@ def joints() -> Iterator[JointCurve]:
             plane=str(rng.choice(["strain", "stress"])),
             nu=rng.uniform(0, 0.49),
             pin_nu=rng.uniform(0, 0.49),
+            friction=rng.choice([0.0, rng.uniform(0, 0.3)]),
+            large_strain=bool(rng.random() < 0.5),
         )
         try:
             law = general_law(joint)

@@ -38,12 +38,13 @@ def elastic() -> JointCurve:
     """The same joint without yielding."""
     curve = yielding()
     one = np.ones_like(curve.x)
-    return replace(curve, back=curve.y, dback=curve.dy, ratio=one, dratio=0 * one, toe=0 * one)
+    same = {"back": curve.y, "dback": curve.dy, "ratio": one, "dratio": 0 * one}
+    return replace(curve, **same, toe=0 * one, back_error=0 * one)
 
 
-def solved(plane: str) -> JointCurve:
-    """A joint of the general law, both of whose bodies yield."""
-    return general_law(LawJoint(RADIUS, 0.05, 115e3, 250.0, 250.0, plane=plane, nu=0.3))
+def solved(plane: str, stress: float | None = 250.0, **given: float | bool) -> JointCurve:
+    """A joint of the general law, both of whose bodies yield at this ``stress``."""
+    return general_law(LawJoint(RADIUS, 0.05, 115e3, stress, stress, plane=plane, nu=0.3, **given))
 
 
 LAWS = {
@@ -52,6 +53,9 @@ LAWS = {
     "without touch": lambda: replace(yielding(), touch=np.zeros(0)),
     "plane strain": lambda: solved("strain"),
     "plane stress": lambda: solved("stress"),
+    "elastic, friction": lambda: solved("stress", None, friction=0.3),
+    "elastic, large strain": lambda: solved("strain", None, large_strain=True),
+    "yields late, friction": lambda: solved("stress", 700.0, friction=0.3),
 }
 FITTED = FittedLaw(k=0.85, E_star=115e3, R=RADIUS, dR=0.05, k_error=0.0, c=1.0, sigY=300.0)
 
@@ -151,7 +155,7 @@ def test_a_straight_way_is_the_law(name: str) -> None:
         assert T == 0
 
 
-@pytest.mark.parametrize("name", ["yielding", "plane strain", "plane stress"])
+@pytest.mark.parametrize("name", sorted({*LAWS} - {"elastic", "without touch"}))
 def test_memory_only_loses_energy(name: str) -> None:
     """The energy given back from any displacement falls, or stays, as the deepest one grows."""
     curve = LAWS[name]()

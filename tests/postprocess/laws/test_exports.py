@@ -79,7 +79,8 @@ def curves() -> dict[str, JointCurve]:
     yielding = replace(yielding_curve(), length=0.05, force=7e3, pressure=210.0, about=about)
     one = np.ones_like(yielding.x)
     none = np.zeros_like(yielding.x)
-    elastic = replace(yielding, back=yielding.y, dback=yielding.dy, ratio=one, dratio=none)
+    same = {"back": yielding.y, "dback": yielding.dy, "ratio": one, "dratio": none}
+    elastic = replace(yielding, **same, back_error=none)
     return {
         "yielding": yielding,
         "elastic": elastic,

@@ -161,6 +161,35 @@ def test_large_strain_changes_little(pin: LawJoint) -> None:
     np.testing.assert_allclose(both, friction * (1 + change), rtol=0.02)
 
 
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("yields", ["none", "both"])
+def test_nothing_jumps_at_the_first_node(plane: str, yields: str) -> None:
+    """Up to which first touch is a law of its own, neither on loading nor on the way back, with
+    friction and large strain."""
+    plain = joint(plane, 1.0, (0.3, 0.2), 0.015, 0.5, yields)
+    law = general_law(replace(plain, friction=0.3, large_strain=True))
+    for curve in (law, replace(law, y=law.back, dy=law.dback)):
+        below, above = curve.at(curve.x[1] * curve.length * np.array([1 - 1e-12, 1.0])).load
+        assert above == pytest.approx(below, rel=1e-10)
+        below, above = curve.at(curve.x[1] * curve.length * np.array([1 - 1e-12, 1.0])).stiffness
+        assert above == pytest.approx(below, rel=1e-10)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_elastic_joints_with_friction_come_back_as_they_went(plane: str) -> None:
+    """The law leaves the shear out that turns around: all curves of the joint are one. Its error on
+    the way back is larger."""
+    plain = joint(plane, 1.0, (0.3, 0.2), 0.015, math.inf)
+    law = general_law(replace(plain, friction=0.3, large_strain=True))
+    x = law.length * np.linspace(0.1, 1.9, 20)
+    first = law.at(x)
+    back = law.at(x, 2.0 * law.length)
+    np.testing.assert_allclose(back.load, first.load, rtol=1e-9)
+    np.testing.assert_allclose(back.stiffness, first.stiffness, rtol=1e-9)
+    assert (back.error > 3 * first.error).all()
+    assert law.residual(2.0 * law.length) < 1e-9 * law.length
+
+
 def test_friction_in_the_papers_joint() -> None:
     """Elastic, at 2 dR, by GetFEM (README.md), within what the law expects; more of it is
     refused."""
