@@ -15,6 +15,7 @@ from archord.measures.edge import PatchProfile
 ORIGIN = (0.0, 0.0, 0.0)
 ALONG_Z = (0.0, 0.0, 1.0)
 _PIECES = 40  # of a line load, by default
+_NORMAL = 1 - 1e-9  # cosine of an axis that is normal to a plane
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,14 @@ class Axis:
         a = arm @ first
         b = arm @ np.cross(along, first)
         return np.hypot(a, b), np.degrees(np.arctan2(b, a)), arm @ along
+
+    def meets(self, number: int, at: float) -> float | None:
+        """The place along the axis of the plane across x, y or z, by its ``number``, ``at`` a
+        coordinate; None unless the axis is normal to the plane."""
+        along = unit(np.array(self.direction))[number]
+        if abs(along) < _NORMAL:
+            return None
+        return float((at - self.point[number]) * np.sign(along))
 
 
 @dataclass(frozen=True)
@@ -75,7 +84,8 @@ class LineLoad:
     along : array (k + 1,)
         The ends of the pieces of the axis.
     load : array (k, 3)
-        The force per length of each piece. It is the force of the history if it is integrated.
+        The force per length of each piece. It is the force of the history if it is integrated, but
+        along the axis where the whole is mirrored across it: there the forces cancel.
     """
 
     along: Array
@@ -106,10 +116,12 @@ def line_load(
     shares: Sequence[float],
     axis: Axis,
     along: Sequence[float] | None = None,
+    mirrors: Sequence[tuple[int, float]] = (),
 ) -> LineLoad:
     """The load of an interaction with these ``profiles`` along an ``axis``. Their ``shares`` are
-    negative where the force on the surface is opposite. A piece of a facet has its force spread
-    evenly over the length of the facet."""
+    negative where the force on the surface is opposite, and count the images in ``mirrors``, each
+    number and place on one of x, y and z. A piece of a facet has its force spread evenly over the
+    length of the facet."""
     low = []
     high = []
     force = []
@@ -118,6 +130,15 @@ def line_load(
         _, _, ends = axis.cylindrical(profile.corners)
         low.append(ends.min(axis=1))
         high.append(ends.max(axis=1))
+    for number, at in mirrors:
+        plane = axis.meets(number, at)
+        if plane is None:
+            continue
+        begin, end = np.concatenate(low), np.concatenate(high)
+        low += [2 * plane - end]
+        high += [2 * plane - begin]
+        halves = np.concatenate(force) / 2
+        force = [halves, halves * (1 - 2 * np.eye(3)[number])]
     begin = np.concatenate(low)[:, None]
     end = np.concatenate(high)[:, None]
     evenly = np.linspace(begin.min(), end.max(), _PIECES + 1)

@@ -209,7 +209,8 @@ class Run:
     ) -> LineLoad:
         """The load of an ``interaction`` in space at ``step`` (the last) on its second surface,
         along the axis through a ``point`` along a ``direction``; of pieces between the places
-        ``along`` the axis, by default 40 equal ones. Raises `InputError`."""
+        ``along`` the axis, by default 40 equal ones. It is of the whole, on both sides of a mirror
+        across the axis. Raises `InputError`."""
         self._require_space("line loads")
         shares = self.summary["model"]["contact_shares"]
         if interaction not in shares:
@@ -224,7 +225,8 @@ class Run:
             1.0 if side == part.surfaces[-1] else -1.0 for side in part.surfaces if side in met
         ]
         whole = self.scene.analysis.symmetry * np.multiply(signs, shares[interaction])
-        return line_load(profiles, whole, Axis(point, direction), along)
+        mirrors = self.summary["model"].get("mirrors", ())  # runs of version 0.2 lack them
+        return line_load(profiles, whole, Axis(point, direction), along, mirrors)
 
     def _require_space(self, what: str) -> None:
         """Raise `InputError` for a run that is not in space."""

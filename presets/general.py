@@ -149,9 +149,12 @@ def _facts(scene: ProblemScene, system: System, file: str | None) -> dict[str, A
         interface.interaction.name: [pair.share for pair in interface.pairs]
         for interface in system.contact.interfaces
     }
+    model: dict[str, Any] = {"contact_shares": shares}
+    if system.mirrors:
+        model["mirrors"] = [(mirror.axis, mirror.at) for mirror in system.mirrors]
     return {
         "mesh": sizes(system) | source,
-        "model": {"contact_shares": shares},
+        "model": model,
         "bodies": {
             body.name: list(mesh.cell_sets[body.cells or body.name])
             for body in system.problem.bodies

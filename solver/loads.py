@@ -109,10 +109,19 @@ class Loads:
             return self._vector(self.swept(v[mean.axis]) * ds) / length
         x = ufl.SpatialCoordinate(mesh)
         centre = self._first_moments(x, ds) / length
+        for axis, at in mean.mirrors:
+            centre[axis] = at
         arm = x - fem.Constant(mesh, centre)
         lever = np.zeros(d) if mean.point is None else np.array(mean.point) - centre
-        by_rotations = self._by_rotations(mean.axis, lever, self._inertia(arm, ds))
+        inertia = self._inertia(arm, ds)
         along = np.eye(d + len(turns))[mean.axis, :d]
+        for axis, _ in mean.mirrors:
+            along[axis] = 0.0
+            inertia[axis, np.arange(d) != axis] = 0.0
+            inertia[np.arange(d) != axis, axis] = 0.0
+        by_rotations = self._by_rotations(mean.axis, lever, inertia)
+        for axis, _ in mean.mirrors:
+            by_rotations[np.arange(d) != axis] = 0.0
         density = ufl.inner(fem.Constant(mesh, along / length), v)
         for rotation, (i, j) in zip(by_rotations, turns, strict=True):
             density += fem.Constant(mesh, rotation) * (arm[i] * v[j] - arm[j] * v[i])

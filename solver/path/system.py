@@ -10,6 +10,7 @@ import basix.ufl
 import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 
 from archord.geometry.basis import Array, displacement_element, lagrange_element
 from archord.kernels.compat import cell_degree, cell_nodes
@@ -21,6 +22,7 @@ from archord.solver.contact.interaction import Interaction, Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.expansion import expanded
+from archord.solver.mirrors import Mirror, mirrors_of
 from archord.solver.path.load_path import Companion, LoadPath, Position
 from archord.solver.path.newton import NewtonSolver
 from archord.solver.path.recovery import Recovery
@@ -72,6 +74,8 @@ class System(Totals):
         Cells of the mesh, on all ranks.
     drive_names : list of str
         Names of the drives, as of `driven`.
+    mirrors : list of Mirror
+        The planes in space in which the part on the mesh is mirrored.
 
     Raises
     ------
@@ -119,14 +123,23 @@ class System(Totals):
         self.cell_kind = f"{shape} {mesh.basix_cell().name}s"
         self.drive_names = self.equilibrium.drives.names
         self.mean_rates = cache(self._mean_rates)
+        self.mirrors = mirrors_of(problem, self.V)
         self._path: LoadPath | None = None
 
     def _mean_rates(self, facets: str, point: tuple[float, ...]) -> Array:
         """Derivatives ``(d + t, n_owned, d)`` of `mean_motion` by the displacements."""
         kinematics = self.problem.kinematics
         n = kinematics.dimension + len(kinematics.turns)
-        means = [Mean("", facets, axis, point) for axis in range(n)]
+        nodes = self.problem.mesh.dofs_in(self.V, facets)
+        met = [mirror for mirror in self.mirrors if self._meets(mirror, nodes)]
+        mirrors = [(mirror.axis, mirror.at) for mirror in met]
+        means = [Mean("", facets, axis, point, mirrors=mirrors) for axis in range(n)]
         return np.stack([self.equilibrium.drives.loads.mean_motion(mean) for mean in means])
+
+    def _meets(self, mirror: Mirror, nodes: np.ndarray) -> bool:
+        """Whether any of these ``nodes`` ``(n,)`` lies in a ``mirror``."""
+        here = bool(np.isin(nodes, mirror.nodes).any())
+        return self.comm.allreduce(here, op=MPI.LOR)
 
     def _bulk(self) -> Bulk:
         problem = self.problem

@@ -1,0 +1,72 @@
+"""A quarter in space tells the numbers of the whole, whose images it lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import archord
+from archord import Body, Coupling, Elastic, Interaction, Load, Problem, Support, boxes
+
+SOFT = Elastic(1000.0, 0.3)
+HARD = Elastic(3000.0, 0.3)
+HELD = [Support("lower bottom"), Support("lid", on="upper top", fixed="xz")]
+MIRRORS = [Support("across x", on="x = 0", fixed="x"), Support("across z", on="z = 0", fixed="z")]
+
+
+def pressed(quarter: bool, **changes) -> Problem:
+    """A block that is pressed on another one, whose end is coupled to a point."""
+    x, z, width, length, symmetry = (0, 0, 1, 2, 4) if quarter else (-1, -2, 2, 4, 1)
+    drawn = {"lower": (x, -1, z, width, 1, length), "upper": (x, 0, z, width, 1, length)}
+    mesh = boxes(drawn, size=1, kind="hexahedra")
+    sets = mesh.facet_sets
+    sets["x = 0"] = sets["lower left"] + sets["upper left"]
+    sets["z = 0"] = sets["lower back"] + sets["upper back"]
+    given = {
+        "mesh": mesh,
+        "bodies": [Body("lower", SOFT), Body("upper", HARD)],
+        "interactions": [Interaction("joint", ("upper bottom", "lower top"))],
+        "supports": [*HELD, *(MIRRORS if quarter else [])],
+        "loads": [Load("press", on="upper top", direction="y", displacement=-0.05)],
+        "couplings": [Coupling("end", "lower front", (0.0, 0.3, 2.0), "distributing")],
+        "symmetry": symmetry,
+        "steps": 1,
+    }
+    return Problem(**given | changes)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """The whole, and its quarter."""
+    folder = tmp_path_factory.mktemp("mirrors")
+    return [archord.solve(pressed(k), folder / str(k)) for k in (False, True)]
+
+
+def test_a_face_that_a_mirror_cuts_moves_as_the_whole_face(runs):
+    """Its other half moves across the mirror as far, and turns as far the other way."""
+    whole, quarter = ({name: v[-1] for name, v in run.columns.items()} for run in runs)
+    motions = [f"end {kind} {axis}" for kind in ("displacement", "rotation") for axis in "xyz"]
+    np.testing.assert_allclose(
+        [quarter[name] for name in motions], [whole[name] for name in motions], atol=1e-12
+    )
+    assert quarter["end rotation x"] != 0
+    assert quarter["joint force y"] == pytest.approx(whole["joint force y"], rel=1e-9)
+
+
+def test_a_line_load_is_of_both_sides_of_a_mirror(runs):
+    """A quarter has it at each place of the axis as the whole, beyond the mirror, too."""
+    whole, quarter = (run.line_load("joint", along=[-2, -1, 0, 0.5, 2]).load for run in runs)
+    np.testing.assert_allclose(quarter[:, 1:], whole[:, 1:], atol=1e-9 * np.abs(whole).max())
+    by_default = runs[1].line_load("joint")
+    assert by_default.along[0] == pytest.approx(-2.0)
+    force = np.diff(by_default.along) @ by_default.load
+    assert force[1] == pytest.approx(runs[1].columns["joint force y"][-1], rel=1e-12)
+
+
+def test_rollers_that_might_be_mirrors_are_none(comm):
+    """Where three sides are held across themselves, nothing tells which two are mirrors."""
+    supports = [*MIRRORS, Support("lower bottom", fixed="y")]
+    assert archord.System(pressed(True, supports=supports)).mirrors == []
+    found = archord.System(pressed(True)).mirrors
+    assert [mirror.axis for mirror in found] == [0, 2]
+    assert [mirror.at for mirror in found] == pytest.approx([0.0, 0.0], abs=1e-12)
