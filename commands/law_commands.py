@@ -130,7 +130,7 @@ def law(
     joint, units, thickness = joint_of(scene, overrides, given, needed)
     inputs = files_read(scene, overrides) if scene else []
     chosen = chosen or [default_law(joint)]
-    _refuse_unused(chosen, given)
+    _refuse_unused(chosen, given, in_a_scene=scene is not None)
     if exports or deepest:
         _require_archord("--export" if exports else "--deepest", chosen)
         _require_within(chosen[0], joint, deepest)
@@ -254,10 +254,18 @@ def _refuse_contradictions() -> None:
             raise InputError(f"{typed[name]}: is of an export's element, and {missing}.")
 
 
-def _refuse_unused(chosen: list[Law], given: dict[str, Any]) -> None:
-    """Raise `InputError` for a coefficient that no law among the ``chosen`` has."""
+def _refuse_unused(chosen: list[Law], given: dict[str, Any], *, in_a_scene: bool) -> None:
+    """Raise `InputError` for a coefficient that no law among the ``chosen`` has, and for a length
+    that none needs, unless it is the thickness ``in_a_scene``."""
     from archord.postprocess.laws.laws import LAWS
 
+    length = given["length"]
+    if length is not None and not in_a_scene and not any("length" in law.needs for law in chosen):
+        laws = ", ".join(law.name for law in LAWS.values() if "length" in law.needs)
+        raise InputError(
+            f"--length {length:g}: is for {laws} alone, or beside --scene; forces of "
+            f"{chosen[0].name} are per unit length."
+        )
     for name in ("k", "c"):
         if given[name] is not None and not any(name in law.coefficients for law in chosen):
             laws = ", ".join(law.name for law in LAWS.values() if name in law.coefficients)

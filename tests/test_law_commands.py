@@ -76,6 +76,18 @@ def test_outside_the_range_rows_are_nan_and_one_warning(capsys):
     assert "johnson: delta = 1 to 2 dR is outside 0 to 0.5413 dR" in result.err
 
 
+@pytest.mark.parametrize("more", [[], ["--deepest", "2"], ["--by-load"]])
+def test_no_error_is_told_of_a_joint_outside_the_range(more, capsys):
+    """Its law is an extrapolation, whose error nobody knows."""
+    words = ["law", *JOINT, "--plane", "strain", "--nu", "0.3", "--points", "2", "--to", "1", *more]
+    assert run([*words, "--yield-stress", "230"]) == 0
+    assert "+-P" in capsys.readouterr().out
+    assert run([*words, "--yield-stress", "60", "--extrapolate"]) == 0
+    said = capsys.readouterr()
+    assert "+-P" not in said.out
+    assert "sigY R/(E* dR) = 0.104 is outside" in said.err
+
+
 def test_a_ring_has_no_law_with_displacements(tmp_path, capsys, refused):
     """One sentence that says how wrong it would be; p0 and eps of a load are a ring's as well."""
     ring = str(Path(SCENE).with_name("persson.toml"))
@@ -390,6 +402,12 @@ def test_a_rigid_pin_keeps_its_nu(capsys):
             "lankarani-nikravesh: this law needs length. Give --length",
         ),
         ([*JOINT, "--nu", "0.3"], "--nu: says nothing without --plane"),
+        (
+            [*JOINT, "--nu", "0.3", "--plane", "strain", "--length", "25", "--export", "x.h"],
+            "--length 25: is for dubowsky-freudenstein, lankarani-nikravesh alone, or beside "
+            "--scene; forces of archord are per unit length.",
+        ),
+        (["paper", *JOINT, "--length", "25"], "forces of paper are per unit length"),
     ],
 )
 def test_options_that_contradict_each_other_are_refused(

@@ -140,7 +140,7 @@ class Law:
                 f"{self.name}: this law gives no displacement, only pressure and angle of a load."
             )
         inside = self._inside(joint, delta, self.limit(joint), "delta", extrapolate)
-        return self._known(joint, inside)
+        return self._judged(joint, self._known(joint, inside))
 
     def at_load(self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False) -> LawState:
         """All quantities at loads ``load``; displacement and stiffness are nan where the law gives
@@ -152,7 +152,11 @@ class Law:
         largest = float(self.state(joint, np.array(limit)).load)
         P = self._inside(joint, load, largest, "P", extrapolate)
         delta = rising_root(lambda x: self.state(joint, x).load, P, limit)
-        return self._known(joint, delta)._replace(load=P)
+        return self._judged(joint, self._known(joint, delta))._replace(load=P)
+
+    def _judged(self, joint: LawJoint, state: LawState) -> LawState:
+        """The ``state``, whose error nobody knows of a joint that is not in the range."""
+        return state._replace(error=NOTHING) if self.unfit(joint) else state
 
     def _known(self, joint: LawJoint, x: Array) -> LawState:
         """The state at checked points ``x``: nan in, nan out."""

@@ -10,7 +10,7 @@ import numpy as np
 from archord.output.user_file import writing
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.postprocess.laws.law import Law, LawState
+from archord.postprocess.laws.law import NOTHING, Law, LawState
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
@@ -34,7 +34,8 @@ def sample(
     state = law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
     if deepest:
         found = general_law(joint, extrapolate=True).at(steps, deepest * joint.clearance)
-        quantities = found.load, found.stiffness, found.peak_pressure, found.angle, found.error
+        error = found.error if np.isfinite(state.error).any() else NOTHING
+        quantities = found.load, found.stiffness, found.peak_pressure, found.angle, error
         state = LawState(
             steps, *(np.where(np.isnan(state.load), np.nan, values) for values in quantities)
         )

@@ -94,7 +94,7 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
     sizes = _around(np.abs(left_out))
     error = np.interp(nodes, [start, *x], [_FIRST * sizes[0], *sizes]) + mesh
     curve = JointCurve(**tables, error=error, back_error=error)
-    back_error, said = _errors_back(curve, steps, k, back)
+    measured, said = _errors_back(curve, steps, k, back)
     about = steps.about | {
         "first loading": f"{len(k)} steps to {steps.at(x[-1])}, {steps.load(y[-1])}",
         "contact begins at": steps.at(start),
@@ -105,8 +105,11 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
         "way back": back.said,
         "error of the way back": said,
     }
-    if back_error is not None:
-        curve = replace(curve, back_error=back_error + mesh)
+    if measured is not None:
+        back_error = measured + mesh
+        if not len(back.steps):  # elastic: along first loading
+            back_error = np.maximum(back_error, error)
+        curve = replace(curve, back_error=back_error)
     return replace(curve, about=about)
 
 
@@ -205,7 +208,8 @@ def _errors_back(
     curve: JointCurve, steps: RunSteps, k: np.ndarray, back: _WayBack
 ) -> tuple[Array | None, str]:
     """Errors at the nodes of the way back from there, over the force it begins at; None of what
-    does not yield. And in words the errors of the unloadings that ``curve`` is not made of."""
+    does not yield and has not come back. And in words the errors of the unloadings that ``curve``
+    is not made of."""
     errors: dict[float, Array] = {}  # by the displacement that a way back begins at
     for way in _unloadings(steps, k):
         x = steps.x[way]
@@ -220,16 +224,23 @@ def _errors_back(
         sizes = _sizes(np.concatenate([*others.values()]))
         said = f"{sizes} of the force it begins at, in {len(others)} others"
     if not len(back.steps):
-        return None, said or "the error of first loading"
+        if not others:
+            return None, "the error of first loading"
+        return _worst(curve, errors), said
     own = steps.x[back.steps[0]]
     errors[own] = _left_out(back.curve.x, back.curve.f) / back.curve.f[-1]
-    known = sorted(errors)
-    worst = np.interp(curve.x, known, [np.abs(errors[x]).max() for x in known])
+    worst = _worst(curve, errors)
     unseen = curve.x > own
     if not others:
         unseen |= curve.x < own
         said = f"not measured, as there is no other: {_UNSEEN:.0%} assumed"
     return np.where(unseen, _UNSEEN, worst), said
+
+
+def _worst(curve: JointCurve, errors: dict[float, Array]) -> Array:
+    """The largest of the ``errors`` of each way back, at the nodes that it begins at."""
+    known = sorted(errors)
+    return np.interp(curve.x, known, [np.abs(errors[x]).max() for x in known])
 
 
 def _unloadings(steps: RunSteps, k: np.ndarray) -> list[np.ndarray]:

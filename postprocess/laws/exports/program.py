@@ -143,7 +143,7 @@ def _of_tables(curve: JointCurve) -> Program:
     if curve.radius is not None:
         functions += [*_ELEMENT_FUNCTIONS, "stored_energy"]
         rule = f"{rule} {_ELEMENT}"
-        numbers |= ELEMENT_NUMBERS | {"RADIUS": curve.radius}
+        numbers |= ELEMENT_NUMBERS | {"RADIUS": float(curve.radius)}
         arrays |= _element_tables(curve)
     if np.isfinite(curve.peak).all():
         functions.append("peak_pressure")
@@ -162,7 +162,7 @@ def _of_tables(curve: JointCurve) -> Program:
         numbers=numbers | {key: values.tolist() for key, values in arrays.items()},
         length_unit=curve.length_unit,
         force_unit=curve.force_unit,
-        pin_length=curve.pin_length,
+        pin_length=float(curve.pin_length),
     )
 
 

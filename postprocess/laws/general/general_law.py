@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -109,7 +109,8 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
 
 def _in_numbers(joint: LawJoint) -> dict[str, Any]:
     """What decides ``joint``, as JSON has it: a hardening curve as points [PEEQ, yield stress]."""
-    told = {name: value for name, value in vars(joint).items() if value}
+    usual = {field.name: field.default for field in fields(joint)}
+    told = {name: value for name, value in vars(joint).items() if value or value != usual[name]}
     for name in ("pin_hardening", "block_hardening"):
         if name in told:
             peeq = told[name].knots()

@@ -118,7 +118,10 @@ class LawJoint:
     fixed_pairs: bool = False
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Check the values; numbers of numpy become Python's, which files can hold."""
+        for name, value in vars(self).items():
+            if isinstance(value, np.generic):
+                object.__setattr__(self, name, value.item())
         positive = "radius clearance E_star k c pin_yield block_yield length block_size"
         for name in positive.split():
             value = getattr(self, name)

@@ -194,8 +194,9 @@ class JointCurve:
         """The displacement of first loading at which the force is ``load`` (any shape); nan beyond
         the table's."""
         y = np.asarray(load, float) / self.force
-        known = y <= self.y[-1]
-        x = self._inverse(self.y, self.dy, np.where(known, y, 0.0))
+        last = self.y[-1]
+        known = y <= _INSIDE * last
+        x = self._inverse(self.y, self.dy, np.where(known, np.minimum(y, last), 0.0))
         return np.where(known, x, np.nan) * self.length
 
     def residual(self, deepest: npt.ArrayLike) -> Array:

@@ -61,7 +61,8 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     Raises
     ------
     ValueError
-        For columns that no joint has, and for arrays of different lengths.
+        For columns that no joint has, for arrays of different lengths, and for displacements that
+        are not of as many joints.
 
     Warns
     -----
@@ -81,11 +82,8 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     """
     rows = _rows(joints)
     n = len(rows)
-    delta = np.asarray(delta, float)
-    shape = np.broadcast_shapes(delta.shape, np.shape(deepest))
-    shape = (n, *shape[1:])
-    deltas = np.broadcast_to(delta, shape)
-    deepests = np.broadcast_to(np.asarray(deepest, float), shape)
+    deltas, deepests = _of_joints(n, delta, deepest)
+    shape = deltas.shape
     load = np.full(shape, np.nan)
     error = np.full(shape, np.nan)
     reason = np.full(n, "", dtype=object)
@@ -104,6 +102,22 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
         load[row] = state.load
         error[row] = state.error
     return Loads(load, error, reason)
+
+
+def _of_joints(n: int, delta: npt.ArrayLike, deepest: npt.ArrayLike) -> tuple[Array, Array]:
+    """Both as arrays of ``n`` joints, ``(n,)`` or, if one of them is, ``(n, k)``."""
+    given = [np.asarray(delta, float), np.asarray(deepest, float)]
+    rank = max(1, *(values.ndim for values in given))
+    each = [values[:, None] if values.ndim == 1 < rank else values for values in given]
+    try:
+        shape = np.broadcast_shapes((n, 1)[:rank], *(values.shape for values in each))
+    except ValueError:
+        shape = ()
+    if shape[:1] != (n,) or rank > 2:
+        shapes = " and ".join(str(values.shape) for values in given)
+        raise ValueError(f"delta and deepest: shapes {shapes} are not of {n} joints.")
+    deltas, deepests = (np.broadcast_to(values, shape) for values in each)
+    return deltas, deepests
 
 
 def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:

@@ -841,7 +841,8 @@ export class JointLaw {
     /** The displacement of first loading at which the force is `load`. */
     displacement(load) {
         const y = load / this.force;
-        return y <= this.y[this.y.length - 1] ? this.length * this.inverse(this.y, this.dy, y) : NaN;
+        const last = this.y[this.y.length - 1];
+        return y <= (1 + 1e-9) * last ? this.length * this.inverse(this.y, this.dy, Math.min(y, last)) : NaN;
     }
 
     /** The displacement at which the joint opens on its way back from `deepest`. */

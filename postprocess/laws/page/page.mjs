@@ -303,7 +303,7 @@ function save(suffix) {
 
 function about() {
     const { joint, law } = shown;
-    const given = Object.entries(joint).filter(([, value]) => value);
+    const given = Object.entries(joint).filter(([name, value]) => value || (value === 0 && name !== "friction"));
     const most = (end) => Math.max(...law.error.filter((_, i) => law.x[i] >= 0.1 && law.x[i] <= end));
     const percent = (value) => `${(100 * value).toFixed(2)}%`;
     let error = `9 in 10 such joints are within ${percent(most(2))} of P from 0.1 to 2 dR, ${percent(most(3))} to 3 dR`;

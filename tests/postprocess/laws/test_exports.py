@@ -359,6 +359,22 @@ def test_a_joint_that_does_not_yield_needs_no_way_back(tmp_path: Path) -> None:
     assert curve.at([0.02], [0.1]) == curve.at([0.02])
 
 
+def test_numbers_of_numpy_are_numbers_of_files(tmp_path: Path) -> None:
+    """And whole numbers are no integers of C."""
+    given = {"radius": 10, "clearance": 0.05, "E_star": 115e3, "pin_yield": 300.0, "nu": 0.3}
+    plain = LawJoint(**given, plane="strain", large_strain=True)
+    kinds = {"radius": np.int64, "clearance": np.float64, "pin_yield": np.float32}
+    numbers = {name: kinds.get(name, np.float64)(value) for name, value in given.items()}
+    other = LawJoint(**numbers, plane=np.str_("strain"), large_strain=np.True_)
+    for suffix in (".py", ".h", ".mo", ".m", ".mjs", ".json"):
+        target = tmp_path / f"law{suffix}"
+        text = export_law(replace(general_law(other), pin_length=np.float64(2.0)), target)
+        assert text == export_law(replace(general_law(plain), pin_length=2.0), target)
+        assert "enum { law_RADIUS" not in text
+        assert "Integer RADIUS" not in text
+        assert "np." not in text
+
+
 def test_what_is_unknown_is_left_out(tmp_path: Path) -> None:
     """No pressure and angle, no functions that say them; JSON has null for them, and gives the
     table back."""

@@ -323,6 +323,15 @@ def test_every_named_metal_has_a_law(name: str, plane: str) -> None:
     assert (found.at(x, x[-1]).load <= load).all()
 
 
+def test_a_law_tells_the_joint_that_it_is_of() -> None:
+    """Zeros that are no defaults included: nu, and the share of a rigid pin."""
+    for change in ({"pin_share": 0.0}, {"pin_nu": 0.0, "pin_yield": 400.0}, {"friction": 0.1}):
+        pin = LawJoint(
+            **{"radius": 10.0, "clearance": 0.05, "E_star": 1e5, "nu": 0.0} | change, plane="stress"
+        )
+        assert LawJoint(**general_law(pin).about["joint"]) == pin
+
+
 @pytest.mark.parametrize("name", ["plane", "nu"])
 def test_a_joint_without_plane_or_nu_has_no_range(name: str) -> None:
     """The sentence says which is missing."""

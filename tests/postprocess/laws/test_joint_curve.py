@@ -14,6 +14,15 @@ from tests.postprocess.laws.curves import yielding_curve
 X = np.linspace(0.0, 3.0, 500)
 
 
+def test_the_last_force_has_its_displacement() -> None:
+    """Whatever round-off makes of it."""
+    for length in 0.05 * np.linspace(1, 2, 50):
+        curve = replace(yielding_curve(), length=length, force=7e3 * length)
+        found = curve.displacement(curve.at(curve.limit).load)
+        assert found == pytest.approx(curve.limit, rel=1e-9)
+    assert np.isnan(curve.displacement(1.001 * curve.at(curve.limit).load))
+
+
 def test_slopes_are_those_of_the_force() -> None:
     """dP/d(delta) is the derivative of P, loading and coming back, but at kinks: where it opens,
     and the deepest."""

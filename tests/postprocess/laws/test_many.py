@@ -51,6 +51,22 @@ def test_a_frame_is_a_table_of_joints():
     assert not found.reason.any()
 
 
+def test_displacements_and_ways_back_belong_to_joints():
+    """One of each joint, whatever the other has: as many joints as columns change nothing."""
+    table = SAME | {"clearance": [0.05, 0.04], "block_yield": 250.0}
+    delta = np.array([[0.02, 0.03], [0.05, 0.07]])
+    deepest = np.array([0.1, 0.08])
+    found = loads(table, delta, deepest)
+    again = loads(table, delta[:, 0], delta)
+    for row, clearance in enumerate(table["clearance"]):
+        law = general_law(LawJoint(**SAME, clearance=clearance, block_yield=250.0))
+        assert found.load[row] == pytest.approx(law.at(delta[row], deepest[row]).load)
+        assert again.load[row] == pytest.approx(law.at(delta[row, 0], delta[row]).load)
+    for wrong in (np.zeros(3), np.zeros((3, 2)), np.zeros((2, 3)), np.zeros((1, 2, 2))):
+        with pytest.raises(ValueError, match="are not of 2 joints"):
+            loads(table, delta, wrong)
+
+
 def test_unknown_columns_and_lengths_are_refused():
     with pytest.raises(ValueError, match="gap: no parameter of a joint"):
         loads(SAME | {"clearance": 0.05, "gap": 1.0}, 0.05)

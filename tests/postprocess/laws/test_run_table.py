@@ -168,6 +168,20 @@ def test_an_elastic_joint_comes_back_as_it_went() -> None:
         assert abs(curve.residual(curve.limit)) < 1e-10
 
 
+def test_friction_makes_the_way_back_of_an_elastic_joint_known_less_well() -> None:
+    """Where it comes back by other forces than it went; the expected error says so."""
+    x = path(1.0, 0.0, END, 0.0)
+    back = np.append(0, np.diff(x)) < 0
+    elastic_run = synthetic(x, yields=False)
+    P = np.array(elastic_run.columns["P"]) * np.where(back, 0.95, 1.0)
+    curve = run_table(synthetic(x, yields=False, P=list(P)))
+    deepest = END * curve.length
+    off = np.abs(curve.at(0.6 * deepest, deepest).load - 0.95 * curve.at(0.6 * deepest).load)
+    assert off < curve.at(0.6 * deepest, deepest).error < 0.06 * P.max()
+    assert curve.at(0.6 * deepest).error < 0.1 * off
+    assert not run_table(elastic_run).yields
+
+
 def test_an_unloading_that_ends_early_is_extended() -> None:
     curve = run_table(synthetic(path(END, 1.2)))
     assert "extended from" in curve.about["way back"]
