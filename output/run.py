@@ -168,8 +168,9 @@ class _Output:
     """Everything that a run writes; rank 0 writes, all ranks take part. Raises `WriteError` on all
     of them.
 
-    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes
-    what they lack.
+    A step counts once the checkpoint has it. Its arrays are on disk by then: what is evaluated from
+    an accepted state once more differs from them, where laws and materials of own classes depend on
+    the length of the step. The tables follow, and a run that goes on writes what they lack.
     """
 
     def __init__(
@@ -219,7 +220,9 @@ class _Output:
             checkpoint = self._start.checkpoint if self._start else None
             m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
         self._on_root(lambda: self._report.unseal())
-        self._write(m, step, self.account.profiles())
+        profiles = self.account.profiles()
+        self._write_arrays(m, profiles)
+        self._write_tables(m, step, profiles)
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return position, work
 
@@ -239,30 +242,40 @@ class _Output:
             seconds = now - self._last
             self._last = now
             m = self.account.step(self.steps, step, profiles, work.total, seconds)
+        self._write_arrays(m, profiles)
         if self.account.scene.output.checkpoint:
             with self.system.timer("checkpoint"):
                 checkpoint = halt(self._order, self._scene, m, step, position, work)
                 self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
-        self._write(m, step, profiles)
+        self._write_tables(m, step, profiles)
         return m
 
-    def _write(self, m: Record, step: Step, profiles: Mapping[str, EdgeProfile]) -> None:
-        """Make ``m`` the last step of all files but the checkpoint. Collective."""
-        account = self.account
+    def _write_arrays(self, m: Record, profiles: Mapping[str, EdgeProfile]) -> None:
+        """Make ``m`` the last step of the files of fields and contact. Collective."""
+        output = self.account.scene.output
         before = len(self.steps)
         with self.system.timer("output"):
-            warnings = account.step_warnings(m, profiles, step.residual, self.steps)
             fields = None
-            if account.scene.output.fields:
+            if output.fields:
                 order = self._order
                 fields = self._of_fields.collect_fields(order, self._at_points, self._own_fields)
+
+            def write() -> None:
+                if output.fields:
+                    self._write_fields(m.at, fields, before)
+                if output.contact:
+                    self._write_contact(m.at, profiles, before)
+
+            self._on_root(write)
+
+    def _write_tables(self, m: Record, step: Step, profiles: Mapping[str, EdgeProfile]) -> None:
+        """Make ``m`` the last step of history.csv and run.json. Collective."""
+        account = self.account
+        with self.system.timer("output"):
+            warnings = account.step_warnings(m, profiles, step.residual, self.steps)
             self.steps.append(m)
 
             def write() -> None:
-                if account.scene.output.fields:
-                    self._write_fields(m.at, fields, before)
-                if account.scene.output.contact:
-                    self._write_contact(m.at, profiles, before)
                 write_history(self.folder / "history.csv", account.columns, self.steps)
                 self._report.add(step, warnings)
 

@@ -14,6 +14,7 @@ import archord
 from archord import cli
 from archord.commands.progress import Progress
 from archord.materials.kinematics import Kinematics
+from archord.output import run as run_module
 from archord.postprocess.laws.run_steps import read_steps
 
 Worn = make_dataclass("Worn", ["depth"])
@@ -122,6 +123,35 @@ def test_the_halted_step_keeps_its_contact(tmp_path, monkeypatch):
     for side, profile in contact.items():
         np.testing.assert_array_equal(after.contact(3)[side].pressure, profile.pressure)
     np.testing.assert_array_equal(after.fields(3).cell["contact_pressure"], field)
+
+
+class Killed(BaseException):
+    """What ends a run where a kill would."""
+
+
+@pytest.mark.parametrize("behind", [True, False])
+def test_a_kill_at_the_checkpoint_leaves_no_step_to_evaluate_once_more(
+    run, tmp_path, monkeypatch, behind
+):
+    """The arrays of a step are on disk before the checkpoint counts it."""
+
+    def kill(path, checkpoint):
+        if behind or checkpoint.step < 3:
+            write(path, checkpoint)
+        if checkpoint.step == 3:
+            raise Killed
+
+    write = run_module.write_checkpoint
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "write_checkpoint", kill)
+        with pytest.raises(Killed):
+            archord.solve(sliding(MPI.COMM_SELF), tmp_path / "run", comm=MPI.COMM_SELF)
+    problem = sliding(MPI.COMM_SELF)
+    after = archord.solve(problem, tmp_path / "run", restart=True, comm=MPI.COMM_SELF)
+    for side, profile in run.contact(3).items():
+        np.testing.assert_allclose(after.contact(3)[side].pressure, profile.pressure, atol=1e-9)
+    field = run.fields(3).cell["contact_pressure"]
+    np.testing.assert_allclose(after.fields(3).cell["contact_pressure"], field, atol=1e-9)
 
 
 def test_the_folder_tells_of_the_objects(run):

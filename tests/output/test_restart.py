@@ -403,12 +403,12 @@ def test_a_run_with_files_missing_is_refused(halted, damage, said):
 
 
 def test_a_step_that_only_the_checkpoint_has_is_written(tmp_path):
-    """Killed after the checkpoint and before all other files: they get the step from the restored
-    state. Tables that were lost are written again."""
+    """Earlier versions, killed there, left all other files a step behind: they get the step from
+    the restored state. Tables that were lost are written again."""
     problem = CASES["plastic"][0]
     run(problem, tmp_path / "whole", copies={2: tmp_path / "before", 3: tmp_path / "halted"})
     shutil.copy(tmp_path / "halted" / "checkpoint.h5", tmp_path / "before")
-    assert accepted_steps(tmp_path / "before") == 3
+    assert checkpoint.read(tmp_path / "before" / "checkpoint.h5").step == 3
     assert len(json.loads((tmp_path / "before" / "run.json").read_text())["steps"]) == 2
     for name in ("history.csv", "fields.xdmf"):
         (tmp_path / "before" / name).unlink()
