@@ -90,11 +90,17 @@ def _halved(ends: Array, n_parts: int) -> Array:
 
 def _divided(ends: Array, n_parts: int) -> Array:
     """The ``ends`` of segments and between them as many more that there are ``n_parts``, of
-    lengths as equal as segments allow."""
+    lengths as equal as segments allow.
+
+    Of segments whose parts are equally long the longest one gets the next part, and of these the
+    first one, whatever the rounding.
+    """
     length = np.diff(ends)
     parts = np.ones(len(length), dtype=int)
     while parts.sum() < n_parts:
-        parts[np.argmax(length / parts)] += 1
+        of_parts = length / parts
+        longest = np.where(of_parts > of_parts.max() - _SHORTEST, length, 0.0)
+        parts[np.argmax(longest > longest.max() - _SHORTEST)] += 1
     size = np.repeat(length / parts, parts)
     within = np.concatenate([np.arange(count) for count in parts])
     return np.append(np.repeat(ends[:-1], parts) + within * size, ends[-1])

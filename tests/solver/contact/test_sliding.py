@@ -58,6 +58,18 @@ def test_points_do_not_depend_on_round_off_where_nodes_coincide(seed):
     np.testing.assert_allclose(xi, expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("end", [4 / 11, 7 / 11])
+@pytest.mark.parametrize("round_off", [-1e-14, 0.0, 1e-14])
+def test_points_do_not_depend_on_round_off_where_parts_are_equally_long(end, round_off):
+    """Segments of 4 and 7 elevenths of a facet, cut into eleven parts: the twelfth is the longer
+    segment's, from whichever end the facet is passed."""
+    own = Curve(np.column_stack([[0.0, 0.5, 1.0], np.zeros(3)]), 2)
+    opposite = Curve(np.column_stack([np.linspace(1.0, end + round_off, 3), np.zeros(3)]), 2)
+    xi, _ = segment_rule(own, opposite)
+    in_shorter = xi < end if end < 0.5 else xi > end
+    assert in_shorter.sum() == 4 * (own.degree + 1)
+
+
 @pytest.mark.parametrize("n_own", [10, 12, 30])
 def test_nodes_get_their_share_of_a_uniform_pressure(n_own):
     """To round-off without slip, and within a hundredth wherever the facets have slid to."""
