@@ -47,7 +47,12 @@ from archord.scene.sections.keys import Section
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
 # what the base scene of a sweep holds where it says nothing: P differs by 1e-7 at most
-DEFAULTS = {"analysis.tolerance": 1e-6, "output.contact": False, "output.checkpoint": False}
+DEFAULTS = {
+    "analysis.tolerance": 1e-6,
+    "output.fields": False,
+    "output.contact": False,
+    "output.checkpoint": False,
+}
 _MOST_SENTENCES = 20
 _TABLES = ("hardening", "parameters", "core")  # keys whose values are tables
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm

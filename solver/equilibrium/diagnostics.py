@@ -6,7 +6,6 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.materials.material import Points
 from archord.solver.equilibrium.evaluation import Evaluation
 
 
@@ -16,20 +15,6 @@ class Diagnostics:
     def __init__(self, evaluation: Evaluation) -> None:
         self.evaluation = evaluation
         self.unknowns = evaluation.unknowns
-
-    def points(self) -> list[Points]:
-        """The points of materials and of contact laws, in bulk and contact."""
-        parts = self.evaluation.bulk, self.evaluation.contact
-        return [points for part in parts for _, points in part.histories().values()]
-
-    def plastic_points(self) -> list[Points]:
-        """The points that can yield."""
-        return [points for points in self.points() if points.yields]
-
-    def yields(self) -> bool:
-        """Whether any point has left its elastic tangent, on any rank."""
-        here = any(points.flows.any() for points in self.plastic_points())
-        return self.unknowns.comm.allreduce(here, op=MPI.LOR)
 
     def reaction(self, name: str) -> Array:
         """Forces ``(n_owned, d)`` of the supports and means ``name`` on the nodes."""
@@ -59,7 +44,7 @@ class Diagnostics:
     def plastic_increment(self) -> float:
         """How far PEEQ has grown in the step at most, over all ranks."""
         grown = 0.0
-        for points in self.plastic_points():
+        for points in self.evaluation.plastic_points():
             increments = points.peeq - points.material.peeq(points.state)
             grown = max(grown, float(increments.max(initial=0.0)))
         return self.unknowns.comm.allreduce(grown, op=MPI.MAX)

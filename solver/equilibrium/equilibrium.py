@@ -66,7 +66,7 @@ class Equilibrium:
         raises."""
         self.unknowns.take(x)
         self.evaluate()
-        renewed = self.linear.follow_pattern()
+        renewed = self.linear.follow()
         lacking = self.evaluation.lacking(self.load)
         self.unknowns.join(f, self.evaluation.free_forces(), lacking)
         return renewed
@@ -102,7 +102,7 @@ class Equilibrium:
         self.contact.move(self.unknowns.levels, self.problem.fitted(load))
         self.contact.begin(self.displacement())
         self.evaluate()
-        self.linear.follow_pattern()
+        self.linear.follow()
         self.contact.begin(self.displacement())  # now that it is known which points touch
         if self.springs:
             self.springs.look()
@@ -113,6 +113,6 @@ class Equilibrium:
         self.largest_reaction = max(self.largest_reaction, self.evaluation.reaction_norm)
         if self.springs:
             self.springs.commit()
-        for points in self.diagnostics.points():
+        for points in self.evaluation.points():
             points.commit()
         self.contact.begin(self.displacement())

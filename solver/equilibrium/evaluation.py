@@ -12,6 +12,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.kernels.compat import ghosted_vector
 from archord.kernels.interrupt import Interrupt, Interrupted
+from archord.materials.material import Points
 from archord.report.timer import Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
@@ -114,6 +115,20 @@ class Evaluation:
         self.noise = of_bulk + np.sqrt(squared_noise)
         if interrupts:
             raise Interrupted(comm.allreduce(self.interrupt.received, op=MPI.MAX))
+
+    def points(self) -> list[Points]:
+        """The points of materials and of contact laws, in bulk and contact."""
+        parts = self.bulk, self.contact
+        return [points for part in parts for _, points in part.histories().values()]
+
+    def plastic_points(self) -> list[Points]:
+        """The points that can yield."""
+        return [points for points in self.points() if points.yields]
+
+    def yields(self) -> bool:
+        """Whether any point has left its elastic tangent, on any rank."""
+        here = any(points.flows.any() for points in self.plastic_points())
+        return self.unknowns.comm.allreduce(here, op=MPI.LOR)
 
     def lacking(self, load: float) -> Array:
         """What the conjugates of the unknown levels lack of their values at the ``load``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -17,7 +19,8 @@ from archord.solver.linear.strategy import Facts, Strategy
 class LinearSystem:
     """The tangent of the last ``evaluation`` and what solves with it. Collective.
 
-    ``choice`` names the strategies that the ``facts`` allow. ``tangent`` is the matrix of all
+    ``choice`` names the strategies that the ``facts`` allow; while no point has yielded, a system
+    that would be condensed if bodies were elastic is condensed. ``tangent`` is the matrix of all
     displacements; the unknown levels are in the ``border``, None without any. ``strategy`` solves
     for all unknowns.
     """
@@ -29,8 +32,11 @@ class LinearSystem:
         self.timer = timer
         self.facts = self._facts()
         self.choice = choose(self.facts)
-        condense = self._revise_condensed if self.choice.uses("condensed") else None
-        self.tangent = TangentMatrix(evaluation, timer, condense)
+        while_elastic = choose(replace(self.facts, yields=False))
+        self._awaits_yield = self.facts.yields and while_elastic.uses("condensed")
+        if self._awaits_yield:
+            self.choice = while_elastic
+        self.tangent = self._tangent()
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
             if self.unknowns.n_levels:
@@ -57,6 +63,10 @@ class LinearSystem:
             held=lambda: all(map(drives.held, self.evaluation.problem.bodies)),
         )
 
+    def _tangent(self) -> TangentMatrix:
+        condense = self._revise_condensed if self.choice.uses("condensed") else None
+        return TangentMatrix(self.evaluation, self.timer, condense)
+
     def _strategy(self) -> Strategy:
         if self.border:
             return self.border
@@ -75,15 +85,27 @@ class LinearSystem:
             with self.timer("assemble border"):
                 self.border.update(*self.tangent.border(), factorise=factorise)
 
-    def follow_pattern(self) -> bool:
-        """Replace the matrix where the pairs of the last evaluation slid out of its pattern;
-        returns whether."""
+    def follow(self) -> bool:
+        """Replace the matrix where the pairs of the last evaluation slid out of its pattern, or
+        where the first point yields; returns whether."""
+        if self._awaits_yield and self.evaluation.yields():
+            self._awaits_yield = False
+            self._solve_as_yielding()
+            return True
         if not self.evaluation.pattern_grew:
             return False
         self.tangent.renew()
         self.renew_factorisation()
         self.strategy = self._strategy()
         return True
+
+    def _solve_as_yielding(self) -> None:
+        """Replace the condensed system by the system of bodies that yield."""
+        factorisations = self.tangent.factorisations
+        self.choice = choose(self.facts)
+        self.tangent = self._tangent()
+        self.tangent.factorisations = factorisations
+        self.strategy = self._strategy()
 
     def renew_factorisation(self) -> None:
         """Take note that the tangent is another matrix, or has to be factorised once more."""

@@ -92,19 +92,10 @@ class NewtonSolver:
         self.tolerance = equilibrium.problem.tolerance
         self.max_iterations = equilibrium.problem.max_iterations
         self._system = equilibrium.linear
-        choice = self._system.choice
-        self._iterates = choice.uses("multigrid") and self._system.border is None
         bulk = equilibrium.bulk
         self._has_linear_bulk = not (bulk.plastic or bulk.finite)
-        self._lagged = Lagged() if choice.uses("lagged") else None
-        self._ahead: LookAhead | None = None
-        if choice.uses("look_ahead"):
-            self._ahead = LookAhead(
-                self._system.revise,
-                yields=equilibrium.bulk.plastic,
-                by_multigrid=choice.uses("multigrid"),
-            )
         self._ahead_rests = rests_while_bodies_yield(self._system.facts)
+        self._take_choice()
         for sums in _RANDOM_SUMS:
             PETSc.Options()[sums] = False
         n_points = sum(len(pair.active) for pair in equilibrium.contact.pairs)
@@ -115,6 +106,19 @@ class NewtonSolver:
             # by whether they search along the line
             self._solvers = {True: self._solver("bt"), False: self._solver("basic")}
             self._start_linear()
+
+    def _take_choice(self) -> None:
+        """Make what the chosen strategies need."""
+        self._choice = choice = self._system.choice
+        self._iterates = choice.uses("multigrid") and self._system.border is None
+        self._lagged = Lagged() if choice.uses("lagged") else None
+        self._ahead: LookAhead | None = None
+        if choice.uses("look_ahead"):
+            self._ahead = LookAhead(
+                self._system.revise,
+                yields=self.equilibrium.bulk.plastic,
+                by_multigrid=choice.uses("multigrid"),
+            )
 
     def _solver(self, line_search: str) -> PETSc.SNES:
         snes = PETSc.SNES().create(self.equilibrium.comm)
@@ -142,6 +146,8 @@ class NewtonSolver:
 
     def _attach(self) -> None:
         """Solve with the tangent as it is chosen."""
+        if self._system.choice is not self._choice:
+            self._take_choice()
         self._strategy = self._system.strategy
         for snes in self._solvers.values():
             snes.setJacobian(self._guarded(self._jacobian), *self._strategy.operators())
@@ -165,7 +171,7 @@ class NewtonSolver:
         self._result.krylov_iterations += krylov_iterations(ksp)
         if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
             return
-        if self._ahead_rests and self.equilibrium.diagnostics.yields():
+        if self._ahead_rests and self.equilibrium.evaluation.yields():
             return
         tolerance = ksp.getTolerances()[0] if self._iterates else 0.0
         iterations = self._ahead.improve(b, x, self._strategy.matrix, tolerance)

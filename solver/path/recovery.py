@@ -98,7 +98,7 @@ class Recovery:
         solve lets no point yield.
         """
         at = self.equilibrium
-        yielding = at.diagnostics.plastic_points()
+        yielding = at.evaluation.plastic_points()
         rubbing = [pair.points for pair in at.contact.pairs if pair.law.has_friction]
         yields = at.comm.allreduce(len(yielding)) > 0
         full_steps = (afar or at.bulk.finite) and not yields

@@ -76,7 +76,7 @@ class Cylinder:
         """Radius of the disc whose area inside the wall has yielded."""
         X, w = bulk_quadrature(self.V.mesh.basix_cell(), 2)
         weight = cell_basis(self.V.mesh, 2, self.cells.indices, X).measure * w
-        area = weight.ravel() @ (self.problem.diagnostics.plastic_points()[0].state.peeq > 0)
+        area = weight.ravel() @ (self.problem.evaluation.plastic_points()[0].state.peeq > 0)
         return np.sqrt(A**2 + 4 * area / np.pi)
 
 

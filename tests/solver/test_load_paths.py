@@ -120,7 +120,7 @@ def test_the_way_back_is_elastic():
 
     joint = solve(scene(H, 4, yield_stress=0.002)).joint
     equilibrium = joint.equilibrium
-    points = joint.equilibrium.diagnostics.plastic_points()
+    points = joint.equilibrium.evaluation.plastic_points()
     for p in points:
         p.acting = p.material.elastic()
     assert joint.solver.newton.solve(

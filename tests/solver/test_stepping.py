@@ -24,7 +24,7 @@ def test_a_failed_step_leaves_no_trace():
     solution = solve(scene(0.1, 2, yield_stress=0.002))
     joint = solution.joint
     equilibrium = joint.equilibrium
-    points = joint.equilibrium.diagnostics.plastic_points()
+    points = joint.equilibrium.evaluation.plastic_points()
     states = [p.state for p in points]
     before = [s.peeq.copy() for s in states]
     load = equilibrium.load

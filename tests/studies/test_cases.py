@@ -273,16 +273,18 @@ def test_examples_are_sound(tmp_path):
 
 
 def test_a_sweep_asks_for_less_than_a_scene_unless_it_says_so(tmp_path):
-    """No contact.h5, no checkpoint, a wider tolerance; what is solved already stays so."""
+    """No contact.h5, no checkpoint, no fields, a wider tolerance; what is solved already stays
+    so."""
 
     def asked(file: Path, *overrides: str) -> tuple[float, bool, bool]:
         scene = read_sweep(file, overrides).cases[0].scene
+        assert bool(scene.output.fields) == scene.output.contact
         return scene.analysis.tolerance, scene.output.contact, scene.output.checkpoint
 
     file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.006]")
     assert asked(file) == (1e-6, False, False)
     assert asked(file, "analysis.tolerance=1e-8") == (1e-8, False, False)
-    assert asked(file, "analysis.tolerance=none", "output.contact=true")[:2] == (1e-10, True)
+    assert asked(file, "analysis.tolerance=none", "output.contact=true", "output.fields=true")[:2] == (1e-10, True)
     folder = tmp_path / "solved"
     (folder / "cases").mkdir(parents=True)
     (folder / "sweep.toml").write_text(load_sweep(file).resolved())

@@ -121,11 +121,37 @@ def test_the_ranks_take_the_same_way(comm, pin):
     )
 
 
+@pytest.mark.mpi
+def test_joints_that_yield_are_condensed_until_then(comm, monkeypatch):
+    """The first steps take one factorisation, the next ones as many as without, on every rank."""
+    scene = paper_joint(0.08, 8, 0.002)
+    condensed = solve(scene, comm)
+    linear = condensed.joint.equilibrium.linear
+    assert linear.choice.uses("look_ahead")
+    assert linear.tangent.condensed is None
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
+    whole = solve(scene, comm)
+    factorisations = [
+        solved.joint.equilibrium.linear.tangent.factorisations for solved in (condensed, whole)
+    ]
+    yielding = [m["block peeq_max"] > 0 for m in whole.steps]
+    assert 0 < sum(yielding) < len(yielding)
+    assert factorisations[0] < factorisations[1]
+    for a, b in zip(condensed.steps, whole.steps, strict=True):
+        assert (a["P"], a["p0"], a["eps"]) == pytest.approx((b["P"], b["p0"], b["eps"]), rel=1e-9)
+
+
+def test_a_joint_that_never_yields_takes_one_factorisation():
+    strong = solve(paper_joint(0.1, 3, 1.0), MPI.COMM_SELF)
+    linear = strong.joint.equilibrium.linear
+    assert linear.tangent.condensed is not None
+    assert linear.tangent.factorisations == 1
+
+
 def test_only_joints_that_stay_elastic_and_held_are_condensed():
-    """Nothing that yields, floats, acts by force, or is large."""
+    """Nothing that floats, acts by force, or is large."""
     relative_force = {"displacement": None, "relative_force": 0.005}
     for scene in (
-        paper_joint(0.2, 1, 0.002),
         paper_joint(0.2, 1, load=relative_force),
         paper_joint(0.02, 1),
         paper_joint(0.2, 1, analysis={"gamma_factor": 10.0}),
