@@ -284,7 +284,9 @@ def test_a_sweep_asks_for_less_than_a_scene_unless_it_says_so(tmp_path):
     file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.006]")
     assert asked(file) == (1e-6, False, False)
     assert asked(file, "analysis.tolerance=1e-8") == (1e-8, False, False)
-    assert asked(file, "analysis.tolerance=none", "output.contact=true", "output.fields=true")[:2] == (1e-10, True)
+    assert asked(file, "analysis.tolerance=none", "output.contact=true", "output.fields=true")[
+        :2
+    ] == (1e-10, True)
     folder = tmp_path / "solved"
     (folder / "cases").mkdir(parents=True)
     (folder / "sweep.toml").write_text(load_sweep(file).resolved())
