@@ -269,14 +269,17 @@ def stored_energy(dents: Table, ex: float, ey: float) -> float:
     """The energy that the joint would give back from an accepted position, until it opens."""
     distance = math.sqrt(ex * ex + ey * ey)
     delta = distance - LENGTH
-    energy = beyond(distance, 1e300)
+    energy = 0.0
+    none = beyond(distance, 1e300)
     if delta > 0:
         if WITH_WAY_BACK:
             deepest, turn, bend = remembered(dents, math.atan2(ey, ex))
             energy = elastic_energy(delta, min(max(delta, deepest), NODES[LAST]))
+            none = none + beyond(deepest, 1e300)
         else:
             P, stiffness = curve(BACK, BACK_SLOPE, delta)
             energy = energy_of_back(delta, P, stiffness)
+    energy = energy + none
     return energy
 
 

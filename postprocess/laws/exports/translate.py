@@ -214,7 +214,7 @@ def in_octave(node: ast.FunctionDef, name: str) -> str:
     """The function in Matlab and Octave; tables are a persistent structure ``T``."""
     f = Signature.of(node)
     lines = [f"% {f.doc}"]
-    if _names(f.body) & TABLES:
+    if _names(f.body) & {*TABLES, "warn_outside"}:  # which asks the tables for their end
         lines += ["persistent T", "if isempty(T)", "    T = tables();", "end"]
     lines += OCTAVE.statements(f.body, "")
     head = f"function [{', '.join(f.outputs)}] = {f.name}({', '.join(f.inputs)})\n"

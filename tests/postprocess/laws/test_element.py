@@ -376,6 +376,9 @@ def test_within_the_clearance_nothing_acts() -> None:
         assert np.isnan(law.advance_element(memory, bad, 0.0)).all()
     nan = (np.nan,) * law.SECTORS
     assert np.isnan(law.element(nan, (0.06, 0.0))[0]).all()
+    assert np.isnan(
+        [law.stored_energy(nan, 0.06, 0.0), law.stored_energy(memory, np.inf, 0.0)]
+    ).all()
     assert np.isnan(law.advance_element(nan, 0.06, 0.0)).all()
 
 

@@ -124,6 +124,21 @@ def test_beyond_what_it_was_fitted_to_it_warns():
             assert np.isnan([*said, *module["force"](np.nan)]).all()
 
 
+def test_octave_has_the_formula_too(tmp_path):
+    """A function without tables knows where the range ends."""
+    if not shutil.which("octave-cli"):
+        pytest.skip("octave-cli is not here")
+    (tmp_path / "joint.m").write_text(export_law(ELASTIC, Path("joint.m")))
+    asked = "law = joint(); [P, S] = law.force(0.02, 0); [Q, T] = law.force(0.2, 0);"
+    script = f"warning('off', 'archord:outside'); {asked} printf('%.17g ', P, S, Q, T);"
+    command = ["octave-cli", "--quiet", "--norc", "--eval", script]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = [float(word) for word in done.stdout.split()]
+    with pytest.warns(LawRangeWarning):
+        wanted = [ELASTIC.force(0.02), ELASTIC.stiffness(0.02), ELASTIC.force(0.2), np.nan]
+    np.testing.assert_allclose(found, wanted, rtol=1e-14)
+
+
 def test_every_export_says_how_good_it_is():
     for suffix in ("py", "h", "mo", "m"):
         text = export_law(PLASTIC, Path(f"joint.{suffix}"))
