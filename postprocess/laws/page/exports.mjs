@@ -2,12 +2,17 @@
 
 import { shiftOf, storedEnergy } from "./dents.mjs";
 
-/** JSON with the blanks that Python's json.dumps leaves. */
-function spaced(value) {
-    if (Array.isArray(value)) return `[${value.map(spaced).join(", ")}]`;
-    if (value === null || typeof value !== "object") return JSON.stringify(value);
-    return `{${Object.entries(value).map(([key, own]) => `${JSON.stringify(key)}: ${spaced(own)}`).join(", ")}}`;
+/** JSON with the blanks that Python's json.dumps leaves; other words for a value by `words`. */
+function spaced(value, words = {}) {
+    const told = (own) => spaced(own, words);
+    if (Array.isArray(value)) return `[${value.map(told).join(", ")}]`;
+    if (typeof value === "string") return JSON.stringify(value);
+    if (value === null || typeof value !== "object") return words[value] ?? JSON.stringify(value);
+    return `{${Object.entries(value).map(([key, own]) => `${JSON.stringify(key)}: ${told(own)}`).join(", ")}}`;
 }
+
+/** A literal of Python. */
+const literal = (value) => spaced(value, { true: "True", false: "False", null: "None" });
 
 /** A number as Python prints it. */
 function exact(value) {
@@ -32,8 +37,8 @@ const filled = (form, words) =>
     form.replace(/\{\{|\}\}|\{(\w+)\}/g, (mark, word) => (word ? words[word] : mark[0]));
 
 const QUOTED = {
-    ".py": spaced,
-    ".mjs": spaced,
+    ".py": literal,
+    ".mjs": (about) => spaced(about),
     ".h": (about) => JSON.stringify(spaced(about)),
     ".mo": (about) => JSON.stringify(spaced(about)),
     ".m": (about) => `'${spaced(about).replaceAll("'", "''")}'`,

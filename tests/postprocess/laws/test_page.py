@@ -239,6 +239,17 @@ def test_files_of_the_page_are_those_of_the_exports(tmp_path):
             assert found == pytest.approx(numbers, rel=1e-8, abs=1e-10)
 
 
+def test_python_of_the_page_tells_its_joint_in_python(tmp_path):
+    """Truth and nothing included."""
+    joint = {"radius": 10.0, "clearance": 0.05, "E_star": 115e3, "plane": "strain", "nu": 0.3}
+    joint |= {"pin_share": 0.5, "friction": 0.1, "large_strain": True, "pin_yield": None}
+    asked = case(joint, (), [".py"]) | {"about": {"title": "a joint", "of": joint, "unit": "true"}}
+    [said] = in_javascript(tmp_path, [asked])["laws"]
+    module: dict[str, Any] = {}
+    exec(said["texts"][0], module)
+    assert module["ABOUT"] == asked["about"]
+
+
 def _words(text: str, number: str) -> str:
     """A text without its numbers, line ends and Python's quotes."""
     return " ".join(re.sub(number, "#", text).replace("'", '"').split())
