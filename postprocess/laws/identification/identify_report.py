@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,24 @@ _GAP = 3  # points before first touch that show where it is
 _RETURNED = 0.1  # share of the largest force by which the way back must leave first loading
 
 
+def as_read(found: Identification) -> Identification:
+    """``found`` with its offset as a reading of the file, whose displacements may have been turned
+    round."""
+    if not found.model.curve.turned:
+        return found
+    estimates = []
+    sign = np.ones(len(found.estimates))
+    for k, one in enumerate(found.estimates):
+        if one.unknown.name == OFFSET:
+            sign[k] = -1.0
+            own = one.unknown
+            unknown = replace(own, start=-own.start, low=-own.high, high=-own.low)
+            one = replace(one, unknown=unknown, value=-one.value, low=-one.high, high=-one.low)
+        estimates.append(one)
+    correlation = found.correlation * np.outer(sign, sign)
+    return replace(found, estimates=estimates, correlation=correlation)
+
+
 def units_of(found: Identification) -> dict[str, str]:
     """The units of displacement and force, and of each unknown."""
     scene = found.scene
@@ -47,7 +66,7 @@ def estimates_table(found: Identification) -> Table:
     """A row for each unknown."""
     units = units_of(found)
     table = Table("unknown", "unit", "value", "95 % interval", "error by the law", left=2)
-    for one in found.estimates:
+    for one in as_read(found).estimates:
         name = one.unknown.name
         interval = f"{one.low:.5g} .. {one.high:.5g}"
         table.add(name, units[name], f"{one.value:.5g}", interval, f"{one.by_law:.2g}")
@@ -57,9 +76,10 @@ def estimates_table(found: Identification) -> Table:
 def correlation_table(found: Identification) -> Table:
     """The correlations of the unknowns' errors."""
     names = [one.unknown.name for one in found.estimates]
+    correlation = as_read(found).correlation
     table = Table("correlation", *names, left=1)
     for k, name in enumerate(names):
-        table.add(name, *(f"{value:.2f}" for value in found.correlation[k, :]))
+        table.add(name, *(f"{value:.2f}" for value in correlation[k, :]))
     return table
 
 
@@ -83,6 +103,7 @@ def notes(found: Identification) -> list[str]:
 
 def doubts(found: Identification) -> list[str]:
     """What cannot be told, and what is outside of what the law knows, a sentence each."""
+    found = as_read(found)
     said = [*found.model.curve.said]
     for one in found.estimates:
         said += _doubts_of(one, found)
@@ -174,8 +195,14 @@ def _doubts_of_residuals(found: Identification) -> list[str]:
 
 
 def as_json(found: Identification) -> str:
-    """All numbers and sentences as JSON; null for what is unknown."""
+    """All numbers and sentences as JSON; null for what is unknown. The offset and the displacements
+    are readings of the file, delta and forces are positive in compression."""
+    found = as_read(found)
     units = units_of(found)
+    fixed = dict(found.model.fixed)
+    turn = -1.0 if found.model.curve.turned else 1.0
+    if OFFSET in fixed:
+        fixed[OFFSET] *= turn
     estimates = []
     for one in found.estimates:
         numbers = {"value": one.value, "low": one.low, "high": one.high, "by_law": one.by_law}
@@ -188,10 +215,10 @@ def as_json(found: Identification) -> str:
     data = {
         "estimates": estimates,
         "correlation": np.where(known, found.correlation, np.array(None)).tolist(),
-        "fixed": dict(found.model.fixed),
+        "fixed": fixed,
         "notes": notes(found),
         "doubts": doubts(found),
-        "displacement": curve.displacement.tolist(),
+        "displacement": (turn * curve.displacement).tolist(),
         "load": curve.load.tolist(),
         "law": found.predicted.load.tolist(),
         "delta": found.predicted.delta.tolist(),

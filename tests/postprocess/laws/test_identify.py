@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,11 @@ from archord.cli import run
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import identify
-from archord.postprocess.laws.identification.identify_report import doubts
+from archord.postprocess.laws.identification.identify_report import (
+    as_json,
+    doubts,
+    estimates_table,
+)
 from archord.postprocess.laws.identification.measured import MeasuredCurve, read_curve
 from archord.postprocess.laws.identification.unknowns import COMPLIANCE, OFFSET
 from archord.report.errors import InputError
@@ -234,8 +239,26 @@ def test_an_offset_is_a_reading_of_the_file(tmp_path):
         assert run([*words, "-o", str(out)]) == 0
         data = json.loads((out / "identified.json").read_text())
         found.append(data["estimates"][0]["value"])
-        assert data["fixed"][OFFSET] == OFF
+        assert data["fixed"][OFFSET] == sign * OFF
+        assert data["displacement"] == table[:, 0].tolist()
     assert found[1] == found[0] == pytest.approx(0.006, rel=0.03)
+
+
+def test_an_offset_that_is_found_is_a_reading_of_the_file():
+    """So that it can be given: all else is as of displacements of the other sign."""
+    curve = measured(ELASTIC, {"joint.clearance": 0.006}, 5, turns=(-0.1, 1.5), n=100, soft=0.0)
+    scene = archord.load_scene(ELASTIC)
+    found = identify(scene, curve, ["joint.clearance"], stiffness=np.inf)
+    turned = replace(found, model=replace(found.model, curve=replace(curve, turned=True)))
+    plain, told = (json.loads(as_json(one)) for one in (found, turned))
+    own, other = (data["estimates"][1] for data in (plain, told))
+    assert own["name"] == OFFSET
+    assert other["value"] == -own["value"] == pytest.approx(-OFF, abs=1e-3)
+    assert (other["low"], other["high"]) == (-own["high"], -own["low"])
+    assert told["estimates"][0] == plain["estimates"][0]
+    assert told["correlation"][0][1] == -plain["correlation"][0][1]
+    assert f"{-own['value']:.5g}" in str(estimates_table(turned))
+    assert told["delta"] == plain["delta"]
 
 
 def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
