@@ -204,9 +204,10 @@ class _Output:
 
                 self._of_fields = fields
                 self._mesh = fields.collect_mesh(self._order, self._at_points)
+        facts = account.facts()
         if comm.rank == 0:
             before = start.report if start else {}
-            self._report = Report(folder / "run.json", account, begun, self.steps, before)
+            self._report = Report(folder / "run.json", account, facts, begun, self.steps, before)
 
     def begin(self) -> tuple[Position | None, Work]:
         """Make the files, or write the step that the run goes on from, and give its state to the

@@ -6,7 +6,7 @@ import json
 import platform
 import resource
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -38,7 +38,8 @@ _INSIDE_SOLVE = (
 
 
 class Report:
-    """run.json of an ``account``; ``begun`` is the ``perf_counter`` from which the seconds count.
+    """run.json of an ``account``, with its ``facts``; ``begun`` is the ``perf_counter`` from which
+    the seconds count.
 
     ``steps`` are the steps of the run, also of the run that it goes on from, with the run.json
     ``before``; whoever appends one to them calls `add`.
@@ -48,6 +49,7 @@ class Report:
         self,
         path: Path,
         account: Account,
+        facts: Mapping[str, Any],
         begun: float,
         steps: list[Record],
         before: dict[str, Any],
@@ -85,7 +87,7 @@ class Report:
             },
             "ranks": ranks,
             "peak_memory": [],
-            **account.facts(),
+            **facts,
             "tolerances": {
                 "newton": self.system.problem.tolerance,
                 "gamma_factor": account.scene.analysis.gamma_factor,

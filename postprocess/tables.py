@@ -192,6 +192,8 @@ def facts_of(run: Run) -> Iterator[tuple[str, str]]:
     cells = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')}"
     counts = f"{cells} of degree {run.scene.analysis.degree}, {mesh.get('dofs', '?')} dofs"
     yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
+    if worst := mesh.get("worst_cells"):
+        yield "worst cells", ", ".join(f"{name} {value:.2f}" for name, value in worst.items())
 
 
 def history_table(run: Run) -> Table:

@@ -7,11 +7,14 @@ from typing import NamedTuple
 
 import basix
 import numpy as np
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 
 from archord.geometry.basis import Array, bulk_quadrature, lagrange_element, tabulate
 from archord.geometry.meshes.cells import corners_of, distinct, entities_of, sides_of
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
+from archord.kernels.compat import cell_nodes
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 # Smallest over largest jacobian below which a cell is told of. Cells below -0.02 are refused: the
@@ -168,6 +171,19 @@ def quality(mesh: MeshArrays) -> Quality:
     """How good the cells of ``mesh`` are."""
     smallest, largest = smallest_determinants(mesh)
     return Quality(smallest / largest, _widths(mesh) / _REGULAR[mesh.kind])
+
+
+def worst_cells(mesh: Mesh) -> dict[str, float]:
+    """The smallest values of `Quality`, by their names, of a distributed ``mesh``. Collective."""
+    dimension = mesh.topology.dim
+    own = cell_nodes(mesh)[: mesh.topology.index_map(dimension).size_local]
+    no_tags = np.zeros(len(own), dtype=np.int32)
+    no_facets = np.zeros((0, dimension), dtype=np.int32)
+    x = mesh.geometry.x[:, :dimension]
+    good = quality(MeshArrays(x, mesh.basix_cell(), own, no_tags, no_facets, no_tags[:0]))
+    worst = np.array([values.min(initial=np.inf) for values in good])
+    mesh.comm.Allreduce(MPI.IN_PLACE, worst, op=MPI.MIN)
+    return dict(zip(Quality._fields, map(float, worst), strict=True))
 
 
 def _widths(mesh: MeshArrays) -> Array:
