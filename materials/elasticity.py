@@ -23,7 +23,8 @@ def von_mises(stress: Array) -> Array:
     """Von Mises stress ``(...,)`` of stresses ``(..., 4)``, or ``(..., 6)`` in space."""
     xx, yy, zz, *shears = np.moveaxis(stress, -1, 0)
     differences = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.sqrt(0.5 * differences + 3 * sum(shear**2 for shear in shears))
+    of_shears = sum(shear**2 for shear in shears)
+    return np.sqrt(0.5 * differences + 3 * of_shears)
 
 
 def mean_stress(stress: Array) -> Array:
@@ -45,7 +46,8 @@ def principal_stresses(stress: Array) -> tuple[Array, Array]:
         return np.linalg.eigvalsh(tensors)[..., ::-1], angle
     middle = (xx + yy) / 2
     radius = np.hypot((xx - yy) / 2, xy)
-    values = np.sort(np.stack([middle + radius, middle - radius, zz], axis=-1), axis=-1)
+    unsorted = np.stack([middle + radius, middle - radius, zz], axis=-1)
+    values = np.sort(unsorted, axis=-1)
     return values[..., ::-1], angle
 
 

@@ -143,8 +143,9 @@ class LargeStrain(Material):
         normal = np.array([float(place < 3) for place in m.working])
         if m.kinematics.is_thin:
             # it follows the stress, which hardly depends on it: its derivative is left out
-            elastic_stress = m.update(strain, state)[0]
-            volume = (1 - 2 * m.nu) / m.E * elastic_stress[:, :2].sum(axis=1)
+            elastic_stress, *_ = m.update(strain, state)
+            trace = elastic_stress[:, :2].sum(axis=1)
+            volume = (1 - 2 * m.nu) / m.E * trace
         else:
             volume = strain @ normal
         scaled = replace(m, hardening=Scaled(m.hardening, np.exp(volume)))
@@ -157,10 +158,12 @@ class LargeStrain(Material):
             return stress, moduli, new
         # a yield stress that grows makes the deviator grow with it
         mean = stress[:, :3].mean(axis=1)
-        deviator = stress - mean[:, None] * TRACE[: stress.shape[1]] - m.centre(new)
+        spherical = mean[:, None] * TRACE[: stress.shape[1]]
+        deviator = stress - spherical - m.centre(new)
         slope = scaled.hardening.slope(new.peeq) + m.stiffening(state, new)
         _, mu = m.lame
-        grown = m.flows(state, new) / (1 + slope / (3 * mu))
+        hardened = 1 + slope / (3 * mu)
+        grown = m.flows(state, new) / hardened
         by_volume = (grown[:, None] * deviator)[:, m.working]
         return stress, moduli + by_volume[:, :, None] * normal, new
 
@@ -172,7 +175,9 @@ class LargeStrain(Material):
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
         """Elastic energy per undeformed volume ``(n,)`` after an update to the gradients ``strain``
         and ``state``."""
-        return self.energy(self._logarithmic(_logarithm(strain).strain, state)[0])
+        logarithm = _logarithm(strain)
+        T, *_ = self._logarithmic(logarithm.strain, state)
+        return self.energy(T)
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
         """Cauchy's stress ``(n, n_stress)`` after an update to the gradients ``strain``, the
@@ -180,7 +185,8 @@ class LargeStrain(Material):
         logarithm = _logarithm(strain)
         T, _, _ = self._logarithmic(logarithm.strain, state)
         compliance = (1 - 2 * self.inner.nu) / self.inner.E
-        J = np.exp(compliance * T[:, :3].sum(axis=1))
+        trace = T[:, :3].sum(axis=1)
+        J = np.exp(compliance * trace)
         return logarithm.kirchhoff(stress, T) / J[:, None]
 
 
@@ -193,9 +199,9 @@ def _logarithm(gradient: Array) -> Logarithm | SpatialLogarithm:
 def _deformation(gradient: Array) -> tuple[Array, Array, Array, Array]:
     """``F_xx, F_xy, F_yx, F_yy`` ``(n,)`` of displacement gradients; not a number where what is
     deformed is turned inside out."""
-    xx, yy, xy, yx = gradient.T[:4]
+    xx, yy, xy, yx, *hoops = gradient.T
     is_right = (1 + xx) * (1 + yy) > xy * yx
-    for hoop in gradient.T[4:]:
+    for hoop in hoops:
         is_right &= hoop > -1
     one = np.where(is_right, 1.0, np.nan)
     return one + xx, one * xy, one * yx, one + yy
@@ -243,8 +249,10 @@ class Logarithm:
         E_2 = 0.5 * np.log1p(more - radius)
         E_xx = cos**2 * E_1 + sin**2 * E_2
         E_yy = sin**2 * E_1 + cos**2 * E_2
-        hoop = np.log1p(np.where(gradient.T[4:] > -1, gradient.T[4:], np.nan))
-        self.strain = np.stack([E_xx, E_yy, *hoop, 2 * cos * sin * (E_1 - E_2)], axis=1)
+        shear = 2 * cos * sin * (E_1 - E_2)
+        hoops = gradient.T[4:]
+        known = np.where(hoops > -1, hoops, np.nan)
+        self.strain = np.stack([E_xx, E_yy, *np.log1p(known), shear], axis=1)
 
     def _divide(self, mean: Array, radius: Array) -> None:
         """Divided differences of the logarithm at the eigenvalues ``mean +- radius`` of C."""
@@ -256,12 +264,18 @@ class Logarithm:
         swapped = polyval(-x, _MIXED)
         far = x >= _NEAR
         y = x[far]
-        ratio[far] = np.arctanh(y) / y
-        mixed[far] = (1 / (1 + y) - ratio[far]) / y
-        swapped[far] = (ratio[far] - 1 / (1 - y)) / y
-        self._first = 0.5 / one, 0.5 / two, 0.5 * ratio / mean
+        exact = np.arctanh(y) / y
+        ratio[far] = exact
+        mixed[far] = (1 / (1 + y) - exact) / y
+        swapped[far] = (exact - 1 / (1 - y)) / y
+        g_11 = 0.5 / one
+        g_22 = 0.5 / two
+        g_12 = 0.5 * ratio / mean
+        self._first = g_11, g_22, g_12
+        g_111 = -0.25 / one**2
+        g_222 = -0.25 / two**2
         quarter = 0.25 / mean**2
-        self._second = -0.25 / one**2, -0.25 / two**2, quarter * mixed, quarter * swapped
+        self._second = g_111, g_222, quarter * mixed, quarter * swapped
 
     def nominal(self, T: Array, moduli: Array) -> tuple[Array, Array]:
         """The nominal stress ``(n, k_gradient)`` and its derivative by the gradient, from ``T``
@@ -274,7 +288,11 @@ class Logarithm:
         T_11, T_22, T_12 = np.einsum("nij,nj->in", self._to_axes, T[:, [0, 1, -1]])
         g_11, g_22, g_12 = self._first
         weight = np.stack(self._first, axis=1)
-        work = np.stack([g_11 * T_11, g_22 * T_22, 2 * g_12 * T_12], axis=1)
+        # half the second Piola-Kirchhoff stress
+        S_11 = g_11 * T_11
+        S_22 = g_22 * T_22
+        S_12 = g_12 * T_12
+        work = np.stack([S_11, S_22, 2 * S_12], axis=1)
         # takes strains along the axes to engineering ones along x and y
         turn = self._back * np.array([1.0, 1.0, 2.0])[:, None]
         slope = turn @ (weight[:, :, None] * Q)
@@ -283,7 +301,7 @@ class Logarithm:
         stress = np.einsum("nik,ni->nk", Q, work)
         tangent = np.swapaxes(slope, 1, 2) @ M @ slope
         tangent += np.swapaxes(Q, 1, 2) @ self._bent(T_11, T_22, T_12) @ Q
-        tangent += self._turning(g_11 * T_11, g_22 * T_22, g_12 * T_12)
+        tangent += self._turning(S_11, S_22, S_12)
         if T.shape[1] == 3:
             return stress, tangent
         return self._with_hoop(stress, tangent, slope, T, moduli)
@@ -318,11 +336,12 @@ class Logarithm:
         zero = np.zeros_like(T_11)
         first = 2 * g_112 * T_12
         second = 2 * g_122 * T_12
+        shear = 2 * (g_112 * T_11 + g_122 * T_22)
         return _table(
             [
                 [2 * g_111 * T_11, zero, first],
                 [zero, 2 * g_222 * T_22, second],
-                [first, second, 2 * (g_112 * T_11 + g_122 * T_22)],
+                [first, second, shear],
             ]
         )
 
@@ -346,20 +365,18 @@ class Logarithm:
         P_tt = T[:, 2] / stretch
         by_hoop = np.einsum("nik,ni->nk", slope, moduli[:, in_plane, 2])
         of_hoop = np.einsum("ni,nik->nk", moduli[:, 2, in_plane], slope)
+        stiffness = moduli[:, 2, 2] / stretch
         whole = np.empty((len(T), 5, 5))
         whole[:, :4, :4] = tangent
         whole[:, :4, 4] = by_hoop / stretch[:, None]
         whole[:, 4, :4] = of_hoop / stretch[:, None]
-        whole[:, 4, 4] = (moduli[:, 2, 2] / stretch - P_tt) / stretch
+        whole[:, 4, 4] = (stiffness - P_tt) / stretch
         return np.column_stack([stress, P_tt]), whole
 
 
 def _rotation(cos: Array, sin: Array) -> Array:
     """Takes the components [xx, yy, xy] of a tensor to axes that are turned, ``(n, 3, 3)``."""
-    return _table(
-        [
-            [cos * cos, sin * sin, 2 * cos * sin],
-            [sin * sin, cos * cos, -2 * cos * sin],
-            [-cos * sin, cos * sin, cos * cos - sin * sin],
-        ]
-    )
+    cc = cos * cos
+    ss = sin * sin
+    cs = cos * sin
+    return _table([[cc, ss, 2 * cs], [ss, cc, -2 * cs], [-cs, cs, cc - ss]])

@@ -139,24 +139,28 @@ class KinematicMaterial(J2Material):
             stress, tangent, new = self._return(whole, state)
         rows, columns = np.ix_(self.working, self.working)
         flows = self.flows(state, new)[:, None, None]
-        return stress, np.where(flows, tangent[:, rows, columns], self.elastic_tangent), new
+        working = np.where(flows, tangent[:, rows, columns], self.elastic_tangent)
+        return stress, working, new
 
     def _plane_stress(
         self, strain: Array, old: KinematicState
     ) -> tuple[Array, Array, KinematicState]:
         """`_return` at the ``eps_zz`` at which ``s_zz`` vanishes, which increases with it."""
-        modulus = self.lame[0] + 2 * self.lame[1]
+        lam, mu = self.lame
+        modulus = lam + 2 * mu
 
         def off(z: Array) -> tuple:
             strain[:, 2] = z
             stress, tangent, new = self._return(strain, old)
+            stiffness = tangent[:, 2, 2]
             strains = (np.abs(strain) + np.abs(old.plastic_strain)).sum(axis=1)
-            close = 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains
-            return stress[:, 2], tangent[:, 2, 2], close / tangent[:, 2, 2], stress, tangent, new
+            round_off = 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains
+            return stress[:, 2], stiffness, round_off / stiffness, stress, tangent, new
 
         elastic = strain - old.plastic_strain * _TWICE[:4]
         in_plane = elastic[:, 0] + elastic[:, 1]
-        start = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * in_plane
+        thinner = self.nu / (1 - self.nu) * in_plane
+        start = old.plastic_strain[:, 2] - thinner
         far = np.full(len(strain), 1e100)
         _, (_, _, _, *found) = bracketed_newton(off, start, -far, far)
         return tuple(found)
@@ -175,8 +179,9 @@ class KinematicMaterial(J2Material):
         stress = trial + pressure[:, None] * trace
         elastic_tangent = bulk * np.outer(trace, trace) + 2 * mu * deviator
         tangent = np.tile(elastic_tangent, (len(strain), 1, 1))
-        from_centre = trial - old.back_stress.sum(axis=1)
-        p = beyond(np.sqrt(1.5) * _norm(from_centre), self.hardening, old.peeq)
+        from_centre = trial - self.centre(old)
+        mises = np.sqrt(1.5) * _norm(from_centre)
+        p = beyond(mises, self.hardening, old.peeq)
         if not len(p):
             return stress, tangent, old
         hardening = self.hardening.at(p)
@@ -189,8 +194,10 @@ class KinematicMaterial(J2Material):
         # the flow turns with the trial stress, and grows with the increment
         steep = np.sqrt(6) * mu
         shrunk = steep * grown.d_peeq / length
-        turned = deviator - n[:, :, None] * n[:, None, :]
-        aside = grown.rate - _dot(grown.rate, n)[:, None] * n
+        dyad = n[:, :, None] * n[:, None, :]
+        turned = deviator - dyad
+        along = _dot(grown.rate, n)
+        aside = grown.rate - along[:, None] * n
         drift = steep * n + shrunk[:, None] * aside
         stretch = (steep / grown.fall)[:, None] * drift
         tangent[p] -= shrunk[:, None, None] * 2 * mu * turned
@@ -234,9 +241,10 @@ class KinematicMaterial(J2Material):
     ) -> _Increment:
         """The increment of PEEQ at which ``sqrt(1.5) |eta| = (3 mu + sum of theta C) d_peeq + yield
         stress``."""
-        mu = self.lame[1]
+        _, mu = self.lame
         C, gamma = self._moduli
-        high = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
+        at_most = _norm(trial) + _norm(back).sum(axis=1)
+        high = np.sqrt(1.5) * at_most / (3 * mu)
         close = 1e-14 * high
 
         def off(d_peeq: Array) -> tuple:
@@ -246,9 +254,11 @@ class KinematicMaterial(J2Material):
             length = _norm(eta)
             after = peeq + d_peeq
             strength = hardening.stress(after)
-            value = (3 * mu + theta @ C) * d_peeq + strength - np.sqrt(1.5) * length
+            given_way = (3 * mu + theta @ C) * d_peeq
+            value = given_way + strength - np.sqrt(1.5) * length
             hardened = 3 * mu + theta**2 @ C + hardening.slope(after)
-            fall = hardened - np.sqrt(1.5) * _dot(rate, eta) / length
+            longer = np.sqrt(1.5) * _dot(rate, eta) / length
+            fall = hardened - longer
             return value, fall, close, theta, eta, rate
 
         start = np.zeros(len(trial))
@@ -263,7 +273,9 @@ class KinematicMaterial(J2Material):
     def stiffening(self, old: PlasticState, new: PlasticState) -> Array:
         """By how much their sum moves per PEEQ, but for the recovery of what was there before."""
         C, gamma = self._moduli
-        return (1 / (1 + gamma * (new.peeq - old.peeq)[:, None]) ** 2) @ C
+        d_peeq = new.peeq - old.peeq
+        theta_squared = 1 / (1 + gamma * d_peeq[:, None]) ** 2
+        return theta_squared @ C
 
     def dissipation(self, state: State) -> Array:
         """Plastic work density ``(n,)``, with what the back stresses store."""

@@ -183,6 +183,10 @@ class Kinematics:
         """Rigid motions, which make no strain."""
         return len(self._components.slides) + len(self.turns)
 
+    def moments(self, arm: Array, force: Array) -> list[Array]:
+        """Moments ``(n,)`` of forces ``(n, d)`` at arms ``(n, d)``, of each of the `turns`."""
+        return [arm[:, i] * force[:, j] - arm[:, j] * force[:, i] for i, j in self.turns]
+
     def rigid_motions(self, x: Array) -> Array:
         """Displacements ``(n_rigid, n, d)`` of the rigid motions at the positions ``x`` ``(n, d)``:
         along the axes, around an axis only along it, and the turns about the origin."""

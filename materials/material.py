@@ -16,9 +16,8 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 import numpy.typing as npt
 
-from archord.materials.kinematics import Kinematics, Plane
+from archord.materials.kinematics import Array, Kinematics, Plane
 
-Array = npt.NDArray[np.floating]
 __all__ = ["Array", "Material", "Plane", "Points", "State"]
 State = Any
 

@@ -35,8 +35,10 @@ STEEP = 1e3
 _NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
 _STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
 # eigenvectors and eigenvalues of P on normal stresses, in plane stress and else
-_IN_PLANE = np.array([[1, 1], [-1, 1]]) / np.sqrt([[2], [2]]), [1 / 3, 1.0]
-_NORMAL = np.array([[1, 1, 1], [-1, 1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]]), [0.0, 1.0, 1.0]
+_TWO = np.array([[1, 1], [-1, 1]]) / np.sqrt([[2], [2]])
+_IN_PLANE = _TWO, [1 / 3, 1.0]
+_THREE = np.array([[1, 1, 1], [-1, 1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]])
+_NORMAL = _THREE, [0.0, 1.0, 1.0]
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,13 @@ def _eigensystem(kinematics: Kinematics) -> tuple[list[int], Array, Array]:
     """The components of a stress on which the map works, and the eigenvectors and eigenvalues of P
     on them."""
     normal, deviator = _IN_PLANE if kinematics.is_thin else _NORMAL
-    shears = list(range(3, kinematics.n_stress))
-    parts = [*range(len(deviator)), *shears]
+    n_normal = len(deviator)
+    shears = range(3, kinematics.n_stress)
+    parts = [*range(n_normal), *shears]
     Q = np.eye(len(parts))
-    Q[: len(deviator), : len(deviator)] = normal
-    return parts, Q, np.array([*deviator, *[2.0] * len(shears)])
+    Q[:n_normal, :n_normal] = normal
+    of_shears = [2.0] * len(shears)
+    return parts, Q, np.array(deviator + of_shears)
 
 
 def return_map(
@@ -78,13 +82,15 @@ def return_map(
     stress[:, parts] = elastic[:, parts] @ C
     tangent = np.tile(m.elastic_tangent, (len(strain), 1, 1))
     trial = stress[:, parts] @ Q.T
-    p = beyond(np.sqrt(1.5 * trial**2 @ deviator), hardening, old.peeq)
+    mises = np.sqrt(1.5 * trial**2 @ deviator)
+    p = beyond(mises, hardening, old.peeq)
     if not len(p):
         return stress, tangent, old
     hardening = hardening.at(p)
-    zeta, q = plastic_multiplier(trial[p], 1.5 * deviator, compliance, hardening, old.peeq[p])
+    trial = trial[p]
+    zeta, q = plastic_multiplier(trial, 1.5 * deviator, compliance, hardening, old.peeq[p])
     shrink = 1 + zeta[:, None] * compliance
-    sigma = (trial[p] / shrink) @ Q
+    sigma = (trial / shrink) @ Q
     stress[p[:, None], parts] = sigma
 
     flow = sigma @ P
@@ -123,7 +129,8 @@ def _consistent_tangent(softened: Array, flow: Array, zeta: Array, q: Array, slo
     along = np.einsum("nij,nj->ni", softened, flow)
     work = np.einsum("ni,ni->n", flow, along)
     left = 1 - 2 / 3 * slope * zeta
-    factor = left / (left * work + 4 / 9 * slope * q**2)
+    hardened = 4 / 9 * slope * q**2
+    factor = left / (left * work + hardened)
     return softened - factor[:, None, None] * along[:, :, None] * along[:, None, :]
 
 
@@ -157,12 +164,14 @@ def plastic_multiplier(
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
         value = 1 / q - 1 / strength
         slope = fall / q**2 + rise / strength**2
-        close = 1e-10 * (zeta + 1 / compliance.max())
+        close = 1e-10 * (zeta + 1 / largest)
         return value, slope, close
 
+    largest = compliance.max()
     start = np.zeros(len(a))
     anywhere = np.full(len(a), np.inf)
-    steep = STEEP * compliance.max() / np.sqrt(a**2 @ weights)
+    trial_mises = np.sqrt(a**2 @ weights)
+    steep = STEEP * largest / trial_mises
     zeta, (value, slope, close) = bracketed_newton(off, start, start, anywhere, steep)
     # so short a step of Newton's leaves nothing but round-off
     last = np.clip(value / slope, -close, close)

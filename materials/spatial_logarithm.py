@@ -70,7 +70,7 @@ class SpatialLogarithm:
         metric = self._metric()  # (n, 6, 9)
         to_axes = self._to_axes()
         T_axes = np.einsum("nij,nj->ni", to_axes, T)
-        first = self._first[:, _ROWS, _COLUMNS]
+        first = _components(self._first)
         half = first * T_axes  # of the second Piola-Kirchhoff stress along the principal axes
         stress = np.einsum("nki,nk->ni", metric, half)
         slope = first[:, :, None] * to_axes
@@ -97,7 +97,8 @@ class SpatialLogarithm:
         """``dC/dF`` ``(n, 6, 9)`` along the principal axes, with engineering shear."""
         deformed = (self._F @ self._axes)[:, _COMPONENT]  # (n, 9, 3)
         along = self._axes[:, _DERIVATIVE]
-        return np.swapaxes(_symmetric_products(deformed, along) * ENGINEERING, 1, 2)
+        products = _symmetric_products(deformed, along)
+        return np.swapaxes(products * ENGINEERING, 1, 2)
 
     def _to_axes(self) -> Array:
         """Takes a stress ``(n, 6)`` to the principal axes, ``(n, 6, 6)``."""
@@ -115,7 +116,9 @@ class SpatialLogarithm:
 
 def _symmetric_products(a: Array, b: Array) -> Array:
     """Components ``(n, k, 6)`` of ``a b^T + b a^T`` of vectors ``(n, k, 3)``."""
-    return a[..., _ROWS] * b[..., _COLUMNS] + a[..., _COLUMNS] * b[..., _ROWS]
+    product = a[..., _ROWS] * b[..., _COLUMNS]
+    transposed = a[..., _COLUMNS] * b[..., _ROWS]
+    return product + transposed
 
 
 def _components(tensors: Array) -> Array:
@@ -136,14 +139,16 @@ def _first_differences(values: Array) -> Array:
     ``artanh(x) / x`` over their sum, with x half their difference over their mean."""
     one = values[:, :, None]
     two = values[:, None, :]
-    x = np.abs(one - two) / (one + two)
+    total = one + two
+    x = np.abs(one - two) / total
     square = x**2
     ratio = np.zeros_like(x)
     for k in reversed(range(_TERMS // 2)):
         ratio = ratio * square + 1 / (2 * k + 1)
     far = x >= _NEAR
-    ratio[far] = np.arctanh(x[far]) / x[far]
-    return ratio / (one + two)
+    y = x[far]
+    ratio[far] = np.arctanh(y) / y
+    return ratio / total
 
 
 def _second_differences(values: Array, first: Array) -> Array:
@@ -156,7 +161,8 @@ def _second_differences(values: Array, first: Array) -> Array:
         spread = triple[:, 2] - triple[:, 0]
         near = spread < _NEAR * triple.mean(axis=1)
         between = np.where(near, 1.0, spread)
-        difference = (first[:, j, k] - first[:, i, j]) / between
+        rise = first[:, j, k] - first[:, i, j]
+        difference = rise / between
         difference[near] = _series(triple[near])
         for a, b, c in permutations((i, j, k)):
             found[:, a, b, c] = difference
@@ -171,7 +177,8 @@ def _series(triples: Array) -> Array:
     of their relative distances from m, which follows from their symmetric functions.
     """
     mean = triples.mean(axis=1)
-    a, b, c = (triples / mean[:, None] - 1).T
+    distances = triples / mean[:, None] - 1
+    a, b, c = distances.T
     pairs = a * b + b * c + c * a
     product = a * b * c
     sums = [np.ones_like(mean), np.zeros_like(mean), -pairs]
