@@ -13,11 +13,10 @@ import numpy.typing as npt
 
 from archord.geometry.vectors import crossed
 from archord.kernels.compat import cell_degree, cell_nodes
+from archord.materials.kinematics import Array
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
-
-Array = npt.NDArray[np.floating]
 
 CONTACT_POINTS = 4  # Gauss points a contact facet
 TRIANGLE = basix.CellType.triangle

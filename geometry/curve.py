@@ -87,7 +87,9 @@ def lagrange(degree: int) -> Array:
     """Monomial coefficients ``(degree + 1, degree + 1)`` of the Lagrange polynomials of equispaced
     nodes in [0, 1]."""
     nodes = np.linspace(0.0, 1.0, degree + 1)
-    return np.ascontiguousarray(np.linalg.inv(np.vander(nodes, increasing=True)).T)
+    monomials = np.vander(nodes, increasing=True)
+    inverse = np.linalg.inv(monomials)
+    return np.ascontiguousarray(inverse.T)
 
 
 def in_pieces(start: np.ndarray, end: np.ndarray, height: Array) -> np.ndarray:
@@ -119,17 +121,19 @@ class Curve:
         self.X = X
         self.degree = degree
         if connectivity is None:
-            connectivity = np.arange(0, len(X) - 1, degree)[:, None] + np.arange(degree + 1)
+            begins = np.arange(0, len(X) - 1, degree)
+            connectivity = begins[:, None] + np.arange(degree + 1)
         self.connectivity = connectivity.astype(np.int32)
         self.n_facets = len(connectivity)
         first = self.connectivity[:, 0]
         last = self.connectivity[:, -1]
+        facets = np.arange(self.n_facets)
         starting, ending = np.full((2, len(X)), -1, dtype=np.int32)
-        starting[first] = np.arange(self.n_facets)
-        ending[last] = np.arange(self.n_facets)
+        starting[first] = facets
+        ending[last] = facets
         self.before = ending[first]
         self.after = starting[last]
-        follows = self.before[1:] == np.arange(self.n_facets - 1)
+        follows = self.before[1:] == facets[:-1]
         self._first = np.flatnonzero(~follows) + 1  # facet of each piece but one
         self._coefficients = lagrange(degree)
 
@@ -142,7 +146,8 @@ class Curve:
         """Shape functions and their derivatives, ``(..., degree + 1)`` each, at ``xi``."""
         k = np.arange(self.degree + 1)
         at = xi[..., None]
-        powers = np.stack([at**k, k * at ** np.maximum(k - 1, 0)])
+        derivatives = k * at ** np.maximum(k - 1, 0)
+        powers = np.stack([at**k, derivatives])
         # one product of two matrices: numpy would multiply point by point
         flat = powers.reshape(-1, self.degree + 1) @ self._coefficients.T
         value, slope = flat.reshape(powers.shape)
@@ -156,8 +161,10 @@ class Curve:
         ends_free = self.after < 0
         earlier = np.where(starts_free, np.arange(self.n_facets), self.before)
         x = np.concatenate([start, end[ends_free]])
-        step = np.concatenate([end - start[earlier], (end - start)[ends_free]])
-        outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
+        at_starts = end - start[earlier]
+        at_ends = (end - start)[ends_free]
+        step_x, step_y = np.concatenate([at_starts, at_ends]).T
+        outward = np.stack([step_y, -step_x], axis=1)
         return x, unit(outward)
 
     def arc_length(self, xi: Array) -> Array:
@@ -165,7 +172,8 @@ class Curve:
         each facet."""
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
         ends = np.concatenate([xi, np.ones((self.n_facets, 1))], axis=1)
-        _, slope = self.shapes(ends[..., None] * (_PLACES + 1) / 2)
+        places = ends[..., None] * (_PLACES + 1) / 2
+        _, slope = self.shapes(places)
         tangent = np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope)
         lengths = (np.linalg.norm(tangent, axis=-1) @ _WEIGHTS) * ends / 2
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
@@ -182,15 +190,17 @@ class Curve:
             for _ in range(rings):
                 facet = np.where(facet < 0, -1, adjacent[facet])
                 near.append(facet)
-        ring, place = np.nonzero(np.array(near) >= 0)
-        return place, np.array(near)[ring, place]
+        rows = np.array(near)
+        ring, place = np.nonzero(rows >= 0)
+        return place, rows[ring, place]
 
     def nearest_facet(self, x: Array, displacement: Array) -> Index:
         """Facet ``(m,)`` of the displaced curve of whose sample points one comes nearest to each of
         ``x`` ``(m, 2)``."""
         places = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+        shape, _ = self.shapes(places)
         nodes = (self.X + displacement)[self.connectivity]
-        samples = np.einsum("qa,fai->fqi", self.shapes(places)[0], nodes).reshape(-1, 2)
+        samples = np.einsum("qa,fai->fqi", shape, nodes).reshape(-1, 2)
         half_square = 0.5 * (samples**2).sum(1)
         nearest = np.empty(len(x), dtype=np.int64)
         n_parts = 1 + len(x) * len(samples) // 4_000_000  # by their memory
@@ -290,7 +300,8 @@ def circle_through(x: Array) -> tuple[Array, float] | None:
         return None
     centre, radius = nearest_circle(x)
     size = np.ptp(x, axis=0).max()
-    off = np.abs(np.linalg.norm(x - centre, axis=1) - radius).max()
+    distances = np.linalg.norm(x - centre, axis=1)
+    off = np.abs(distances - radius).max()
     is_line = _ROUND * radius > size
     if off > _ROUND * size or is_line:
         return None

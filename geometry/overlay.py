@@ -32,7 +32,8 @@ def broken_facets(own: Patches, opposite: Patches) -> tuple[Index, Array]:
     facet, other = _overlying(own, opposite)
     corners = opposite.corner_points()[other]
     n_corners = corners.shape[1]
-    xi = own.coordinates(corners.reshape(-1, 3), np.repeat(facet, n_corners))
+    facet_of_corners = np.repeat(facet, n_corners)
+    xi = own.coordinates(corners.reshape(-1, 3), facet_of_corners)
     window = own.reference_corners()
     counts = np.bincount(facet, minlength=own.n_facets)
     overlay: dict[str, int | np.ndarray] = {
@@ -43,15 +44,15 @@ def broken_facets(own: Patches, opposite: Patches) -> tuple[Index, Array]:
         "first": np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         "polygons": xi,
     }
+    given = structure(_SOURCE, "Overlay", overlay)
+    kernel = library(_SOURCE).broken_facets
     most = 0
     needed = 8 * own.n_facets + 2 * len(facet)
     while needed > most:
         most = needed
         broken = np.empty(most, dtype=np.int32)
         pieces = np.empty((most, len(window), 2))
-        needed = library(_SOURCE).broken_facets(
-            structure(_SOURCE, "Overlay", overlay), most, pointer(broken), pointer(pieces)
-        )
+        needed = kernel(given, most, pointer(broken), pointer(pieces))
     return broken[:needed], pieces[:needed]
 
 
@@ -85,7 +86,8 @@ def piece_rule(pieces: Array, degree: int) -> tuple[Array, Array]:
     if pieces.shape[1] == 3:
         X, w = basix.make_quadrature(basix.CellType.triangle, degree)
         sides = pieces[:, 1:] - start
-        return start + X @ sides, np.abs(np.linalg.det(sides))[:, None] * w
+        size = np.abs(np.linalg.det(sides))
+        return start + X @ sides, size[:, None] * w
     X, w = basix.make_quadrature(basix.CellType.quadrilateral, degree + 1)
     s, t = X.T[..., None]
     one, opposite, two = (pieces[:, k, None] - start for k in (1, 2, 3))

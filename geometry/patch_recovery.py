@@ -72,15 +72,17 @@ class PatchRecovery:
         alone = outside.copy()  # on the boundary, without a neighbour inside
         alone[inward[:, 0]] = False
         own = np.flatnonzero(~outside | alone)
-        wanted, source = np.concatenate([inward, np.column_stack([own, own])]).T
+        by_themselves = np.column_stack([own, own])
+        wanted, source = np.concatenate([inward, by_themselves]).T
 
         self._powers = _powers(degree, nodes.shape[1])
         self._is_point = np.logical_and.reduce(np.isfinite(points), axis=-1)
         points = np.where(self._is_point[..., None], points, 0.0)
         vertex, self._cell = _patches(cells, outside, alone)
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
+        centres = vertex[self._first]
         self._patch = np.zeros(n_vertices, dtype=np.int64)
-        self._patch[vertex[self._first]] = np.arange(len(self._first))
+        self._patch[centres] = np.arange(len(centres))
         ray = points[self._cell] - nodes[vertex][:, None]
         self._fit_patches(ray, self._patch[vertex], alone[vertex])
         self._mean_of_vertices(nodes, between, wanted, source)
@@ -94,12 +96,14 @@ class PatchRecovery:
         self._scale = np.sqrt(size)
         near = 1 / (_CORE + square / size[patch][:, None])
         weight = np.where(wide[:, None], near, 1.0) * is_point
-        monomials = self._monomials(ray / self._scale[patch][:, None, None])
+        scale = self._scale[patch]
+        monomials = self._monomials(ray / scale[:, None, None])
         weighted = np.swapaxes(monomials * weight[..., None], 1, 2)
         moments = np.add.reduceat(weighted @ monomials, self._first)
         trace = np.trace(moments, axis1=1, axis2=2)
         moments += _SINGULAR * trace[:, None, None] * np.eye(moments.shape[1])
-        self._fit = np.linalg.inv(moments)[patch] @ weighted
+        inverse = np.linalg.inv(moments)
+        self._fit = inverse[patch] @ weighted
 
     def _mean_of_vertices(
         self,
@@ -120,12 +124,15 @@ class PatchRecovery:
         self._start = np.flatnonzero(np.diff(node, prepend=-1))
         self._source = self._patch[source]
         scale = self._scale[self._source]
-        value = self._monomials((nodes[node] - nodes[source]) / scale[:, None])
-        self._value = value / (n_ends[node] * n_sources)[:, None]
+        from_centre = nodes[node] - nodes[source]
+        value = self._monomials(from_centre / scale[:, None])
+        n_terms = n_ends[node] * n_sources
+        self._value = value / n_terms[:, None]
 
     def _monomials(self, y: Array) -> Array:
         powers = np.ones((self._powers.max() + 1, *y.shape))
-        np.cumprod(np.broadcast_to(y, powers[1:].shape), axis=0, out=powers[1:])
+        above_zero = powers[1:]
+        np.cumprod(np.broadcast_to(y, above_zero.shape), axis=0, out=above_zero)
         monomials = []
         for of_axes in self._powers:
             factors = [powers[power, ..., axis] for axis, power in enumerate(of_axes)]
@@ -145,7 +152,8 @@ def _powers(degree: int, dimension: int) -> np.ndarray:
     powers = np.indices((degree + 1,) * dimension).reshape(dimension, -1).T
     total = powers.sum(axis=1)
     order = np.lexsort((*-powers.T[::-1], total))
-    return powers[order[total[order] <= degree]]
+    chosen = order[total[order] <= degree]
+    return powers[chosen]
 
 
 def _boundary(
@@ -183,12 +191,14 @@ def _patches(
     """The vertices and the cells ``(p,)`` of their patches: one layer around vertices inside, two
     around those on the boundary that are ``alone``."""
     n_cells, k = cells.shape
-    around = np.argsort(cells.ravel(), kind="stable")
-    vertex = cells.ravel()[around]
+    vertices = cells.ravel()
+    around = np.argsort(vertices, kind="stable")
+    vertex = vertices[around]
     cell = around // k
     wide = np.repeat(alone[vertex], k)
     centre = np.repeat(vertex, k)[wide]
-    place, second = _joined(cells[cell].ravel()[wide], vertex, cell)
+    first_layer = cells[cell].ravel()[wide]
+    place, second = _joined(first_layer, vertex, cell)
     both_layers = np.unique(centre[place] * n_cells + second)
     wide_vertex, wide_cell = np.divmod(both_layers, n_cells)
     inside = ~outside[vertex]
@@ -198,8 +208,10 @@ def _patches(
 def _joined(keys: np.ndarray, of: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """All ``items`` ``of`` each of ``keys``, in turn, and the place in ``keys`` of each."""
     order = np.argsort(of, kind="stable")
-    first = np.searchsorted(of[order], keys)
-    count = np.searchsorted(of[order], keys, "right") - first
+    rising = of[order]
+    first = np.searchsorted(rising, keys)
+    count = np.searchsorted(rising, keys, "right") - first
     place = np.repeat(np.arange(len(keys)), count)
     shift = first + count - np.cumsum(count)
-    return place, items[order[np.arange(len(place)) + shift[place]]]
+    found = np.arange(len(place)) + shift[place]
+    return place, items[order[found]]

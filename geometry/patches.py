@@ -134,13 +134,16 @@ class Patches:
 
     def corner_shapes(self, xi: Array) -> Array:
         """Linear, or bilinear, functions ``(m, e)`` of the corners in turn at ``xi`` ``(m, 2)``."""
-        element = element_of(self.cell, len(self.reference_corners()))
-        return element.tabulate(0, np.ascontiguousarray(xi))[0, :, list(_CORNERS[self.cell]), 0].T
+        in_turn = list(_CORNERS[self.cell])
+        element = element_of(self.cell, len(in_turn))
+        values = element.tabulate(0, np.ascontiguousarray(xi))
+        return values[0, :, in_turn, 0].T
 
     def areas(self) -> Array:
         """Area ``(n_facets,)`` of each facet."""
         xi, w = basix.make_quadrature(self.cell, 2 * self.degree)
-        tangent = np.einsum("fai,qca->fqci", self.X[self.connectivity], self.shapes(xi)[1])
+        _, slope = self.shapes(xi)
+        tangent = np.einsum("fai,qca->fqci", self.X[self.connectivity], slope)
         product = np.cross(tangent[:, :, 0], tangent[:, :, 1])
         return np.linalg.norm(product, axis=-1) @ w
 
@@ -154,7 +157,8 @@ class Patches:
             row, column = np.nonzero(across >= 0)
             place = np.concatenate([place, place[row]])
             near = np.concatenate([near, across[row, column]])
-            place, near = np.divmod(np.unique(place * self.n_facets + near), self.n_facets)
+            pairs = np.unique(place * self.n_facets + near)
+            place, near = np.divmod(pairs, self.n_facets)
         return place, near
 
     def nearest_facet(self, x: Array, displacement: Array) -> Index:
@@ -163,8 +167,9 @@ class Patches:
         from scipy.spatial import cKDTree  # a plane problem does not pay for it
 
         xi, _ = basix.make_quadrature(self.cell, 4)
+        shape, _ = self.shapes(xi)
         nodes = (self.X + displacement)[self.connectivity]
-        samples = np.einsum("qa,fai->fqi", self.shapes(xi)[0], nodes)
+        samples = np.einsum("qa,fai->fqi", shape, nodes)
         _, nearest = cKDTree(samples.reshape(-1, 3)).query(x)
         return nearest // len(xi)
 
@@ -205,10 +210,9 @@ class Patches:
         margin = np.full(self.beyond.shape, _FAR)
         members = self._members(np.zeros_like(self.X), margin)
         xi = np.empty((len(x), 2))
+        patches = structure(_SOURCE, "Patches", members)
         arrays = np.ascontiguousarray(x), facet.astype(np.int32, copy=False), xi
-        library(_SOURCE).coordinates_on_patches(
-            structure(_SOURCE, "Patches", members), len(x), *map(pointer, arrays)
-        )
+        library(_SOURCE).coordinates_on_patches(patches, len(x), *map(pointer, arrays))
         return xi
 
     def _members(self, displacement: Array, margin: Array) -> dict[str, int | np.ndarray]:
@@ -231,7 +235,7 @@ class Patches:
 
     def corner_points(self) -> Array:
         """The vertices ``(n_facets, e, 3)`` of the facets, in the order in which edges follow."""
-        return self.X[self.connectivity[:, list(_CORNERS[self.cell])]]
+        return self.X[self.vertices]
 
     def reference_corners(self) -> Array:
         """Corners ``(e, 2)`` of the reference facet, anticlockwise."""
@@ -240,12 +244,14 @@ class Patches:
     def spheres(self) -> tuple[Array, Array, Array]:
         """Middle ``(n_facets, 3)`` of each facet, the unit normal there, and the radius
         ``(n_facets,)`` of a sphere about the middle that holds its nodes."""
-        shape, slope = self.shapes(self.reference_corners().mean(axis=0)[None])
+        at = self.reference_corners().mean(axis=0)
+        [shape], [slope] = self.shapes(at[None])
         nodes = self.X[self.connectivity]
-        middle = shape[0] @ nodes
-        by_s, by_t = (slope[0][:, None, None] @ nodes[None])[:, :, 0]
-        radius = np.linalg.norm(nodes - middle[:, None], axis=2).max(axis=1)
-        return middle, unit(np.cross(by_s, by_t)), radius
+        middle = shape @ nodes
+        by_s, by_t = (slope[:, None, None] @ nodes[None])[:, :, 0]
+        normal = unit(np.cross(by_s, by_t))
+        distances = np.linalg.norm(nodes - middle[:, None], axis=2)
+        return middle, normal, distances.max(axis=1)
 
     def _project(
         self,
@@ -259,19 +265,17 @@ class Patches:
         """Closest points on the facets ``home`` and at most so many ``others`` from there on, each
         continued by its ``margin``."""
         members = self._members(displacement, margin)
+        patches = structure(_SOURCE, "Patches", members)
         partners = PatchProjection.empty(len(x), self.connectivity.shape[1])
         points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
         start = home.astype(np.int32, copy=False)
         results: list[np.ndarray] = list(vars(partners).values())
         on_nodes = results.pop()
         first_lost = np.zeros(1, dtype=np.int32)
-        n_lost = library(_SOURCE).closest_on_patches(
-            structure(_SOURCE, "Patches", members),
-            len(x),
-            *map(pointer, (*points, start)),
-            others,
-            *map(pointer, (*results, first_lost)),
-        )
+        given = map(pointer, (*points, start))
+        found = map(pointer, (*results, first_lost))
+        kernel = library(_SOURCE).closest_on_patches
+        n_lost = kernel(patches, len(x), *given, others, *found)
         if n_lost:
             at = "({:g}, {:g}, {:g})".format(*x[first_lost[0]])
             raise ProjectionError(
@@ -293,4 +297,5 @@ def _monomials(element: basix.finite_element.FiniteElement) -> tuple[Index, Arra
     exponents = np.array(powers, dtype=np.int32)
     nodes = element.points
     values = np.prod(nodes[:, None] ** exponents, axis=-1)
-    return exponents, np.ascontiguousarray(np.linalg.inv(values).T)
+    inverse = np.linalg.inv(values)
+    return exponents, np.ascontiguousarray(inverse.T)

@@ -90,10 +90,12 @@ def distinct(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     They have no direction.
     """
-    number, *others = np.sort(corners.astype(np.int64), axis=1).T
+    rising = np.sort(corners.astype(np.int64), axis=1)
+    number, *others = rising.T
     first = np.zeros(0, dtype=np.int64)
     for other in others:
-        number = number * (other.max(initial=0) + 1) + other
+        n_others = other.max(initial=0) + 1
+        number = number * n_others + other
         _, first, number = np.unique(number, return_index=True, return_inverse=True)
     return first, number
 
@@ -105,23 +107,28 @@ def corners_of(kind: basix.CellType, sides: np.ndarray) -> np.ndarray:
 
 def sides_among(kind: basix.CellType, sides: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Whether each of the ``sides`` ``(k, b)`` is one of the ``others`` ``(j, b)``."""
-    _, which = distinct(np.concatenate([corners_of(kind, sides), corners_of(kind, others)]))
-    return np.isin(which[: len(sides)], which[len(sides) :])
+    together = np.concatenate([corners_of(kind, sides), corners_of(kind, others)])
+    _, which = distinct(together)
+    own, of_others = np.split(which, [len(sides)])
+    return np.isin(own, of_others)
 
 
 def sides_between(kind: basix.CellType, cells: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Which of `sides_of` ``cells`` has each row of ``corners`` ``(k, c)``; where none has, a
     number beyond them."""
     sides = sides_of(kind, cells)
-    first, which = distinct(np.concatenate([corners_of(kind, sides), corners]))
-    return first[which[len(sides) :]]
+    together = np.concatenate([corners_of(kind, sides), corners])
+    first, which = distinct(together)
+    wanted = which[len(sides) :]
+    return first[wanted]
 
 
 def outer_sides(kind: basix.CellType, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The sides ``(k, b)`` of ``cells`` that belong to one cell alone, and that cell ``(k,)``."""
     sides = sides_of(kind, cells)
     first, which = distinct(corners_of(kind, sides))
-    alone = first[np.bincount(which) == 1]
+    n_cells = np.bincount(which)
+    alone = first[n_cells == 1]
     return sides[alone], alone // n_sides(kind)
 
 

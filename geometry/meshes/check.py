@@ -149,7 +149,8 @@ def cracks(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
     near = _SAME * np.ptp(mesh.x, axis=0).max()
     pairs = cKDTree(mesh.x[nodes]).query_pairs(near, output_type="ndarray")
     if len(pairs):
-        at = place(mesh.x[nodes[pairs[0, 0]]])
+        first = nodes[pairs[0, 0]]
+        at = place(mesh.x[first])
         yield (
             f"the body {body!r} has {len(pairs)} pairs of nodes at the same place, as at {at}: a "
             "crack, if not merged"
@@ -164,14 +165,17 @@ def holes(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
     nodes, number = np.unique(ends, return_inverse=True)
     number = number.reshape(-1, 2)
     joined = coo_matrix((np.ones(len(ends)), number.T), shape=(len(nodes), len(nodes)))
-    loop = connected_components(joined, directed=False)[1][number[:, 0]]
-    outermost = loop[mesh.x[ends, 0].max(axis=1).argmax()]
+    _, loop_of_node = connected_components(joined, directed=False)
+    loop = loop_of_node[number[:, 0]]
+    farthest = mesh.x[ends, 0].max(axis=1).argmax()
+    outermost = loop[farthest]
     named = sides_among(mesh.kind, sides, mesh.facets)
     small = np.bincount(loop) == n_sides(mesh.kind)
     small &= np.bincount(loop, weights=named) == 0
     small[outermost] = False
     if small.any():
-        at = place(mesh.x[ends[loop == small.argmax()]].mean(axis=(0, 1)))
+        around_first = ends[loop == small.argmax()]
+        at = place(mesh.x[around_first].mean(axis=(0, 1)))
         found = f"{small.sum()} holes of the size of one cell, as at {at}"
         yield f"the body {body!r} has {found}: {_NO_CELL}"
     pinched = nodes[np.bincount(number.ravel()) > 2]
@@ -188,7 +192,8 @@ def facets_within(mesh: MeshArrays, name: str) -> Iterator[str]:
     facets = mesh.facets_of(name)
     within = ~_outside(mesh, facets)
     if within.any() and not within.all():
-        at = place(mesh.x[corners_of(mesh.kind, facets[within])[0]].mean(axis=0))
+        first, *_ = corners_of(mesh.kind, facets[within])
+        at = place(mesh.x[first].mean(axis=0))
         yield (
             f"the facet set {name!r} has {within.sum()} of its {len(facets)} facets inside a body, "
             f"as at {at}"
@@ -201,8 +206,10 @@ def gaps(mesh: MeshArrays, name: str) -> Iterator[str]:
     if mesh.dimension != 2:
         return
     outer, _ = outer_sides(mesh.kind, mesh.cells)
-    of_none = outer[~sides_among(mesh.kind, outer, mesh.facets), :2]
-    between = of_none[np.isin(of_none, mesh.facets[:, :2]).all(axis=1)]
+    has_set = sides_among(mesh.kind, outer, mesh.facets)
+    of_none = outer[~has_set, :2]
+    meets_sets = np.isin(of_none, mesh.facets[:, :2])
+    between = of_none[meets_sets.all(axis=1)]
     direction = {
         int(node): mesh.x[end] - mesh.x[start]
         for start, end in mesh.facets_of(name)[:, :2]
@@ -247,9 +254,11 @@ def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
             return
         radii.append(radius)
         start, middle, end = np.swapaxes(polygons[:, :: PIECES // 2], 0, 1)
-        sagitta = ((end - start) ** 2).sum(axis=1) / (8 * radius)
+        squared_chord = ((end - start) ** 2).sum(axis=1)
+        sagitta = squared_chord / (8 * radius)
         bulge = np.linalg.norm(middle - (start + end) / 2, axis=1)
-        deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
+        is_straight = bulge < sagitta / 2
+        deepest = max(deepest, sagitta[is_straight].max(initial=0.0))
     radii += [radius for radius in pair if not isinstance(radius, str)]
     if deepest < _ROUND_OFF * radii[0]:
         return

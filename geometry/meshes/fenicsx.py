@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -127,8 +127,7 @@ def _made(
     if quads:
         options["RecombinationAlgorithm"] = _ALL_QUADS
     with own_gmsh() as gmsh:
-        for name, value in options.items():
-            gmsh.option.setNumber(f"Mesh.{name}", value)
+        set_mesh_options(gmsh, options)
         build(gmsh)
         gmsh.model.mesh.generate(gmsh_dimension(gmsh))
         for _ in range(refinements):
@@ -140,6 +139,12 @@ def _made(
         mesh = mesh.second_order()
     mesh = on_circles(mesh, circles)
     return mesh.centred() if quads else mesh
+
+
+def set_mesh_options(gmsh: Any, options: Mapping[str, float]) -> None:
+    """Give gmsh these ``options`` of its mesh, by their names without "Mesh."."""
+    for name, value in options.items():
+        gmsh.option.setNumber(f"Mesh.{name}", value)
 
 
 @contextmanager

@@ -36,8 +36,10 @@ def smallest_determinants(mesh: MeshArrays) -> tuple[Array, Array]:
     d = mesh.dimension
     degree = d * (mesh.order - 1) if is_simplex(mesh.kind) else d * mesh.order - 1
     n_values = len(mesh.cells) * len(_points(mesh.kind, degree))
-    pieces = np.array_split(mesh.cells, 1 + n_values // _AT_ONCE)
-    found = [_extremes(mesh.kind, _determinants(mesh, cells, degree), degree) for cells in pieces]
+    found = []
+    for cells in np.array_split(mesh.cells, 1 + n_values // _AT_ONCE):
+        values = _determinants(mesh, cells, degree)
+        found.append(_extremes(mesh.kind, values, degree))
     smallest, largest = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return smallest, largest
 
@@ -97,7 +99,8 @@ def _bernstein_of_values(kind: basix.CellType, degree: int) -> Array:
         rest = degree - powers.sum(axis=0)
         first = np.prod(X ** powers[:, None], axis=0)
         last = (1 - X.sum(axis=0)) ** rest
-        values = _choose(degree, *powers, rest) * first * last
+        choices = _choose(degree, *powers, rest)
+        values = choices * first * last
     else:
         along = [_choose(degree, i, degree - i) * x**i for x, i in zip(X, powers, strict=True)]
         back = np.prod((1 - X) ** (degree - powers[:, None]), axis=0)

@@ -93,27 +93,23 @@ class MeshArrays:
         _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
         kept = np.sort(first)
         place_of = np.searchsorted(kept, first[which.ravel()])
-        members = np.split(place_of, np.cumsum([len(nodes) for nodes in listed])[:-1])
-        numbers, x, _ = gmsh.model.mesh.getNodes()
-        order = np.argsort(numbers)
+        ends = np.cumsum([len(nodes) for nodes in listed])
+        members = np.split(place_of, ends[:-1])
+        node_tags, x, _ = gmsh.model.mesh.getNodes()
+        order = np.argsort(node_tags)
 
         def place(found: np.ndarray) -> np.ndarray:
-            return np.searchsorted(numbers, found, sorter=order)
+            return np.searchsorted(node_tags, found, sorter=order)
 
-        kind = basix.CellType[name.split()[0].lower()]
-        x, cells = in_basix_order(kind, x.reshape(-1, 3)[order], place(cells[kept]), perm_gmsh)
-        return cls.of_sets(
-            kind,
-            x,
-            cells,
-            dict(zip(groups, members, strict=True)),
-            {name: place(corners_of(kind, group.nodes)) for name, group in facets.items()},
-            {name: np.unique(place(group.nodes)) for name, group in points.items()},
-            (
-                {name: group.tag for name, group in groups.items()},
-                {name: group.tag for name, group in facets.items()},
-            ),
-        )
+        word, *_ = name.split()
+        kind = basix.CellType[word.lower()]
+        places = x.reshape(-1, 3)[order]
+        x, cells = in_basix_order(kind, places, place(cells[kept]), perm_gmsh)
+        cell_sets = dict(zip(groups, members, strict=True))
+        facet_sets = {name: place(corners_of(kind, own.nodes)) for name, own in facets.items()}
+        point_sets = {name: np.unique(place(own.nodes)) for name, own in points.items()}
+        numbers = _tags(groups), _tags(facets)
+        return cls.of_sets(kind, x, cells, cell_sets, facet_sets, point_sets, numbers)
 
     @classmethod
     def of_sets(
@@ -187,7 +183,8 @@ class MeshArrays:
         """This mesh with the nodes ``x`` and ``cells`` of another order that lie where this one's
         lie."""
         corners = corners_of(self.kind, self.facets)
-        facets = sides_of(self.kind, cells)[sides_between(self.kind, self.cells, corners)]
+        numbers = sides_between(self.kind, self.cells, corners)
+        facets = sides_of(self.kind, cells)[numbers]
         return replace(self, x=x, cells=cells, facets=facets)
 
     def centred(self, kept: np.ndarray = _NONE) -> MeshArrays:
@@ -195,7 +192,8 @@ class MeshArrays:
         but for nodes that are ``kept``."""
         x = self.x.copy()
         for dim in range(2, self.dimension + 1):
-            weights = inner_weights(basix.cell.subentity_types(self.kind)[dim][0], self.order)
+            kind, *_ = basix.cell.subentity_types(self.kind)[dim]
+            weights = inner_weights(kind, self.order)
             n_inner = len(weights)
             if n_inner:
                 entities = entities_of(self.kind, self.cells, dim)
@@ -219,19 +217,22 @@ def _one_tag_each(
     """
     none = np.zeros(0, dtype=np.int64)
     members = np.concatenate([none, *sets.values()]).astype(np.int64)
-    of_set = np.repeat(np.arange(len(sets)), [len(found) for found in sets.values()])
+    sizes = [len(found) for found in sets.values()]
+    set_of = np.repeat(np.arange(len(sets)), sizes)
     distinct, first, which = np.unique(members, return_index=True, return_inverse=True)
     within = np.zeros((len(distinct), len(sets)), dtype=bool)
-    within[which, of_set] = True
+    within[which, set_of] = True
     given = np.array([numbers[name] for name in sets], dtype=np.int32)
-    tag = given[of_set[first]]
+    tag = given[set_of[first]]
     several = within.sum(axis=1) > 1
     together, combination = np.unique(within[several], axis=0, return_inverse=True)
-    new = given.max(initial=0) + 1 + np.arange(len(together), dtype=np.int32)
+    next_tag = given.max(initial=0) + 1
+    new = next_tag + np.arange(len(together), dtype=np.int32)
     tag[several] = new[combination.ravel()]
     tags = {}
     for name, inside in zip(sets, within.T, strict=True):
-        tags[name] = tuple(np.unique(tag[inside]).tolist())
+        of_set = np.unique(tag[inside])
+        tags[name] = tuple(of_set.tolist())
     order = np.argsort(first)
     return distinct[order], tag[order], tags
 
@@ -243,6 +244,10 @@ class _Group(NamedTuple):
     tag: int
     types: set[int]
     nodes: np.ndarray
+
+
+def _tags(groups: Mapping[str, _Group]) -> dict[str, int]:
+    return {name: group.tag for name, group in groups.items()}
 
 
 def _groups(gmsh, dim: int) -> dict[str, _Group]:
@@ -297,7 +302,8 @@ def gmsh_dimension(gmsh) -> int:
 def coordinates(x: Array, dimension: int) -> Array:
     """The first ``dimension`` coordinates of ``x`` ``(n, 2 or 3)``. Raises ValueError where the
     third one differs in a plane, and for nan."""
-    if not np.isfinite(x).all() or not np.abs(x).max(initial=0) < _FAR:
+    farthest = np.abs(x).max(initial=0)
+    if not farthest < _FAR:  # nor of nan
         raise ValueError("some nodes have coordinates that are not finite or beyond 1e30")
     size = np.ptp(x, axis=0)
     if dimension == 2 and len(size) == 3 and size[2] > _THICK * size[:2].max():
@@ -307,7 +313,7 @@ def coordinates(x: Array, dimension: int) -> Array:
     return x[:, :dimension]
 
 
-def one_kind(nodes: set[int], dimension: int = 2) -> int:
+def one_kind(nodes: set[int], dimension: int) -> int:
     """The number of ``nodes`` of all cells. Raises ValueError if there is not one."""
     if len(nodes) == 1:
         return nodes.pop()

@@ -34,9 +34,11 @@ def free_motions(
     free = np.zeros(matrix.shape[1:], dtype=bool)
     # rotations first, which translations can be a part of, then translations alone
     is_translation = np.array([not motion.startswith("rotation") for motion in motions])
-    for kept in (np.ones_like(is_translation), is_translation):
+    all_motions = np.ones_like(is_translation)
+    for kept in (all_motions, is_translation):
         of_kept = matrix[:, :, kept]
-        reduced = np.linalg.qr(of_kept.reshape(len(matrix), -1), mode="r")
+        conditions = of_kept.reshape(len(matrix), -1)
+        reduced = np.linalg.qr(conditions, mode="r")
         modes = null_space(reduced, rcond=_FREE)
         moves = (np.abs(modes) > _FREE).any(axis=1)
         free[:, kept] = moves.reshape(of_kept.shape[1:])
@@ -47,7 +49,8 @@ def _prevented(bodies: Sequence[str], links: Links, motions: Sequence[str]) -> A
     """How much every unit motion of every body violates each condition of the ``links``: a matrix
     ``(conditions, bodies, motions)``. A body that is held links to itself. Rotations are about a
     body's first point, and lengths are in sizes of the largest link."""
-    size = max((np.ptp(x, axis=0).max() for _, _, x, _ in links), default=0.0) or 1.0
+    sizes = [np.ptp(x, axis=0).max() for _, _, x, _ in links]
+    size = max(sizes, default=0.0) or 1.0
     centre = {body: x[0] for a, b, x, _ in reversed(links) for body in (a, b)}
     blocks = [np.zeros((1, len(bodies), len(motions)))]
     for a, b, x, n in links:
@@ -66,7 +69,8 @@ def _along(n: Array, x: Array, motions: Sequence[str]) -> Array:
         return n
     moved: dict[str, Array] = dict(zip("xyz", n.T, strict=False))
     if x.shape[1] == 3:
-        moved |= zip(SPACE[3:], np.cross(x, n).T, strict=True)
+        moments = np.cross(x, n)
+        moved |= zip(SPACE[3:], moments.T, strict=True)
     else:
         moved["rotation"] = crossed(x, n)
     return np.column_stack([moved[motion] for motion in motions])

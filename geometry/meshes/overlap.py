@@ -29,7 +29,9 @@ Inside = Mapping[str, np.ndarray]  # which cells ``(n,)`` are in each body
 def polygons(mesh: MeshArrays, edges: np.ndarray) -> Array:
     """Points ``(k, pieces + 1, d)`` on ``edges`` ``(k, b)``."""
     order = edges.shape[1] - 1
-    shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(np.linspace(0, 1, PIECES + 1))
+    places = np.linspace(0, 1, PIECES + 1)
+    edge = Curve(np.zeros((order + 1, 2)), order)
+    shape, _ = edge.shapes(places)
     return np.einsum("qa,kai->kqi", shape, mesh.x[along(edges)])
 
 
@@ -51,18 +53,21 @@ class _Outline(NamedTuple):
         polygon = polygons(mesh, sides)
         start = polygon[:, :-1].reshape(-1, 2)
         end = polygon[:, 1:].reshape(-1, 2)
-        return cls(np.concatenate([mesh.x[sides[:, 0]], middles]), start, end)
+        corners = mesh.x[sides[:, 0]]
+        return cls(np.concatenate([corners, middles]), start, end)
 
     def contains(self, x: Array) -> np.ndarray:
         """Whether points ``(k, 2)`` lie within: a ray to the right crosses an odd number of
         pieces."""
         to = x[:, None] - self.start
-        piece = self.end - self.start
+        piece_x, piece_y = (self.end - self.start).T
         # one and the same comparison for both ends, so that it is exact where pieces meet
-        below_start = x[:, None, 1] < self.start[:, 1]
-        below_end = x[:, None, 1] < self.end[:, 1]
-        left = to[..., 0] * piece[:, 1] < to[..., 1] * piece[:, 0]
-        crosses = (below_start != below_end) & (left == (piece[:, 1] > 0))
+        height = x[:, None, 1]
+        below_start = height < self.start[:, 1]
+        below_end = height < self.end[:, 1]
+        left = to[..., 0] * piece_y < to[..., 1] * piece_x
+        is_right = left == (piece_y > 0)
+        crosses = (below_start != below_end) & is_right
         return crosses.sum(axis=1) % 2 == 1
 
     @property
@@ -73,8 +78,10 @@ class _Outline(NamedTuple):
     def depth(self, x: Array, allowed: float, into: float) -> Array:
         """How deep points ``(k, 2)`` lie within, 0 outside and where it is no more than
         ``allowed``, and the part ``into`` of the side next to them."""
-        spare = allowed + into * PIECES * np.linalg.norm(self.end - self.start, axis=1)
-        parts = np.array_split(x, 1 + len(x) * len(spare) // _AT_ONCE)
+        lengths = np.linalg.norm(self.end - self.start, axis=1)
+        spare = allowed + into * PIECES * lengths
+        n_parts = 1 + len(x) * len(spare) // _AT_ONCE
+        parts = np.array_split(x, n_parts)
         return np.concatenate([self._depth(few, spare) * self.contains(few) for few in parts])
 
     def _depth(self, x: Array, spare: Array) -> Array:
@@ -82,7 +89,8 @@ class _Outline(NamedTuple):
         that piece has to ``spare`` ``(s,)``."""
         to = x[:, None] - self.start
         piece = self.end - self.start
-        xi = np.clip((to * piece).sum(axis=2) / (piece**2).sum(axis=1), 0, 1)
+        along = (to * piece).sum(axis=2) / (piece**2).sum(axis=1)
+        xi = np.clip(along, 0, 1)
         away = np.linalg.norm(to - xi[..., None] * piece, axis=2)
         nearest = away.argmin(axis=1)
         depth = away.min(axis=1)
@@ -107,8 +115,10 @@ class _Hull(NamedTuple):
         middles = mesh.x[cells[behind]].mean(axis=1)
         patches = Patches(mesh.x, sides, side_kind(mesh.kind), mesh.order)
         at, normal, _ = patches.spheres()
-        outward = np.sign(((at - middles) * normal).sum(axis=1))
-        return cls(np.concatenate([mesh.x[sides[:, 0]], middles]), patches, outward)
+        along_normal = ((at - middles) * normal).sum(axis=1)
+        outward = np.sign(along_normal)
+        corners = mesh.x[sides[:, 0]]
+        return cls(np.concatenate([corners, middles]), patches, outward)
 
     @property
     def extent(self) -> Array:

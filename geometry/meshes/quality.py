@@ -44,7 +44,8 @@ def place(x: Array) -> str:
 def _place_of(mesh: MeshArrays, cell: int) -> str:
     """The middle of a ``cell`` and the sets that have it."""
     names = [repr(name) for name, tags in mesh.cell_sets.items() if mesh.bodies[cell] in tags]
-    middle = place(mesh.x[mesh.cells[cell]].mean(axis=0))
+    nodes = mesh.x[mesh.cells[cell]]
+    middle = place(nodes.mean(axis=0))
     return f"{middle} in {' and '.join(names)}" if names else middle
 
 
@@ -68,7 +69,8 @@ def _crowded(mesh: MeshArrays) -> Iterator[str]:
     first, which = distinct(corners_of(mesh.kind, sides))
     crowded = first[np.bincount(which) > 2]
     if len(crowded):
-        at = place(mesh.x[sides[crowded[0]]].mean(axis=0))
+        first_side = mesh.x[sides[crowded[0]]]
+        at = place(first_side.mean(axis=0))
         what = "edges" if mesh.dimension == 2 else "faces"
         yield (
             f"{len(crowded)} {what} belong to more than two cells, the first at {at}: cells overlap"
@@ -81,7 +83,8 @@ def _apart(mesh: MeshArrays) -> Iterator[str]:
     corners = corners_of(mesh.kind, sides)
     first, which = distinct(corners)
     same_side = sides[first][which]
-    unlike = (np.sort(sides, axis=1) != np.sort(same_side, axis=1)).any(axis=1)
+    differs = np.sort(sides, axis=1) != np.sort(same_side, axis=1)
+    unlike = differs.any(axis=1)
     expected = len(np.unique(corners)) + _nodes_between_corners(mesh)
     if unlike.any():
         at = place(mesh.x[sides[unlike][0, 0]])
@@ -114,7 +117,8 @@ def _jacobians(mesh: MeshArrays) -> tuple[Array, Array]:
 def _unsound(mesh: MeshArrays) -> Iterator[str]:
     """Cells whose map cannot be inverted everywhere, corners and middles of sides included."""
     nodes = np.sort(mesh.cells, axis=1)
-    repeating = np.flatnonzero((nodes[:, 1:] == nodes[:, :-1]).any(axis=1))
+    is_again = nodes[:, 1:] == nodes[:, :-1]
+    repeating = np.flatnonzero(is_again.any(axis=1))
     if len(repeating):
         at = _place_of(mesh, repeating[0])
         yield (
@@ -123,7 +127,8 @@ def _unsound(mesh: MeshArrays) -> Iterator[str]:
         )
         return
     smallest, largest = smallest_determinants(mesh)
-    size = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1) ** mesh.dimension
+    extent = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1)
+    size = extent**mesh.dimension
     flat = largest <= _FLAT * size
     bad = np.flatnonzero(flat | is_folded(mesh, smallest, largest))
     if not len(bad):
@@ -132,7 +137,8 @@ def _unsound(mesh: MeshArrays) -> Iterator[str]:
     measure = "area" if mesh.dimension == 2 else "volume"
     how = f"it has no {measure}"
     if not flat[worst]:
-        how = f"{_falls(smallest[worst] / largest[worst])}; move the nodes on its sides"
+        ratio = smallest[worst] / largest[worst]
+        how = f"{_falls(ratio)}; move the nodes on its sides"
     at = _place_of(mesh, worst)
     yield f"{len(bad)} cells are folded or have no {measure}, the worst at {at}: {how}"
 
@@ -148,7 +154,8 @@ def _turned_at_points(mesh: MeshArrays) -> np.ndarray:
     points."""
     J, _ = _jacobians(mesh)
     determinant = np.linalg.det(J)
-    none = _FLAT * (J**2).sum(axis=(2, 3)).max(axis=1) ** (mesh.dimension / 2)
+    squared = (J**2).sum(axis=(2, 3)).max(axis=1)
+    none = _FLAT * squared ** (mesh.dimension / 2)
     return (determinant.min(axis=1) <= none) & (determinant.max(axis=1) >= -none)
 
 
@@ -190,7 +197,8 @@ def _widths(mesh: MeshArrays) -> Array:
     """The area over the square of the longest edge, or the root of the volume over its cube
     ``(n,)``: about the width of cells over their length."""
     d = mesh.dimension
-    ends = mesh.x[entities_of(mesh.kind, mesh.cells, 1)[:, :2]]
+    edges = entities_of(mesh.kind, mesh.cells, 1)
+    ends = mesh.x[edges[:, :2]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     longest = lengths.reshape(len(mesh.cells), -1).max(axis=1)
     width: Array = (measures(mesh) / longest**d) ** (1 / (d - 1))

@@ -50,7 +50,8 @@ class Circle(NamedTuple):
         if self.axis is None:
             return np.broadcast_to(centre, x.shape)
         along = np.array(self.axis) / np.linalg.norm(self.axis)
-        return centre + ((x - centre) @ along)[:, None] * along
+        height = (x - centre) @ along
+        return centre + height[:, None] * along
 
     def distance(self, x: Array) -> Array:
         """How far points ``(k, d)`` are off the circle."""
@@ -65,10 +66,11 @@ def cylinder_through(x: Array, facets: np.ndarray) -> Circle | None:
     """
     from scipy.optimize import least_squares  # a solve without first-order arcs does not pay for it
 
-    a, b, c = np.swapaxes(x[facets[:, :3]], 0, 1)
+    triangles = x[facets[:, :3]]
+    a, b, c = np.swapaxes(triangles, 0, 1)
     normal = unit(np.cross(b - a, c - a))
-    turned = np.linalg.svd(normal.T @ normal)[2]  # across the axis twice, then along it
-    corners = np.unique(x[facets[:, :3]].reshape(-1, 3), axis=0)
+    _, _, turned = np.linalg.svd(normal.T @ normal)  # across the axis twice, then along it
+    corners = np.unique(triangles.reshape(-1, 3), axis=0)
     middle, radius = nearest_circle(corners @ turned[:2].T)
     height = (corners @ turned[2]).mean()
     start = np.array([*middle / radius, 0.0, 0.0])
@@ -82,11 +84,13 @@ def cylinder_through(x: Array, facets: np.ndarray) -> Circle | None:
         distance = on_axis(place).distance(corners)
         return distance / distance.mean() - 1
 
-    made = on_axis(least_squares(unevenness, start, xtol=_SAME, ftol=None, gtol=None).x)
+    found = least_squares(unevenness, start, xtol=_SAME, ftol=None, gtol=None)
+    made = on_axis(found.x)
     distance = made.distance(corners)
-    is_round = np.ptp(distance) < _ROUND * distance.mean()
-    is_flat = np.ptp(corners, axis=0).max() < _FLAT * distance.mean()
-    return made._replace(radius=distance.mean()) if is_round and not is_flat else None
+    radius = distance.mean()
+    is_round = np.ptp(distance) < _ROUND * radius
+    is_flat = np.ptp(corners, axis=0).max() < _FLAT * radius
+    return made._replace(radius=radius) if is_round and not is_flat else None
 
 
 def refined(
@@ -132,10 +136,11 @@ def _require_near(mesh: MeshArrays, circle: Circle) -> None:
     if off.max() <= _OFF_CIRCLE * circle.radius:
         return
     at = x[off.argmax()]
+    place = ", ".join(f"{value:g}" for value in at)
+    middle = "axis" if circle.axis else "centre"
     said = (
-        f"the node ({', '.join(f'{value:g}' for value in at)}) of the facet set "
-        f"{circle.facets!r} is {off.max():.3g} off its {circle.shape}, whose "
-        f"{'axis' if circle.axis else 'centre'} or radius {circle.radius:g} must be wrong"
+        f"the node ({place}) of the facet set {circle.facets!r} is {off.max():.3g} off its "
+        f"{circle.shape}, whose {middle} or radius {circle.radius:g} must be wrong"
     )
     if np.ptp(x, axis=0).max() < _IN_METRES * circle.radius:
         said += "; or is the mesh in metres? Then give mesh.scale = 1000"
@@ -160,12 +165,12 @@ def _elsewhere(mesh: MeshArrays, circle: Circle) -> list[str]:
         return []
     centre, radius = drawn
     x, y = centre.round(9) + 0.0
+    x_wanted, y_wanted = circle.centre
     return [
-        f"the facet set {circle.facets!r} is drawn on the circle of radius {radius:.6g} about "
-        f"({x:.6g}, {y:.6g}), but "
-        f"its [[mesh.circle]] has radius {circle.radius:.6g} about ({circle.centre[0]:.6g}, "
-        f"{circle.centre[1]:.6g}) "
-        f"and moves nodes by up to {moved:.3g}, which changes the clearance by as much"
+        f"the facet set {circle.facets!r} is drawn on the circle of radius {radius:.6g} "
+        f"about ({x:.6g}, {y:.6g}), but its [[mesh.circle]] has radius {circle.radius:.6g} "
+        f"about ({x_wanted:.6g}, {y_wanted:.6g}) and moves nodes by up to {moved:.3g}, "
+        "which changes the clearance by as much"
     ]
 
 
@@ -181,7 +186,8 @@ def on_circles(mesh: MeshArrays, circles: Sequence[Circle]) -> MeshArrays:
         nodes = np.unique(mesh.facets_of(circle.facets))
         foot = circle.foot(x[nodes])
         ray = x[nodes] - foot
-        x[nodes] = foot + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
+        longer = circle.radius / np.linalg.norm(ray, axis=1)
+        x[nodes] = foot + ray * longer[:, None]
     return replace(mesh, x=x)
 
 

@@ -39,23 +39,28 @@ def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshA
     for levels, chosen in _cells_by_heights(plane, heights).items():
         n_layers = len(levels) - 1
         z = _node_heights(levels, plane.order)
-        x.append(np.column_stack([plane.x.repeat(len(z), axis=0), np.tile(z, len(plane.x))]))
-        over = n_nodes + np.arange(len(x[-1])).reshape(-1, len(z))  # (nodes of the plane, heights)
+        feet = plane.x.repeat(len(z), axis=0)
+        heights_of_feet = np.tile(z, len(plane.x))
+        x.append(np.column_stack([feet, heights_of_feet]))
+        numbers = n_nodes + np.arange(len(feet))
+        over = numbers.reshape(-1, len(z))  # (nodes of the plane, heights)
         cells.append(_hexahedra(plane, chosen, over))
         corners = plane.cells[chosen, :4]
         for name, tags in plane.cell_sets.items():
             within = np.isin(plane.bodies[chosen], tags)
-            cell_sets[name].append(n_cells + np.flatnonzero(within.repeat(n_layers)))
+            own = np.flatnonzero(within.repeat(n_layers))
+            cell_sets[name].append(n_cells + own)
             if within.any():
-                facet_sets[f"{name} below"].append(over[corners[within], 0])
-                facet_sets[f"{name} above"].append(over[corners[within], -1])
+                columns = over[corners[within]]
+                facet_sets[f"{name} below"].append(columns[..., 0])
+                facet_sets[f"{name} above"].append(columns[..., -1])
         for name in plane.facet_sets:
             ends = plane.facets_of(name)[:, :2]
             own = ends[np.isin(ends, corners).all(axis=1)]
             facet_sets[name].append(_sides(over[own], plane.order))
         for name, nodes in plane.point_sets.items():
             point_sets[name].append(over[nodes].ravel())
-        n_nodes += len(x[-1])
+        n_nodes += len(feet)
         n_cells += len(cells[-1])
     return MeshArrays.of_sets(
         HEXAHEDRON,
@@ -69,8 +74,9 @@ def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshA
 
 def _node_heights(levels: tuple[float, ...], order: int) -> Array:
     """The heights of the nodes of layers of this ``order`` between ``levels``."""
-    steps = np.arange(order * (len(levels) - 1) + 1) / order
-    return np.interp(steps, np.arange(len(levels)), levels)
+    n_layers = len(levels) - 1
+    steps = np.arange(order * n_layers + 1) / order
+    return np.interp(steps, np.arange(n_layers + 1), levels)
 
 
 def _sides(over: np.ndarray, order: int) -> np.ndarray:
@@ -94,14 +100,16 @@ def _cells_by_heights(
         raise ValueError("layers of triangles would be prisms, which are not supported")
     tags: dict[tuple[float, ...], tuple[int, ...]] = defaultdict(tuple)
     for name, levels in heights.items():
-        if len(levels) < 2 or not np.all(np.diff(levels) > 0):
+        thicknesses = np.diff(levels)
+        if len(levels) < 2 or not np.all(thicknesses > 0):
             raise ValueError(f"heights of {name!r} must be two or more, and increase")
         tags[tuple(levels)] += tags_of("cell", plane.cell_sets, name)
     cells = {levels: np.flatnonzero(np.isin(plane.bodies, own)) for levels, own in tags.items()}
     without = len(plane.cells) - sum(map(len, cells.values()))
     if without > 0:
         raise ValueError(f"{without} cells have no heights: give heights of every body")
-    nodes = np.concatenate([np.unique(plane.cells[chosen]) for chosen in cells.values()])
+    of_bodies = [np.unique(plane.cells[chosen]) for chosen in cells.values()]
+    nodes = np.concatenate(of_bodies)
     if len(np.unique(nodes)) < len(nodes):
         raise ValueError("bodies that share nodes must have the same heights")
     return cells

@@ -57,7 +57,8 @@ class Sketch:
         numbers = []
         for a, b in pairwise(places):
             if (body, a, b) not in self._curve:
-                self.curves.append([self.point(body, place) for place in (a, b, *centre)])
+                points = [self.point(body, place) for place in (a, b, *centre)]
+                self.curves.append(points)
                 self._curve[body, a, b] = len(self.curves)
                 self._curve[body, b, a] = len(self.curves)
             numbers.append(self._curve[body, a, b])
@@ -67,11 +68,12 @@ class Sketch:
         """A face of ``body`` within ``paths`` that together are closed, in whatever direction each
         line goes; the lines go to the sets of these names, where there are such."""
         self.loops.append([line for path in paths.values() for line in path])
-        self.faces[body].append(len(self.loops))
+        face = len(self.loops)
+        self.faces[body].append(face)
         for name in paths.keys() & self.lines:
             of_set = self.lines[name]
             of_set += [line for line in paths[name] if line not in of_set]
-        return len(self.loops)
+        return face
 
     def around_face(self, face: int) -> list[int]:
         """The lines around a ``face`` as they follow each other."""
@@ -89,15 +91,19 @@ class Sketch:
         """The quarters, above or below the axis, of a pin of radius 1 about (x, 0), which may have
         a ``bore`` of a radius; the names of its body and its sets have ``before`` in front."""
         pin = f"{before}pin"
+        outside = Circle(pin, (x, 0.0), 1.0)
+        inside = Circle(f"{pin} inside", (x, 0.0), bore)
+        top = (x, up)
+        top_of_bore = (x, up * bore)
         for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
-            arc = self.path(pin, (x + to, 0), (x, up), on=Circle(pin, (x, 0.0), 1.0))
-            flat = self.path(pin, (x, up), (x, up * bore))
-            axis = self.path(pin, (x + to * bore, 0), (x + to, 0))
+            side = (x + to, 0)
+            side_of_bore = (x + to * bore, 0)
+            arc = self.path(pin, side, top, on=outside)
+            flat = self.path(pin, top, top_of_bore)
+            axis = self.path(pin, side_of_bore, side)
             paths = {pin: arc, f"{before}flat": flat, "axis": axis}
             if bore:
-                inside = Circle(f"{pin} inside", (x, 0.0), bore)
-                ends = (x, up * bore), (x + to * bore, 0)
-                paths[inside.facets] = self.path(pin, *ends, on=inside)
+                paths[inside.facets] = self.path(pin, top_of_bore, side_of_bore, on=inside)
             self.face(pin, **paths)
 
 

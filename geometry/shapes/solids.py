@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import gathered, gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import gathered, gmsh_to_mesh, set_mesh_options
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.quality import is_folded
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
@@ -162,8 +162,7 @@ def draw_solids(sketch: Sketch, slabs: Sequence[Slab], rims: Rims, gmsh: Any) ->
     for name, surfaces in sets.items():
         gmsh.model.addPhysicalGroup(2, surfaces, name=name)
     drawing.use_smallest(fields)
-    for option, value in _OPTIONS.items():
-        gmsh.option.setNumber(f"Mesh.{option}", value)
+    set_mesh_options(gmsh, _OPTIONS)
 
 
 class _Drawing:

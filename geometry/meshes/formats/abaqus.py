@@ -165,11 +165,14 @@ class _Model:
     def _surface(self, scope: Scope, options: Options, rows: Rows) -> None:
         name = options.get("NAME", "")
         if options.get("TYPE", "").upper() == "NODE":
-            self._add(scope, "NSET", name, self._chosen(scope, "NSET", (row[0] for row in rows)))
+            nodes = self._chosen(scope, "NSET", (row[0] for row in rows))
+            self._add(scope, "NSET", name, nodes)
             return
-        for item, *face in rows:
+        surface = scope.qualified(name)
+        for item, *words in rows:
             elements = self._chosen(scope, "ELSET", [item])
-            self.surfaces[scope.qualified(name)].append((elements, "".join(face).upper()))
+            face = "".join(words).upper()
+            self.surfaces[surface].append((elements, face))
 
     def _add(self, scope: Scope, kind: str, name: str | None, keys: list[int]) -> None:
         if not name:
@@ -211,8 +214,9 @@ def read_abaqus(path: Path) -> MeshArrays:
     kind = _SHAPES[d][size]
     node = {key: place for place, key in enumerate(model.nodes)}
     cell = {key: place for place, key in enumerate(elements)}
+    places = np.array(list(model.nodes.values()))
     nodes = _places(node, chain(*elements.values()), "node").reshape(-1, size)
-    x, cells = in_basix_order(kind, np.array(list(model.nodes.values())), nodes, perm_vtk)
+    x, cells = in_basix_order(kind, places, nodes, perm_vtk)
     cell_sets = {}
     facet_sets = defaultdict[str, list[np.ndarray]](list)
     point_sets = {}
