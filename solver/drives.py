@@ -83,17 +83,19 @@ class Drives:
         self.turns = self._turns()
         self._require_independent()
         largest = self._largest_rates(contact)
-        self.weight = np.array([self._weight(level, largest) for level in self.unknown])
+        weights = [self._weight(level, largest) for level in self.unknown]
+        self.weight = np.array(weights)
         weight = self.weight[:, None, None]
         self.unknown_rate = weight * self.rate[self.unknown]
         self.unknown_load = weight * self.applied[self.unknown]
 
     def _stiffest(self) -> float:
         moduli = [body.material.elastic_tangent[0, 0] for body in self.problem.bodies]
+        largest = float(max(moduli))
         if self.dimension == 3:
-            return float(max(moduli)) * self._shortest_extent()
+            return largest * self._shortest_extent()
         depth = np.max(self.kinematics.measure(self._x), initial=0.0)
-        return float(max(moduli)) * self.comm.allreduce(float(depth), op=MPI.MAX)
+        return largest * self.comm.allreduce(float(depth), op=MPI.MAX)
 
     def _shortest_extent(self) -> float:
         """The shortest extent of the mesh along an axis, such as the thickness of a plate.
@@ -132,10 +134,11 @@ class Drives:
 
     def _apply_loads(self) -> None:
         for load in self.problem.loads:
-            self.applied[self.names.index(load.drive)] += self.loads.forces(load)
+            level = self.names.index(load.drive)
+            self.applied[level] += self.loads.forces(load)
         for mean in self.problem.means:
-            motion = self.loads.mean_motion(mean)
-            self.applied[self.names.index(mean.drive)] = motion / self.problem.whole
+            level = self.names.index(mean.drive)
+            self.applied[level] = self.loads.mean_motion(mean) / self.problem.whole
 
     def _move_discs(self, contact: Contact) -> None:
         """Give rigid surfaces their rates ``(l, d)``."""
@@ -166,19 +169,23 @@ class Drives:
     def _require_independent(self) -> None:
         """Raise ValueError where displacements that are free cannot give prescribed means all their
         values."""
-        means = self.unknown[~self.moving[self.unknown]]
+        is_moving = self.moving[self.unknown]
+        means = self.unknown[~is_moving]
         if not len(means):
             return
-        moving = self.unknown[self.moving[self.unknown]]
+        moving = self.unknown[is_moving]
         motions = self.applied[means]
         is_fixed = self.fixed[: self.n_owned]
         free = np.where(is_fixed, 0.0, motions).reshape(len(means), -1)
         rates = self.rate[moving, : self.n_owned]
-        of_levels = self.comm.allreduce(np.tensordot(motions, rates, ((1, 2), (1, 2))))
-        products = self.comm.allreduce(free @ free.T) + of_levels @ of_levels.T
-        lengths = np.sqrt(self.comm.allreduce((motions**2).sum(axis=(1, 2))))
-        smallest, modes = np.linalg.eigh(products / np.outer(lengths, lengths))
-        if smallest[0] < _DEPENDENT:
+        along_rates = np.tensordot(motions, rates, ((1, 2), (1, 2)))
+        of_levels = self.comm.allreduce(along_rates)
+        of_nodes = self.comm.allreduce(free @ free.T)
+        products = of_nodes + of_levels @ of_levels.T
+        squares = (motions**2).sum(axis=(1, 2))
+        lengths = np.sqrt(self.comm.allreduce(squares))
+        values, modes = np.linalg.eigh(products / np.outer(lengths, lengths))
+        if values[0] < _DEPENDENT:
             taking_part = np.abs(modes[:, 0]) > _PART
             names = [repr(self.names[level]) for level in means[taking_part]]
             raise ValueError(
@@ -206,7 +213,8 @@ class Drives:
         of the stiffness."""
         if self.moving[level]:
             return 1 / largest[level]
-        return self.stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
+        forces = np.abs(self.applied[level]).sum()
+        return self.stiffness / self.comm.allreduce(forces)
 
     def values(self, factor: float) -> Array:
         """What the drives prescribe ``(l,)`` at the load ``factor``."""

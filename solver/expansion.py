@@ -52,7 +52,7 @@ class _Expansion:
         self.discs = [i.name for i in problem.interactions if disc_of(i) is not None]
         self.given_supports = [part for part in problem.supports if isinstance(part, Support)]
         self.given_loads = [part for part in problem.loads if isinstance(part, Load)]
-        self.loaded = {(load.on, str(load.direction)): load.name for load in self.given_loads}
+        self.loaded = {_place(load): load.name for load in self.given_loads}
         self.held = {
             (part.on, freedom)
             for part in self.given_supports
@@ -128,7 +128,8 @@ class _Expansion:
         points = [(f"coupling {c.name!r}", "point", c.point) for c in self.stated.couplings]
         for load in self.given_loads:
             if load.core is not None:
-                points.append((f"load {load.name!r}", "core.centre", load.core[0]))
+                centre, _ = load.core
+                points.append((f"load {load.name!r}", "core.centre", centre))
         for part, key, point in points:
             if len(point) != self.dimension:
                 said = f"{key} = {point} must be {self.dimension} numbers here"
@@ -181,9 +182,11 @@ class _Expansion:
         discs = [disc_of(part) for part in self.stated.interactions]
         centres = [disc.centre for disc in discs if disc is not None]
         d = self.dimension
-        x = self.mesh.mesh.geometry.x[:, :d]
-        x = np.concatenate([x, np.reshape(centres, (-1, d))])
-        ends = np.concatenate([x.max(axis=0, initial=-np.inf), -x.min(axis=0, initial=np.inf)])
+        nodes = self.mesh.mesh.geometry.x[:, :d]
+        x = np.concatenate([nodes, np.reshape(centres, (-1, d))])
+        highest = x.max(axis=0, initial=-np.inf)
+        lowest = x.min(axis=0, initial=np.inf)
+        ends = np.concatenate([highest, -lowest])
         comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
         return -ends[d:], ends[:d]
 
@@ -192,7 +195,7 @@ class _Expansion:
         mesh, in the box from ``lowest`` to ``highest``, moves by more than ``most``."""
         points = {coupling.name: np.array(coupling.point) for coupling in self.stated.couplings}
         displaced = [load for load in self.given_loads if load.kind == "displacement"]
-        held = self.held | {(load.on, str(load.direction)) for load in displaced}
+        held = self.held.union(map(_place, displaced))
         for load in displaced:
             if not _turns(load.direction) or load.on not in points:
                 continue
@@ -200,9 +203,10 @@ class _Expansion:
             beside = np.maximum(point - highest, lowest - point)
             beside = np.maximum(beside, 0.0)
             i, j = self._turn(str(load.direction))
-            crossed = (("xyz"[i], beside[j]), ("xyz"[j], beside[i]))
-            arms = [arm for axis, arm in crossed if (load.on, axis) in held]
-            moved = max(map(abs, load.stages)) * max(arms, default=0.0)
+            crossed = {"xyz"[i]: beside[j], "xyz"[j]: beside[i]}
+            arms = [arm for axis, arm in crossed.items() if (load.on, axis) in held]
+            farthest = max(map(abs, load.stages))
+            moved = farthest * max(arms, default=0.0)
             if moved > most:
                 raise ValueError(
                     f"the load {load.name!r} turns {load.on!r} about a point so far away that it "
@@ -227,9 +231,10 @@ class _Expansion:
         """A pressure; a force spread over cells; or what moves a set, a reference point or a
         disc."""
         places = [*self.edges, *self.couplings, *self.discs]
-        on_cells = load.kind == "force" and load.on not in places
+        is_force = load.kind == "force"
+        on_cells = is_force and load.on not in places
         spread = on_cells or load.core is not None
-        control: Control = "force" if load.kind == "force" and not spread else "displacement"
+        control: Control = "force" if is_force and not spread else "displacement"
         self.drives.append(Drive(load.name, self.stated.values(load), control))
         if load.kind == "pressure":
             self.loads.append(DeadLoad(facets=load.on, pressure=1.0, drive=load.name))
@@ -257,11 +262,13 @@ class _Expansion:
 
     def _along(self, load: Load) -> tuple[float, ...]:
         """The unit vector along the axis of the ``load``."""
-        return tuple(np.eye(self.dimension)[self.freedoms[str(load.direction)]])
+        axis = self.freedoms[str(load.direction)]
+        return tuple(np.eye(self.dimension)[axis])
 
     def _turn(self, freedom: str) -> tuple[int, int]:
         """The axes from the first to the second of which a rotation turns."""
-        return _TURNS[self.dimension][self.freedoms[freedom] - self.dimension]
+        number = self.freedoms[freedom] - self.dimension
+        return _TURNS[self.dimension][number]
 
     def _drive(self, coupling: str, freedom: str, control: Control) -> str:
         """The load of a reference point in one of its freedoms, or a drive of its own whose
@@ -349,6 +356,11 @@ class _Expansion:
             return Guess(factor, moved)
 
         return guess
+
+
+def _place(load: Load) -> tuple[str, str]:
+    """What a load acts on, and in which direction."""
+    return load.on, str(load.direction)
 
 
 def _turns(freedom: str | None) -> bool:

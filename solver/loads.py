@@ -34,12 +34,14 @@ class Loads:
         """The measure of a set of cells, or of facets, as drawn."""
         mesh = self.V.mesh
         sets = self.problem.mesh
-        entities = np.unique(sets.cells_in(cells) if cells else sets.facets_in(facets))
+        named = sets.cells_in(cells) if cells else sets.facets_in(facets)
+        entities = np.unique(named).astype(np.int32)
         dimension = mesh.topology.dim if cells else mesh.topology.dim - 1
-        tags = meshtags(mesh, dimension, entities.astype(np.int32), 1)
+        tags = meshtags(mesh, dimension, entities, 1)
         rule = {"quadrature_degree": LOAD_DEGREE}
-        measure = ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
-        if not self.integral(self.swept(fem.Constant(mesh, 1.0)) * measure):
+        kind = "dx" if cells else "ds"
+        measure = ufl.Measure(kind, mesh, subdomain_data=tags, metadata=rule)(1)
+        if not self._size(measure):
             raise ValueError(
                 f"the facet set {facets!r} is not on the boundary of a body: nothing can load it"
             )
@@ -49,6 +51,11 @@ class Loads:
         """The ``integrand``, in UFL, times what areas and lengths stand for: around an axis for a
         ring."""
         return integrand * self.kinematics.measure(ufl.SpatialCoordinate(self.V.mesh))
+
+    def _size(self, measure: Any) -> float:
+        """The area, or the length, of what is measured."""
+        one = fem.Constant(self.V.mesh, 1.0)
+        return self.integral(self.swept(one) * measure)
 
     def integral(self, form: Any) -> float:
         """The ``form`` without arguments, over all ranks."""
@@ -74,7 +81,8 @@ class Loads:
         vector = fem.assemble_vector(fem.form(form))
         vector.scatter_reverse(InsertMode.add)
         d = self.kinematics.dimension
-        return vector.array[: d * self.V.dofmap.index_map.size_local].reshape(-1, d)
+        n_owned = self.V.dofmap.index_map.size_local
+        return vector.array[: d * n_owned].reshape(-1, d)
 
     def forces(self, load: DeadLoad) -> Array:
         """Forces ``(n_owned, d)`` on the modelled part per unit of the drive."""
@@ -83,9 +91,8 @@ class Loads:
         measure = self.measure(load.cells, load.facets)
         if load.pressure:
             along_normal = ufl.inner(ufl.FacetNormal(mesh), v)
-            return self._vector(
-                -fem.Constant(mesh, load.pressure) * self.swept(along_normal) * measure
-            )
+            pressure = fem.Constant(mesh, load.pressure)
+            return self._vector(-pressure * self.swept(along_normal) * measure)
         force = fem.Constant(mesh, np.array(load.force))
         density = fem.Constant(mesh, 1.0)
         if load.density is not None:
@@ -102,7 +109,7 @@ class Loads:
         turns = self.kinematics.turns
         v = ufl.TestFunction(self.V)
         ds = self.measure(facets=mean.facets)
-        length = self.integral(self.swept(fem.Constant(mesh, 1.0)) * ds)
+        length = self._size(ds)
         if not turns:
             if mean.axis >= d:
                 raise ValueError(f"the mean {mean.name!r} is a rotation, which no ring has")
@@ -124,7 +131,8 @@ class Loads:
             by_rotations[np.arange(d) != axis] = 0.0
         density = ufl.inner(fem.Constant(mesh, along / length), v)
         for rotation, (i, j) in zip(by_rotations, turns, strict=True):
-            density += fem.Constant(mesh, rotation) * (arm[i] * v[j] - arm[j] * v[i])
+            moment = arm[i] * v[j] - arm[j] * v[i]
+            density += fem.Constant(mesh, rotation) * moment
         return self._vector(density * ds)
 
     def _inertia(self, arm: Any, ds: Any) -> Array:
@@ -137,11 +145,13 @@ class Loads:
         other = fem.Constant(self.V.mesh, np.zeros(d))
         moment = fem.form(ufl.inner(one, arm) * ufl.inner(other, arm) * ds)
         second = np.zeros((d, d))
+        axes = np.eye(d)
         for i, j in combinations_with_replacement(range(d), 2):
-            one.value = np.eye(d)[i]
-            other.value = np.eye(d)[j]
+            one.value = axes[i]
+            other.value = axes[j]
             second[i, j] = second[j, i] = self._sum(moment)
-        return float(np.trace(second)) * np.eye(d) - second
+        polar = float(np.trace(second))
+        return polar * axes - second
 
     def _by_rotations(self, axis: int, lever: Array, inertia: Array) -> Array:
         """What a motion along or about an ``axis`` has of the moments ``(t,)``: of the mean

@@ -44,9 +44,8 @@ class _Motion:
     together: bool = False
 
     def __str__(self) -> str:
-        return (
-            f"{self.name!r}" if self.name == self.facets else f"{self.name!r} (on {self.facets!r})"
-        )
+        where = "" if self.name == self.facets else f" (on {self.facets!r})"
+        return f"{self.name!r}{where}"
 
 
 class Prescribed:
@@ -93,17 +92,24 @@ class Prescribed:
         """The axis, which its nodes do not leave."""
         r = self._x[:, 0]
         near = _ALIKE * self._size
-        if self._comm.allreduce(bool((r < -near).any()), op=MPI.LOR):
+        is_beyond = bool((r < -near).any())
+        if self._comm.allreduce(is_beyond, op=MPI.LOR):
             raise ValueError("axisymmetric bodies have no places at x < 0: x is the radius")
         nodes = np.flatnonzero(r <= near)
         held = self.holder[:, 0]
-        held[nodes] = np.where(held[nodes] < 0, len(self.names), held[nodes])
-        return _Motion("the axis", "the axis", 0, nodes, np.zeros((len(self._drives), len(nodes))))
+        by_supports = held[nodes]
+        held[nodes] = np.where(by_supports < 0, len(self.names), by_supports)
+        return _Motion("the axis", "the axis", 0, nodes, self._at_rest(nodes))
+
+    def _at_rest(self, nodes: np.ndarray) -> Array:
+        """Rates ``(l, k)`` of ``nodes`` that no drive moves."""
+        return np.zeros((len(self._drives), len(nodes)))
 
     def _prescribe(self, moving: list[_Motion], fixing: list[_Motion]) -> None:
         """Prescribe what moves, where nothing fixes it. Raises ValueError for contradictions."""
         fixed = self.holder >= 0
-        largest = np.array([np.abs(self._displaced(motion)).max(initial=0.0) for motion in moving])
+        sizes = [np.abs(self._displaced(motion)).max(initial=0.0) for motion in moving]
+        largest = np.array(sizes)
         self._comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         # along an axis in which a turn displaces nothing all is round-off
         of_name: dict[str, float] = {}
@@ -126,7 +132,9 @@ class Prescribed:
         equal parts where several hold a node."""
         if name not in self.names:
             return np.zeros(self.holder.shape)
-        return self._holds[self.names.index(name)] / np.maximum(self._holds.sum(axis=0), 1)
+        held = self._holds[self.names.index(name)]
+        n_holding = self._holds.sum(axis=0)
+        return held / np.maximum(n_holding, 1)
 
     def _collected(self) -> list[_Motion]:
         """All motions, sorted by their names. Raises ValueError for a drive that is given twice."""
@@ -138,7 +146,7 @@ class Prescribed:
             key = s.name, s.facets, s.axis
             if key not in found:
                 nodes = self._problem.mesh.dofs_in(self._V, s.facets)
-                found[key] = _Motion(*key, nodes, np.zeros((len(self._drives), len(nodes))))
+                found[key] = _Motion(*key, nodes, self._at_rest(nodes))
             if not s.moves:
                 continue
             if (*key, s.drive) in given:
@@ -179,11 +187,11 @@ class Prescribed:
             held = fixed[motion.nodes, motion.axis]
             free[m] = np.count_nonzero(~held)
             away = np.abs(self._displaced(motion)).max(axis=1, initial=0.0) > round_off[m]
+            stopped = motion.nodes[held & away]
             for f, fix in enumerate(fixing):
                 if fix.axis == motion.axis:
-                    met += self._first_place(
-                        m, f, np.intersect1d(motion.nodes[held & away], fix.nodes)
-                    )
+                    common = np.intersect1d(stopped, fix.nodes)
+                    met += self._first_place(m, f, common)
         free = self._comm.allreduce(free)
         for m, f, place in self._everywhere(met):
             motion = moving[m]
@@ -217,7 +225,8 @@ class Prescribed:
             common, i, j = np.intersect1d(first.nodes, second.nodes, return_indices=True)
             difference = np.abs(self._displaced(first)[i] - self._displaced(second)[j])
             unlike = difference.max(axis=1, initial=0.0) > max(round_off[a], round_off[b])
-            met += self._first_place(a, b, common[unlike & ~fixed[common, first.axis]])
+            is_free = ~fixed[common, first.axis]
+            met += self._first_place(a, b, common[unlike & is_free])
         for a, b, place in self._everywhere(met):
             raise ValueError(
                 f"{moving[a]} and {moving[b]} move their common node at {_at(place)} "

@@ -59,15 +59,18 @@ def boundary_facets(V: fem.FunctionSpace, facets: np.ndarray) -> BoundaryFacets:
     middle = vertices.mean(axis=0)
     # some of basix' facets turn inwards, and a mirrored cell turns all of them
     inwards = np.linalg.det(corners - middle) < 0
-    inwards ^= cell_basis(V.mesh, degree, cells, middle[None]).determinant[:, 0] < 0
-    corners[inwards, -2:] = corners[inwards, -2:][:, ::-1]
+    in_middle = cell_basis(V.mesh, degree, cells, middle[None])
+    inwards ^= in_middle.determinant[:, 0] < 0
+    last_two = corners[inwards, -2:]
+    corners[inwards, -2:] = last_two[:, ::-1]
     origin = corners[:, 0]
     axes = corners[:, 1:] - origin[:, None]
     on_facet = origin[:, None] + facet_nodes(kind, degree) @ axes
     in_cell = displacement_element(kind, degree).points
     distance = np.linalg.norm(on_facet[:, :, None] - in_cell, axis=-1)
+    trace = distance.argmin(axis=-1)
     number = _given_number(V.mesh)[cells] * len(vertices_of_facets) + local_facets
-    return BoundaryFacets(cells, number, distance.argmin(axis=-1), origin, axes, within)
+    return BoundaryFacets(cells, number, trace, origin, axes, within)
 
 
 def _given_number(mesh: Mesh) -> np.ndarray:
@@ -96,7 +99,8 @@ def _owned_facets(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarra
     within = np.diff(to_cell.offsets)[facets] > 1
     facets_of_cell = len(basix.topology(mesh.basix_cell())[d - 1])
     of_cells = to_facet.array.reshape(-1, facets_of_cell)[cells]
-    return cells, np.nonzero(of_cells == facets[:, None])[1], within
+    _, local_facets = np.nonzero(of_cells == facets[:, None])
+    return cells, local_facets, within
 
 
 def refuse_all_but_a_boundary(
@@ -106,7 +110,8 @@ def refuse_all_but_a_boundary(
     ``(n, d)`` are the boundary of a body."""
     if not len(corners):
         raise ValueError(f"the contact surface {name!r} has no facets")
-    _, which, count = np.unique(np.sort(corners), axis=0, return_inverse=True, return_counts=True)
+    rising = np.sort(corners)
+    _, which, count = np.unique(rising, axis=0, return_inverse=True, return_counts=True)
     twice = count[which.ravel()] > 1  # two ranks may have a cell each
     for x in middle[within | twice]:
         raise ValueError(

@@ -214,14 +214,13 @@ class Interface:
     def moments(self, point: Array) -> Array:
         """Moments ``(t,)`` of this force about ``point`` ``(d,)``, over all ranks, in the turns of
         the kinematics: anticlockwise in a plane."""
-        turns = self.pairs[0].surface.kinematics.turns
+        kinematics = self.pairs[0].surface.kinematics
         moments = []
         for pair in self.pairs:
-            arm = pair.place - point
-            force = pair.forces
-            of_points = np.zeros((len(arm), len(turns)))
-            for turn, (i, j) in enumerate(turns):
-                of_points[:, turn] = arm[:, i] * force[:, j] - arm[:, j] * force[:, i]
+            of_points = np.zeros((len(pair.forces), len(kinematics.turns)))
+            of_turns = kinematics.moments(pair.place - point, pair.forces)
+            for turn, moment in enumerate(of_turns):
+                of_points[:, turn] = moment
             moments.append(of_points)
         return self._summed(moments)
 

@@ -53,9 +53,9 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     breaks = []
     for k in range(own.n_facets):
         met_here = np.sort(met.xi[inside & (met.facet == k)])
-        breaks.append(
-            np.concatenate([[0.0], met_here[np.diff(met_here, prepend=0.0) > _SHORTEST], [1.0]])
-        )
+        distance = np.diff(met_here, prepend=0.0)
+        apart = met_here[distance > _SHORTEST]
+        breaks.append(np.concatenate([[0.0], apart, [1.0]]))
     n_parts = max(len(ends) - 1 for ends in breaks)
     if RULE.get() == "halved":
         ends = np.array([_halved(ends, n_parts) for ends in breaks])
@@ -68,7 +68,8 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     x, w = np.polynomial.legendre.leggauss(n_points)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
-    return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
+    weight = length * w / 2
+    return xi.reshape(own.n_facets, -1), weight.reshape(own.n_facets, -1)
 
 
 def _n_faced(met: Projection) -> float:
@@ -77,14 +78,16 @@ def _n_faced(met: Projection) -> float:
     one before."""
     place = (met.facet + met.xi)[met.found]
     before = np.floor(place - _SHORTEST).clip(0)
-    return len(place) / max(len(np.unique(before)), 1)
+    n_facing = len(np.unique(before))
+    return len(place) / max(n_facing, 1)
 
 
 def _halved(ends: Array, n_parts: int) -> Array:
     """The ``ends`` of segments with the longest one halved until there are ``n_parts``."""
     while len(ends) <= n_parts:
         k = int(np.argmax(np.diff(ends)))
-        ends = np.insert(ends, k + 1, (ends[k] + ends[k + 1]) / 2)
+        middle = (ends[k] + ends[k + 1]) / 2
+        ends = np.insert(ends, k + 1, middle)
     return ends
 
 
@@ -103,7 +106,8 @@ def _divided(ends: Array, n_parts: int) -> Array:
         parts[np.argmax(longest > longest.max() - _SHORTEST)] += 1
     size = np.repeat(length / parts, parts)
     within = np.concatenate([np.arange(count) for count in parts])
-    return np.append(np.repeat(ends[:-1], parts) + within * size, ends[-1])
+    start = np.repeat(ends[:-1], parts)
+    return np.append(start + within * size, ends[-1])
 
 
 def pieces_rule(own: Patches, opposite: Patches) -> tuple[Array, Array, Index]:

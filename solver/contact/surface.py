@@ -94,7 +94,9 @@ class Surface:
         self._owned_local = owned[self._owned]
         xi, w = _facet_rule(facet_kind(V.mesh.basix_cell()))
         xi = xi[:, 0] if xi.shape[1] == 1 else xi
-        self.place_points(np.stack([xi] * self.n_facets), np.tile(w, (self.n_facets, 1)))
+        places = np.stack([xi] * self.n_facets)
+        weights = np.tile(w, (self.n_facets, 1))
+        self.place_points(places, weights)
         self._constants = self._trace_constants()
 
     @property
@@ -118,7 +120,8 @@ class Surface:
         along = np.argsort(first)  # the nodes in the order of the facets
         self.curve_dofs = unique[along]
         X = x[order].reshape(-1, x.shape[-1])[first[along]]
-        self.curve = self._shape(X, np.argsort(along)[node].reshape(dofs.shape))
+        connectivity = np.argsort(along)[node].reshape(dofs.shape)
+        self.curve = self._shape(X, connectivity)
         self.n_facets = len(order)
 
         start = sum(len(part[0]) for part in of_ranks[: self.comm.rank])
@@ -175,7 +178,8 @@ class Surface:
         area."""
         if isinstance(self.curve, Patches):
             return np.sqrt(self.curve.areas())
-        return np.diff(self.arc_length(np.array([0.0, 1.0])))[:, 0]
+        ends = self.arc_length(np.array([0.0, 1.0]))
+        return np.diff(ends)[:, 0]
 
     def face(self, opposite: Surface) -> None:
         """Place the points so that forces go to the ``opposite`` surface exactly; no history."""
@@ -197,7 +201,8 @@ class Surface:
         X = self._origin[:, None] + on_facet @ self._axes
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         axes = self._axes.swapaxes(0, 1)
-        normal = _normal([np.einsum("nqij,nj->nqi", basis.jacobian, axis) for axis in axes])
+        tangents = [np.einsum("nqij,nj->nqi", basis.jacobian, axis) for axis in axes]
+        normal = _normal(tangents)
         length = np.linalg.norm(normal, axis=-1)
         self.outward = normal / length[..., None]
         self.shape = np.ascontiguousarray(basis.shape)
@@ -222,12 +227,14 @@ class Surface:
     @property
     def gamma(self) -> Array:
         """Constant ``(n,)`` of the trace inequality of normal stress, in stress per length."""
-        return self._constants[0][self._home]
+        of_pressure, _ = self._constants
+        return of_pressure[self._home]
 
     @property
     def gamma_shear(self) -> Array:
         """The same of the shear."""
-        return self._constants[1][self._home]
+        _, of_shear = self._constants
+        return of_shear[self._home]
 
     def _trace_constants(self) -> tuple[Array, Array]:
         """Constants ``(n,)`` of the trace inequality, of normal stress and shear."""

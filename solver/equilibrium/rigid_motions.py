@@ -73,7 +73,8 @@ class RigidMotions:
         self.free = np.tensordot(free[:k].T, self._modes, 1)
         self.levels = np.zeros((free.shape[1], len(drives.rate)))
         self.levels[:, drives.unknown[moving]] = free[k:].T * drives.weight[moving]
-        parts = np.abs(free[:k]).reshape(len(bodies), -1).max(axis=1, initial=0.0)
+        of_bodies = np.abs(free[:k]).reshape(len(bodies), -1)
+        parts = of_bodies.max(axis=1, initial=0.0)
         self.loose = [body for body, part in zip(bodies, parts, strict=True) if part > _LOOSE]
         lengths = [surface.facet_lengths().mean() for surface in contact.surfaces]
         self._facet = min(lengths, default=np.inf)
@@ -123,13 +124,15 @@ class RigidMotions:
     def _with_supports(self, load: float, state: Array) -> tuple[Array, Array]:
         """Displacements and levels with bodies moved rigidly as their supports are."""
         drives = self.drives
-        n = self._modes[0].size
-        u = state[:n].reshape(self._modes[0].shape).copy()
+        mode = self._modes[0]
+        n = mode.size
+        u = state[:n].reshape(mode.shape).copy()
         levels = drives.values(load)
         levels[drives.unknown] = state[n:][drives.unknown]
         prescribed = drives.displaced(levels)
         lacking = (prescribed - u)[drives.fixed]
-        followed = self._follow @ self.comm.allreduce(self._prescribed.T @ lacking)
+        along = self.comm.allreduce(self._prescribed.T @ lacking)
+        followed = self._follow @ along
         u += np.tensordot(followed[: len(self._modes)], self._modes, 1)
         return u, levels
 
@@ -158,7 +161,8 @@ class RigidMotions:
             if size <= max(_AT_REST * scale, _ROUND_OFF * most):
                 break
             damped = best.stiffness + damping * np.eye(len(step))
-            step = self._shortened(np.linalg.solve(damped, best_left), best.openings)
+            whole_step = np.linalg.solve(damped, best_left)
+            step = self._shortened(whole_step, best.openings)
             u = u + np.tensordot(step, self.free, 1)
             levels = levels + step @ self.levels
         return u, levels
@@ -196,10 +200,8 @@ class RigidMotions:
 
     def _shortened(self, step: Array, openings: list[Array]) -> Array:
         """The ``step``, in which no gap changes by more than a facet."""
-        farthest = 0.0
-        for opening in openings:
-            farthest = max(farthest, float(np.abs(opening @ step).max(initial=0.0)))
-        farthest = self.comm.allreduce(farthest, op=MPI.MAX)
+        sizes = [float(np.abs(opening @ step).max(initial=0.0)) for opening in openings]
+        farthest = self.comm.allreduce(max(sizes, default=0.0), op=MPI.MAX)
         return step if farthest <= self._facet else step * (self._facet / farthest)
 
     def _push(self, u: Array, levels: Array, load: float) -> _Push:
@@ -212,13 +214,13 @@ class RigidMotions:
         pressed = 0.0
         openings: list[Array] = []
         for pair in self.contact.pairs:
-            rates = [
-                point_rates(pair, *motion)[0] for motion in zip(self.free, self.levels, strict=True)
-            ]
+            motions = zip(self.free, self.levels, strict=True)
+            rates = [point_rates(pair, *motion)[0] for motion in motions]
             opening = -np.stack(rates, axis=2) / pair.gamma[..., None]
             weight = pair.share * pair.surface.weight.ravel()
             force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
-            stiff = (weight[:, None] * pair.gamma)[:, None] * pair.by_trial
+            weighted = weight[:, None] * pair.gamma
+            stiff = weighted[:, None] * pair.by_trial
             stiffness += np.tensordot(opening, stiff @ opening, ((0, 1), (0, 1)))
             pressed += float(np.abs(pair.forces).sum())
             openings.append(opening)

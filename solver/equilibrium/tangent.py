@@ -83,7 +83,8 @@ class TangentMatrix:
     def _held(self, axis: int) -> fem.DirichletBC:
         """The prescribed displacements along an ``axis``."""
         nodes = np.flatnonzero(self.drives.fixed[:, axis]).astype(np.int32)
-        return fem.dirichletbc(0.0, self.dimension * nodes + axis, self.V.sub(axis))
+        dofs = self.dimension * nodes + axis
+        return fem.dirichletbc(0.0, dofs, self.V.sub(axis))
 
     def _prescribed_rates(self) -> tuple[np.ndarray, Array]:
         """The prescribed dofs ``(p,)`` of all ranks, and then the dofs of rigid discs and one that
@@ -91,12 +92,13 @@ class TangentMatrix:
         drives = self.drives
         m = len(drives.unknown)
         own = np.flatnonzero(self._fixed)
-        rate = drives.unknown_rate[:, : self._n_owned].reshape(m, self._fixed.size).T[own]
+        of_nodes = drives.unknown_rate[:, : self._n_owned].reshape(m, self._fixed.size)
         first = self.dimension * self._start
-        parts = self.V.mesh.comm.allgather((first + own, rate))
+        parts = self.V.mesh.comm.allgather((first + own, of_nodes.T[own]))
         discs = [drives.weight[:, None] * disc.rate[drives.unknown] for disc in self.contact.rigid]
         behind = np.hstack([*discs, np.zeros((m, 1))]).T
-        parts.append((self.dimension * self._size + np.arange(len(behind)), behind))
+        numbers = self.dimension * self._size + np.arange(len(behind))
+        parts.append((numbers, behind))
         dofs, rates = zip(*parts, strict=True)
         return np.concatenate(dofs), np.concatenate(rates)
 
@@ -105,7 +107,8 @@ class TangentMatrix:
         self.A.assemble()
         self.A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
         nodes = [surface.curve_dofs for surface in self.contact.surfaces]
-        return Condensed(self.A, np.unique(np.concatenate(nodes)), self.dimension, revise)
+        in_contact = np.unique(np.concatenate(nodes))
+        return Condensed(self.A, in_contact, self.dimension, revise)
 
     def _allocated(self, *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
         """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this
@@ -130,7 +133,8 @@ class TangentMatrix:
         rows, columns = self.contact.pattern()
         self.A = self._allocated((rows, columns))
         # zeros into every other slot: what is not written before the first assembly is given back
-        add_blocks(self.A, rows, columns, np.zeros((len(rows), self.dimension, self.dimension)))
+        zeros = np.zeros((len(rows), self.dimension, self.dimension))
+        add_blocks(self.A, rows, columns, zeros)
         self.A.assemble()
         self.A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
         changes = self.bulk.plastic or self.bulk.finite or self.springs
@@ -220,7 +224,8 @@ class TangentMatrix:
         row_rate = self._slots.row_rate[at]
         on_rows = np.einsum("nij,njm->nim", blocks, self._slots.column_rate[at])
         on_columns = np.einsum("nim,nij->njm", row_rate, blocks)
-        D = np.tensordot(row_rate, on_rows, ((0, 1), (0, 1))) - rate @ load.T + load @ rate.T
+        between = np.tensordot(row_rate, on_rows, ((0, 1), (0, 1)))
+        D = between - rate @ load.T + load @ rate.T
         B = -load.T
         C = load.T.copy()
         for level in range(m):

@@ -114,16 +114,16 @@ class MeshOrder:
             shape = tabulate(V.mesh.basix_cell(), degree, element.points)[0]
             corners = self.coordinates[self.nodes_of_cell]
             places = np.einsum("qa,nai->nqi", shape, corners).reshape(-1, 3)
-            first = np.unique(of_cells, return_index=True)[1]
-            self.coordinates = places[np.sort(first)]
-            self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
+            _, first = np.unique(of_cells, return_index=True)
+            in_order = np.sort(first)
+            self.coordinates = places[in_order]
+            self.nodes_of_cell = np.searchsorted(in_order, first[of_cells])
         self._index = self.system.comm.bcast(first)[numbers]
 
     def mesh_digest(self) -> str:
         """SHA-256 of coordinates and cells, on rank 0."""
-        return hashlib.sha256(
-            self.coordinates.tobytes() + self.nodes_of_cell.astype("<i8").tobytes()
-        ).hexdigest()
+        nodes = self.nodes_of_cell.astype("<i8")
+        return hashlib.sha256(self.coordinates.tobytes() + nodes.tobytes()).hexdigest()
 
     @cached_property
     def sets_digest(self) -> str:
@@ -141,11 +141,13 @@ class MeshOrder:
         for surface in self.system.contact.surfaces:
             touches = np.zeros((self._n_owned, 1), dtype=bool)
             own = surface.curve_dofs - first
-            touches[own[(own >= 0) & (own < self._n_owned)]] = True
+            is_here = (own >= 0) & (own < self._n_owned)
+            touches[own[is_here]] = True
             marks.append(touches)
         arrays = [self.collect(mark).astype(np.uint8) for mark in marks]
         arrays.append(self.bodies().astype("<i4"))
-        return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+        content = b"".join(array.tobytes() for array in arrays)
+        return hashlib.sha256(content).hexdigest()
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
@@ -153,7 +155,8 @@ class MeshOrder:
         of_cells = np.zeros(self.n_cells, dtype=np.int32)
         for body in problem.bodies:
             cells = problem.cells_of(body)
-            of_cells[cells[cells < self.n_cells]] = problem.tag(body)
+            owned = cells[cells < self.n_cells]
+            of_cells[owned] = problem.tag(body)
         return self.cells(of_cells)
 
     def facet_sets(self) -> dict[str, np.ndarray]:
@@ -164,12 +167,15 @@ class MeshOrder:
         facet = mesh.topology.dim - 1
         n_vertices = len(basix.topology(mesh.basix_cell())[facet][0])
         found = {}
-        for name in (name for name, tags in tagged.facet_sets.items() if tags):
+        for name, tags in tagged.facet_sets.items():
+            if not tags:
+                continue
             facets = tagged.facets_in(name)
             vertices = np.zeros((0, n_vertices), dtype=np.int32)
             if len(facets):  # dolfinx divides by their number
                 vertices = entities_to_geometry(mesh, facet, facets)[:, :n_vertices]
-            nodes = np.sort(self._index[self._dof_of_vertex[vertices]], axis=1)
+            dofs = self._dof_of_vertex[vertices]
+            nodes = np.sort(self._index[dofs], axis=1)
             parts = self.system.comm.gather(nodes)
             if parts is not None:
                 each_once = np.unique(np.concatenate(parts), axis=0)
@@ -210,9 +216,11 @@ class MeshOrder:
             virgin = vars(points.material.state(points.n))
             used = np.zeros(points.n, dtype=bool)
             for name, values in now.items():
-                used |= (values != virgin[name]).any(axis=tuple(range(1, values.ndim)))
+                differs = values != virgin[name]
+                used |= differs.any(axis=tuple(range(1, values.ndim)))
             gather = Gather(self.system.comm, number[used])
-            for name, values in ({"point": number} | now).items():
+            stored = {"point": number} | now
+            for name, values in stored.items():
                 whole[f"history/{place}/{name}"] = gather(values[used])
         return whole
 

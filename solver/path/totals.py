@@ -39,14 +39,14 @@ class Totals:
     def reaction_moments(self, name: str, point: Sequence[float]) -> Array:
         """Moments ``(t,)`` of these forces at ``point``: about z in a plane, about x, y and z in
         space, none around an axis. At large strain forces act where their nodes are now."""
-        d = self.problem.kinematics.dimension
+        kinematics = self.problem.kinematics
         forces = self.equilibrium.diagnostics.reaction(name)
-        places = self.equilibrium.unknowns.V.tabulate_dof_coordinates()[: len(forces), :d]
+        nodes = self.equilibrium.unknowns.V.tabulate_dof_coordinates()
+        places = nodes[: len(forces), : kinematics.dimension]
         if self.bulk.finite:
             places = places + self.equilibrium.displacement()[: len(forces)]
         arm = places - np.asarray(point)
-        turns = self.problem.kinematics.turns
-        here = [(arm[:, i] * forces[:, j] - arm[:, j] * forces[:, i]).sum() for i, j in turns]
+        here = [moment.sum() for moment in kinematics.moments(arm, forces)]
         return self.problem.whole * self.comm.allreduce(np.array(here))
 
     def contact_force(self, name: str = "") -> Array:
@@ -133,7 +133,8 @@ class Totals:
     ) -> tuple[float, ...]:
         """Largest PEEQ at a quadrature point of the ``bodies``, of those at ``x`` ``(n, d)`` for
         which ``within(x)`` is true; and the coordinates of its place. Zeros without any."""
-        found = [(0.0,) * (1 + self.problem.kinematics.dimension)]
+        nowhere = (0.0,) * self.problem.kinematics.dimension
+        found = [(0.0, *nowhere)]
         for body in bodies:
             peeq, x = self.bulk.peeq_of(self.problem.tag(body))
             if within is not None:

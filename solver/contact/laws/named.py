@@ -52,7 +52,7 @@ WITHOUT_PARAMETERS = ("frictionless", "tied")
 NAMES = (*WITHOUT_PARAMETERS, "coulomb")  # what a `Problem` may say, with a coefficient of friction
 
 
-def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
+def contact_law(law: str | ContactLaw, friction: float) -> ContactLaw:
     """The law of a name, or the ``law`` itself if it is one already.
 
     "frictionless" with a coefficient of ``friction`` is "coulomb". Raises ValueError for an unknown
