@@ -16,7 +16,7 @@ def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
     words; nothing where its files agree. Of large files only the size is read."""
     if not _is_of(folder, scene):
         return "scene.toml is of another scene"
-    faults = faults_of(folder, report.get("files", {}), quick=True)
+    faults = faults_of(folder, report.get("files", {}))
     if faults:
         return "; ".join(f"{name} {fault}" for name, fault in faults.items())
     fault = history_fault(folder, report)

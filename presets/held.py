@@ -45,16 +45,19 @@ def check(problem: Problem) -> list[str]:
     doubts = list[str]()
     if whole is not None:
         around_axis = problem.kinematics.has_hoop
+        in_space = whole.dimension == 3
         moves = _free(problem, whole, cells, owner)
+        touching = set(owner.values())
+        excused = SPACE if in_space else ("rotation",)
         faults = chain(
             beyond_axis(whole.x) if around_axis else [],
             _shared(problem, whole, owner),
             _half_loaded(problem, whole),
-            _loose(moves, set(owner.values()), SPACE if whole.dimension == 3 else ("rotation",)),
+            _loose(moves, touching, excused),
         )
         failure = next(faults, "")
         doubts += _half_held(problem, whole)
-        doubts += _sliding(problem, owner, moves) if whole.dimension == 3 else []
+        doubts += _sliding(problem, owner, moves) if in_space else []
         doubts += _moved_in_contact(problem, whole)
         doubts += _stiffened(problem, whole)
         for name in sorted({*owner, *_moved(problem), *_spread(problem)}):
@@ -86,7 +89,8 @@ def _pairs(problem: Problem) -> list[list[str | float]]:
     for part in problem.interactions:
         if not _is_tied(part):
             disc = disc_of(part)
-            pairs.append([*_surfaces(part), *([disc.radius] if disc else [])])
+            beside = [disc.radius] if disc else []
+            pairs.append([*_surfaces(part), *beside])
     return pairs
 
 
@@ -155,8 +159,10 @@ def _moved_in_contact(problem: Problem, whole: MeshArrays) -> Iterator[str]:
         there = np.isin(whole.tags, whole.facet_sets.get(on, ()))
         touching = np.isin(whole.tags, whole.facet_sets[surface])
         both = there & touching
-        if both.any() and (there & ~touching).any() and (touching & ~there).any():
-            at = place(whole.x[whole.facets[both][0, : whole.dimension]].mean(axis=0))
+        only_moved = there & ~touching
+        only_touching = touching & ~there
+        if both.any() and only_moved.any() and only_touching.any():
+            at = _middle(whole, whole.facets[both][0])
             yield (
                 f"the set {on!r} of {by!r} has {both.sum()} facets of the surface {surface!r} of "
                 f"{part!r}, as at {at}, which it moves whatever they touch: look "
@@ -178,12 +184,18 @@ def _shared(problem: Problem, whole: MeshArrays, owner: dict[str, str]) -> Itera
         tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
         common = whole.facets[np.isin(whole.tags, [*tags])]
         if len(common):
-            at = place(whole.x[common[0, : whole.dimension]].mean(axis=0))
+            at = _middle(whole, common[0])
             yield (
                 f"the surfaces {one!r} of the interaction {first!r} and {other!r} of {second!r} "
                 f"have {len(common)} facets in common, the first at {at}, whose "
                 "contact would count twice: a facet meets a body in one interaction"
             )
+
+
+def _middle(whole: MeshArrays, facet: np.ndarray) -> str:
+    """The middle of the corners of a ``facet``, in words."""
+    corners = whole.x[facet[: whole.dimension]]
+    return place(corners.mean(axis=0))
 
 
 def _faced(part: Interaction, name: str, owner: dict[str, str]) -> str:
@@ -204,12 +216,15 @@ def _free(
         middle = corners.mean(axis=1)
         sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
         frames = np.linalg.qr(sides, mode="complete")[0]  # the tangents, then the normal
-        tangents_too = np.moveaxis(frames, 2, 0)
-        for direction in tangents_too if _is_tied(part) else tangents_too[-1:]:
-            if len(names) == 1:
-                held[owner[names[0]]].append((middle, direction))
+        directions = np.moveaxis(frames, 2, 0)
+        if not _is_tied(part):
+            directions = directions[-1:]
+        bodies = [owner[name] for name in names]
+        for direction in directions:
+            if len(bodies) == 1:
+                held[bodies[0]].append((middle, direction))
             else:
-                links.append((owner[names[0]], owner[names[1]], middle, direction))
+                links.append((bodies[0], bodies[1], middle, direction))
     possible = SPACE if whole.dimension == 3 else PLANE
     if problem.kinematics.has_hoop:
         possible = AXISYMMETRIC
@@ -239,7 +254,8 @@ def _loose(
 def _sliding(problem: Problem, owner: dict[str, str], moves: dict[str, list[str]]) -> Iterator[str]:
     """Warnings of bodies in contact without friction that nothing keeps from sliding."""
     smooth = [part for part in problem.interactions if not (part.friction or _is_tied(part))]
-    for body in sorted({owner[name] for part in smooth for name in _surfaces(part)}):
+    bodies = {owner[name] for part in smooth for name in _surfaces(part)}
+    for body in sorted(bodies):
         axes = [motion for motion in moves[body] if motion in ("x", "y", "z")]
         if axes:
             yield (
@@ -254,14 +270,13 @@ def _held_places(
 ) -> dict[str, list[tuple[Array, Array]]]:
     """Where supports and displacements hold each body, and along what: places ``(k, d)`` and
     directions ``(k, d)``, or motions ``(1, 6)`` about the point of a coupling in space."""
+    d = whole.dimension
     facets = {c.name: c.facets for c in problem.couplings}
-    given: list[tuple[str, str]] = [
-        (s.on, f) for s in _supports(problem) for f in s.held(whole.dimension)
-    ]
+    given: list[tuple[str, str]] = [(s.on, f) for s in _supports(problem) for f in s.held(d)]
     displaced = [load for load in _loads(problem) if load.kind == "displacement"]
     given += [(load.on, str(load.direction)) for load in displaced]
-    d = whole.dimension
-    given += [(s.facets, "xyz"[s.axis]) for s in problem.supports if isinstance(s, Dirichlet)]
+    fixed = [support for support in problem.supports if isinstance(support, Dirichlet)]
+    given += [(support.facets, "xyz"[support.axis]) for support in fixed]
     hinged = [c for c in problem.couplings if d == 3 or (c.name, "rotation") not in given]
     hinges = {coupling.name: np.array([coupling.point]) for coupling in hinged}
     units = {freedom: np.eye(d)[axis] for axis, freedom in enumerate("xyz"[:d])}
@@ -295,7 +310,8 @@ def require_facing(system: System) -> list[str]:
             allowed = part.overlap + _FAR * size
             said = f"the surface {pair.surface.name!r} of {part.name!r}"
             is_tied = not pair.law.slides
-            if nearest <= allowed and farthest > _APART * size and is_tied:
+            is_near = nearest <= allowed
+            if is_tied and is_near and farthest > _APART * size:
                 drawn = f"the surfaces that {part.name!r} ties are drawn up to {farthest:.3g} apart"
                 apart = f"{drawn}: what is carried along them loses its moment about that gap"
             if lowest < -allowed:
@@ -303,7 +319,7 @@ def require_facing(system: System) -> list[str]:
                     f"{said} lies up to {-lowest:g} behind the opposite one: they must face each "
                     "other"
                 )
-            if nearest > allowed and is_tied:
+            if is_tied and not is_near:
                 raise ValueError(f"{said} is nowhere near the one that it is tied to")
             closest = min(closest, lowest)
         if apart:
@@ -316,12 +332,15 @@ def require_facing(system: System) -> list[str]:
 def _drawn_gap(pair: Pair, comm: MPI.Comm) -> tuple[float, float, float]:
     """The lowest gap of the points of a ``pair`` as drawn, and the smallest and the largest size of
     a gap. Collective."""
-    gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
+    along_normal = (pair.separation * pair.projection.normal).sum(axis=1)
+    gap = along_normal[pair.projection.found]
     size = np.abs(gap)
-    smallest = [gap.min(initial=np.inf), size.min(initial=np.inf), -size.max(initial=0.0)]
-    found = np.array(smallest)
-    comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MIN)
-    lowest, nearest, farthest = found
+    lowest = gap.min(initial=np.inf)
+    nearest = size.min(initial=np.inf)
+    farthest = size.max(initial=0.0)
+    smallest = np.array([lowest, nearest, -farthest])
+    comm.Allreduce(MPI.IN_PLACE, smallest, op=MPI.MIN)
+    lowest, nearest, farthest = smallest
     return float(lowest), float(nearest), -float(farthest)
 
 
@@ -330,12 +349,13 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
     negative where they lie in each other. Raises ValueError for a fit that is drawn and given as an
     interference, too."""
     deep = -gap
-    drawn = f"drawn {abs(gap):.3g} {'apart' if gap >= 0 else 'deep in each other'}"
-    said = f"the surfaces of {part.name!r} are {drawn}"
+    how = "apart" if gap >= 0 else "deep in each other"
+    said = f"the surfaces of {part.name!r} are drawn {abs(gap):.3g} {how}"
     wanted = part.interference
     if part.overlap and deep < part.overlap / 2:
         yield f"{said}, but its overlap is {part.overlap:g}"
-    if wanted and deep > wanted / _ALIKE and (deep < wanted * _ALIKE or not part.overlap):
+    is_alike = deep > wanted / _ALIKE and (deep < wanted * _ALIKE or not part.overlap)
+    if wanted and is_alike:
         raise ValueError(
             f"{said}, and its interference of {wanted:g} would push them together by as much "
             f"again: for a fit that the mesh shows give overlap = {deep:.3g} alone, for one that "
@@ -357,6 +377,8 @@ def _nodes(whole: MeshArrays, name: str, of_cells: bool = False) -> np.ndarray:
     """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone;
     none of another name."""
     if not of_cells and (name in whole.facet_sets or name in whole.point_sets):
-        edges = whole.facets[np.isin(whole.tags, whole.facet_sets.get(name, ()))]
-        return np.union1d(edges, whole.point_sets.get(name, ())).astype(np.int64)
-    return np.unique(whole.cells[np.isin(whole.bodies, whole.cell_sets.get(name, ()))])
+        in_set = np.isin(whole.tags, whole.facet_sets.get(name, ()))
+        points = whole.point_sets.get(name, ())
+        return np.union1d(whole.facets[in_set], points).astype(np.int64)
+    in_set = np.isin(whole.bodies, whole.cell_sets.get(name, ()))
+    return np.unique(whole.cells[in_set])

@@ -48,16 +48,18 @@ class Bearing:
 
     def angle(self, X: Array) -> Array:
         """The angle of points ``(n, q, 3)`` from the load axis, whichever way."""
+        x, y = self.axis
         to = X[..., :2] - self.centre
-        along = to @ np.array(self.axis)
-        across = to @ np.array([-self.axis[1], self.axis[0]])
+        along = to @ np.array([x, y])
+        across = to @ np.array([-y, x])
         return np.abs(np.arctan2(across, along))
 
     def semi_angle(self, state: Accepted) -> float:
         """The angle from the load axis to which the hole bears, at its middle."""
         hole = state.met[self.contact][-1]
         weight = np.where(_inside(hole.X, self.middle), hole.weight, 0.0)
-        bearing = weight[hole.raw_pressure > 0].sum()
+        is_pressed = hole.raw_pressure > 0
+        bearing = weight[is_pressed].sum()
         return float(self.span * bearing / weight.sum())
 
     def peak(self, state: Accepted, strip: Strip) -> float:
@@ -67,7 +69,8 @@ class Bearing:
         near = angle <= max(_PEAK_FRACTION * eps, _LEAST)
         w = np.sqrt(weight[near])
         parabola = np.stack([w, w * angle[near] ** 2], axis=1)
-        peak, _ = np.linalg.lstsq(parabola, w * pressure[near], rcond=None)[0]
+        coefficients, *_ = np.linalg.lstsq(parabola, w * pressure[near], rcond=None)
+        peak, _ = coefficients
         return max(float(peak), 0.0)
 
     def largest(self, state: Accepted, strip: Strip) -> float:
@@ -77,7 +80,8 @@ class Bearing:
         widths = np.bincount(piece, weight)
         whole = widths > _SLIVER * widths.max()
         forces = np.bincount(piece, weight * pressure)
-        return max(float((forces[whole] / widths[whole]).max()), 0.0)
+        means = forces[whole] / widths[whole]
+        return max(float(means.max()), 0.0)
 
     def _points(self, state: Accepted, strip: Strip) -> tuple[Array, Array, Array]:
         """Angle, pressure and weight ``(k,)`` of the points of both sides in a ``strip``."""
@@ -86,7 +90,8 @@ class Bearing:
             inside = _inside(profile.X, strip)
             arrays = (self.angle(profile.X), profile.pressure, profile.weight)
             found.append([array[inside] for array in arrays])
-        angle, pressure, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        both_sides = zip(*found, strict=True)
+        angle, pressure, weight = (np.concatenate(parts) for parts in both_sides)
         return angle, pressure, weight
 
 
@@ -99,9 +104,11 @@ def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
     if shape.kind == "joint":
         yield from _joint_measures(scene, shape)
         return
-    for bearing in _bearings(shape, [part.name for part in scene.interaction]):
+    contacts = [part.name for part in scene.interaction]
+    for bearing in _bearings(shape, contacts):
         name = bearing.contact
-        for where, strip in (("mid", bearing.middle), ("rim", bearing.rim)):
+        strips = {"mid": bearing.middle, "rim": bearing.rim}
+        for where, strip in strips.items():
             largest = partial(_in, bearing.largest, strip)
             yield Measure(f"{name} {where} pressure", stress, largest)
         yield Measure(f"{name} eps", "rad", bearing.semi_angle)
@@ -112,7 +119,8 @@ def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
 def _inside(X: Array, strip: Strip) -> np.ndarray:
     """Whether points ``(n, q, 3)`` are in a ``strip``."""
     low, high = strip
-    return (X[..., 2] >= low) & (X[..., 2] <= high)
+    z = X[..., 2]
+    return (z >= low) & (z <= high)
 
 
 def _in(value: Callable[[Accepted, Strip], float], strip: Strip, state: Accepted) -> float:
@@ -130,8 +138,9 @@ def _rim(shape: Any, face: float, into: int) -> Strip:
     fillet."""
     width = _STRIP * shape.radius
     blunt = shape.space.chamfer or shape.space.fillet
-    low, high = sorted((face + into * blunt, face + into * (blunt + width)))
-    return low, high
+    outer = face + into * blunt
+    inner = face + into * (blunt + width)
+    return min(outer, inner), max(outer, inner)
 
 
 def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
@@ -139,7 +148,8 @@ def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     units = scene.units
     contact = scene.interaction[0].name
     load = scene.load[0].name
-    strips = _middle(shape), _rim(shape, shape.space.thickness / 2, -1)
+    face = shape.space.thickness / 2
+    strips = _middle(shape), _rim(shape, face, -1)
     bearing = Bearing(contact, shape.radius, (0.0, 0.0), (0.0, -1.0), math.pi / 2, *strips)
     yield Measure("delta", units.length, lambda state: -state.driven[load][0])
     yield Measure("P", units.force_of(1.0), lambda state: -state.driven[load][1])
@@ -152,15 +162,16 @@ def _bearings(shape: Any, contacts: list[str]) -> Iterator[Bearing]:
     """The bearings of a lug, a bushing or a clevis, whose pin is in the hole of ``contacts``."""
     R = shape.radius
     pinned = [name for name in contacts if name.startswith("pin in ")]
-    inside = shape.space.thickness / 2 if shape.kind != "clevis" else shape.inner.thickness / 2
-    strips = _middle(shape), _rim(shape, inside, -1)
+    has_plates = shape.kind == "clevis"
+    plate = shape.inner if has_plates else shape.space
+    strips = _middle(shape), _rim(shape, plate.thickness / 2, -1)
     yield Bearing(pinned[0], R, (0.0, 0.0), (1.0, 0.0), math.pi, *strips)
-    if shape.kind != "clevis":
+    if not has_plates:
         return
     _, bottom, top = _heights(shape)
-    at = (2 * shape.clearance, 0.0)
+    centre = (2 * shape.clearance, 0.0)
     strips = _middle(shape, (bottom + top) / 2), _rim(shape, bottom, 1)
-    yield Bearing(pinned[1], R, at, (-1.0, 0.0), math.pi, *strips)
+    yield Bearing(pinned[1], R, centre, (-1.0, 0.0), math.pi, *strips)
 
 
 def _heights(shape: Any) -> tuple[float, float, float]:

@@ -65,17 +65,18 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key,
     value, what may be.
     """
-    if Path(path).is_dir():
+    file = Path(path)
+    if file.is_dir():
         raise InputError(
-            f"{path}: is a folder, not a scene; the scene of a run is {Path(path) / 'scene.toml'}."
+            f"{path}: is a folder, not a scene; the scene of a run is {file / 'scene.toml'}."
         )
     data = read_toml(path)
     if "base" in data and "joint" not in data:
         raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
     _give_way(data, overrides)
     origin = {override_key(data, o): f"--set {o}" for o in in_order(overrides, "--set ")}
-    read_targets(data, Path(path))
-    find_mesh(data.get("mesh"), Path(path).parent)
+    read_targets(data, file)
+    find_mesh(data.get("mesh"), file.parent)
     return parse_any(data, str(path), origin)
 
 
@@ -83,7 +84,8 @@ def find_mesh(mesh: Any, folder: Path) -> None:
     """Let the file of the section ``mesh`` count from ``folder``, and the scene be read from
     anywhere."""
     if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
-        mesh["file"] = str((folder / mesh["file"]).absolute())
+        file = folder / mesh["file"]
+        mesh["file"] = str(file.absolute())
 
 
 def in_order(overrides: Iterable[str], by: str = "") -> list[str]:
@@ -94,13 +96,13 @@ def in_order(overrides: Iterable[str], by: str = "") -> list[str]:
     given: dict[tuple[str, ...], str] = {}
     for key, override in last.items():
         part, _, name = key.rpartition(".")
-        for names in ALTERNATIVES.get(part.partition(".")[0], []):
-            if (
-                name in names
-                and not _drops(override)
-                and given.setdefault((part, *names), override) != override
-            ):
-                said = f"does not go with {given[part, *names]}; give one of them"
+        section, *_ = part.split(".")
+        for names in ALTERNATIVES.get(section, []):
+            if name not in names or _drops(override):
+                continue
+            other = given.setdefault((part, *names), override)
+            if other != override:
+                said = f"does not go with {other}; give one of them"
                 raise InputError(f"{by}{override}: {said}.")
     brought = sorted(last, key=lambda key: not key.endswith((".rigid", ".material")))
     return sorted((last[key] for key in brought), key=lambda override: not _drops(override))
@@ -108,7 +110,8 @@ def in_order(overrides: Iterable[str], by: str = "") -> list[str]:
 
 def _drops(override: str) -> bool:
     """Whether a ``key=value`` drops its key."""
-    return override.partition("=")[2].strip().strip("\"'") == ABSENT
+    _, _, value = override.partition("=")
+    return value.strip().strip("\"'") == ABSENT
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
@@ -178,9 +181,8 @@ def read_text(path: str | Path) -> str:
     except UnicodeDecodeError:
         raise InputError(f"{path}: cannot be read: it is not UTF-8 text.") from None
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}."
-        ) from None
+        said = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read: {said}.") from None
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -213,12 +215,13 @@ def override_key(data: dict[str, Any], override: str) -> str:
     value = _value(text.strip())
     tables = data.get(section)
     if not isinstance(tables, list):
-        inner = (
-            tables.get("shape") if isinstance(tables, dict) and name.startswith("shape.") else None
-        )
+        inner = None
+        if isinstance(tables, dict) and name.startswith("shape."):
+            inner = tables.get("shape")
         if isinstance(inner, dict):
             name = name.removeprefix("shape.")
-        if "\n" in override or not (sign and dot and section and name and "." not in name):
+        is_key = sign and dot and section and name and "." not in name
+        if "\n" in override or not is_key:
             raise InputError(
                 f"--set {override!r}: must read section.key=value, like joint.clearance=0.01."
             )
@@ -228,11 +231,8 @@ def override_key(data: dict[str, Any], override: str) -> str:
             return f"{section}.shape.{name}"
         put(data, section, name, value, f"--set {override}")
         return f"{section}.{name}"
-    known = {
-        str(t.get("name", k)): t
-        for k, t in reversed([*enumerate(tables, 1)])
-        if isinstance(t, dict)
-    }
+    numbered = [(k, table) for k, table in enumerate(tables, 1) if isinstance(table, dict)]
+    known = {str(table.get("name", k)): table for k, table in reversed(numbered)}
     part, _, name = name.rpartition(".")
     if not (sign and name and part in known):
         example = f"{section}.{['1', *known][-1]}.{name}={text}"

@@ -73,12 +73,9 @@ def require_intact(folder: Path, names: Iterable[str]) -> None:
             raise InputError(f"{folder / name}: {fault}; {cure}.")
 
 
-def faults_of(folder: Path, seals: Seals, *, quick: bool = False) -> dict[str, str]:
-    """`fault_of` by name of all sealed files that have one; with ``quick`` large files are known by
-    their size."""
-    found = {
-        name: fault_of(folder, name, seals, by_size=quick and name not in TABLES) for name in seals
-    }
+def faults_of(folder: Path, seals: Seals) -> dict[str, str]:
+    """`fault_of` by name of all sealed files that have one; large files are known by their size."""
+    found = {name: fault_of(folder, name, seals, by_size=name not in TABLES) for name in seals}
     return {name: fault for name, fault in found.items() if fault}
 
 
