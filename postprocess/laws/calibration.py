@@ -17,11 +17,12 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.judgement.convergence import Order, Refined, group
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.report.errors import InputError
 
 POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning
@@ -49,7 +50,8 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """The 95 % confidence interval, with Student's t."""
-        half = float(student.ppf(0.975, self.dof)) * self.error
+        deviations = float(student.ppf(0.975, self.dof))
+        half = deviations * self.error
         return self.value - half, self.value + half
 
 
@@ -80,8 +82,9 @@ def fit(
         raise ValueError("the points do not determine the parameters")
     inverse = np.linalg.inv(scaled.T @ scaled)
     variance = best.fun @ best.fun
+    covariances = np.diag(inverse) * variance / (n - m)
     errors = np.full(m, np.inf)
-    errors[felt] = np.sqrt(np.diag(inverse) * variance / (n - m)) / size[felt]
+    errors[felt] = np.sqrt(covariances) / size[felt]
     return [*map(float, best.x)], [*map(float, errors)]
 
 
@@ -124,9 +127,10 @@ class CurveFit:
         off = law / data - 1
         left = ((law - data) ** 2).sum()
         spread = ((data - data.mean()) ** 2).sum()
+        determination = 1 - left / spread
         rms = np.sqrt(np.mean(off**2))
         largest = off[np.abs(off).argmax()]
-        return float(1 - left / spread), float(rms), float(largest), len(off)
+        return float(determination), float(rms), float(largest), len(off)
 
     @property
     def serial_correlation(self) -> float:
@@ -136,7 +140,8 @@ class CurveFit:
         squares = sum(float(row @ row) for row in rows)
         if not squares:
             return 0.0
-        return sum(float(row[1:] @ row[:-1]) for row in rows) / squares
+        of_neighbours = sum(float(row[1:] @ row[:-1]) for row in rows)
+        return of_neighbours / squares
 
 
 def fit_curve(
@@ -199,22 +204,24 @@ def fit_curve(
     if free == "k":
         values, errors = solve(data, free)
     mesh: list[float | None] = [None] * len(free)
-    orders = tuple(
-        (g.run.name, g.order(y)) for g, y in zip(groups, curves, strict=True) if g.coarser
-    )
+    orders = []
+    extrapolated = []
+    for g, y in zip(groups, curves, strict=True):
+        finest = y[0]
+        if g.coarser:
+            orders.append((g.run.name, g.order(y)))
+            finest = finest + g.shift(y)
+        extrapolated.append(finest)
     if orders:
-        finer = scaled(
-            y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True)
-        )
-        moved, _ = solve(finer, free)
+        moved, _ = solve(scaled(extrapolated), free)
         mesh = [abs(new - value) for new, value in zip(moved, values, strict=True)]
     residuals = tuple(
         Residual(run.name, run.delta[rows] / run.dR, measured, fitted)
         for (run, rows), measured, fitted in zip(chosen, data, law(values), strict=True)
     )
     dof = sum(map(len, data)) - len(free)
-    found = [Estimate(*numbers, dof) for numbers in zip(values, errors, mesh, strict=True)]
-    return CurveFit(found[0], found[1] if free == "kc" else None, residuals, orders)
+    k, *c = (Estimate(*numbers, dof) for numbers in zip(values, errors, mesh, strict=True))
+    return CurveFit(k, c[0] if c else None, residuals, tuple(orders))
 
 
 def dimensionless_law(
@@ -223,7 +230,8 @@ def dimensionless_law(
     """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield
     stress is None."""
     state = plastic_winkler(_joint(run, k, c), delta)
-    return (state.load if quantity == "P" else state.peak_pressure) / _scale(quantity, run)
+    values = state.load if quantity == "P" else state.peak_pressure
+    return values / _scale(quantity, run)
 
 
 def _joint(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
@@ -242,7 +250,9 @@ def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.
             f"{run.name}: the bodies never touch in this run, so there is no law to fit to it."
         )
     low, high = load_range
-    chosen = touching & (load >= low * (1 - slack)) & (load <= high * (1 + slack))
+    above = load >= low * (1 - slack)
+    below = load <= high * (1 + slack)
+    chosen = touching & above & below
     if not chosen.any():
         raise InputError(
             f"{run.name}: has no step with contact from {low:g} to {high:g} clearances; its "

@@ -15,7 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.materials.material import Array
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import LawState
 
 _LIU_K = 3 * math.pi / 16  # whose parabola over the chord has the force of Liu's ellipse

@@ -21,7 +21,8 @@ import math
 import numpy as np
 from scipy.special import lambertw
 
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.materials.material import Array
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import NOTHING, ROUND_OFF, LawState, rising_root
 
 _AT_LIMIT = 1 - 1e-15  # of the limit: beyond it round-off would give a complex W, or none
@@ -33,8 +34,9 @@ def hertz(joint: LawJoint, P: Array) -> LawState:
     R_star = joint.relative_radius
     root = np.sqrt(P / (math.pi * joint.E_star * R_star))
     half_width = 2 * R_star * root
+    semi_angle = half_width / joint.radius
     p0 = joint.E_star * root
-    return LawState(NOTHING, P, NOTHING, p0, half_width / joint.radius)
+    return LawState(NOTHING, P, NOTHING, p0, semi_angle)
 
 
 def hertz_load_limit(joint: LawJoint) -> float:
@@ -70,7 +72,8 @@ def logarithm(joint: LawJoint, delta: Array, A: float, q: float) -> LawState:
     y = np.maximum(-lambertw(below, -1).real, 1.0)
     y = np.where(delta > 0, y, np.inf)
     y = np.where(at_limit, 1.0, y)
-    y = np.where(delta > limit * (1 + ROUND_OFF), np.nan, y)
+    is_beyond = delta > limit * (1 + ROUND_OFF)
+    y = np.where(is_beyond, np.nan, y)
     with np.errstate(divide="ignore"):
         return LawState(delta, spring * delta / y, spring / (y - 1))
 

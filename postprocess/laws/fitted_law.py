@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from archord.materials.material import Array
 from archord.postprocess.laws.chord_laws import plastic_winkler
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import ROUND_OFF, LawRangeWarning, LawState, rising_root
 from archord.report.readable import json_of
 

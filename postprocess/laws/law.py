@@ -10,12 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.general.joint import (
-    FIXED_PAIRS,
-    Array,
-    LawJoint,
-    LawRangeWarning,
-)
+from archord.materials.material import Array
+from archord.postprocess.laws.general.joint import FIXED_PAIRS, LawJoint, LawRangeWarning
 
 ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
 _FAR = 1e150  # no displacement, and its square is still a number

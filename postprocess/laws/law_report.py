@@ -60,7 +60,7 @@ def too_elastic(law: Law, joint: LawJoint, state: LawState) -> list[str]:
 
 
 def law_table(
-    law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float = 1.0
+    law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float
 ) -> str:
     """The law's title and its `sample`, a row for each point, in ``units`` of length, force,
     stiffness and stress where they are known, forces of a joint of this ``thickness``; without

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws import chord_laws as chord
 from archord.postprocess.laws import elastic_laws as elastic
 from archord.postprocess.laws.general import general_law as general
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import Law, LawState
 
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation

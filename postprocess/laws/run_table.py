@@ -82,17 +82,23 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
     start = _opening(x, y, before)
     if start <= _AT_ONCE * x[0]:
         start = 0.0
-    begin = np.unique([0.0, start])
-    loading = _cubic(np.append(begin, x), np.append(0 * begin, y), touching=len(begin) == 1)
+    without_force = np.unique([0.0, start])
+    displacements = np.append(without_force, x)
+    forces = np.append(0 * without_force, y)
+    loading = _cubic(displacements, forces, touching=len(without_force) == 1)
     back = _way_back(steps, k, loading)
 
     tables = _tables(steps, k, loading, back)
     nodes = tables["x"]
     last = slice(-len(k) - 1, None)
-    left_out = _left_out(loading.x[last] - start, loading.f[last])[1:] / y
-    mesh = np.interp(nodes, x, steps.mesh_error(loading.df[-len(k) :]) / y)
+    off_cubic = _left_out(loading.x[last] - start, loading.f[last])
+    left_out = off_cubic[1:] / y
+    of_mesh = steps.mesh_error(loading.df[-len(k) :])
+    mesh = np.interp(nodes, x, of_mesh / y)
     sizes = _around(np.abs(left_out))
-    error = np.interp(nodes, [start, *x], [_FIRST * sizes[0], *sizes]) + mesh
+    at_first_touch = _FIRST * sizes[0]
+    of_steps = np.interp(nodes, [start, *x], [at_first_touch, *sizes])
+    error = of_steps + mesh
     curve = JointCurve(**tables, error=error, back_error=error)
     measured, said = _errors_back(curve, steps, k, back)
     about = steps.about | {
@@ -116,7 +122,8 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
 def _steps_of_loading(steps: RunSteps) -> np.ndarray:
     """Indices of the steps of first loading, from the first contact on."""
     first = steps.first
-    touching = np.flatnonzero(steps.closed[first] & (steps.y.max(initial=0.0) > 0))
+    has_force = steps.y.max(initial=0.0) > 0
+    touching = np.flatnonzero(steps.closed[first] & has_force)
     k = first[touching[0] :] if len(touching) else first[:0]
     if len(k) < _FEWEST:
         said = f"has {len(k)} steps of first loading with contact, and a table needs {_FEWEST}"
@@ -127,9 +134,10 @@ def _steps_of_loading(steps: RunSteps) -> np.ndarray:
 
 def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> dict[str, Any]:
     """All cubics at the nodes of both ways, by their names in `JointCurve`."""
-    distance = np.abs(back.curve.x[:, None] - loading.x).min(axis=1)
+    on_way_back = back.curve.x
+    distance = np.abs(on_way_back[:, None] - loading.x).min(axis=1)
     is_new = distance > _SAME * loading.x[-1]
-    nodes = np.union1d(loading.x, back.curve.x[is_new])
+    nodes = np.union1d(loading.x, on_way_back[is_new])
     touched = np.append(k[0], k)
     x = np.append(0.0, steps.x[k])
     root = np.sqrt(steps.y[touched])
@@ -140,7 +148,8 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
         "peak": _cubic(x, steps.peak[touched] / root),
         "angle": _cubic(x, steps.angle[touched] / root),
     }
-    tables: dict[str, Any] = {"x": nodes, "toe": np.zeros(len(nodes)), "touch": np.empty(0)}
+    sharp = np.zeros(len(nodes))
+    tables: dict[str, Any] = {"x": nodes, "toe": sharp, "touch": np.empty(0)}
     for name, cubic in cubics.items():
         tables[name], tables[f"d{name}"] = cubic.at(nodes)
     return tables | steps.units
@@ -153,22 +162,27 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
     least = _ELASTIC * np.ptp(steps.x) * steps.y.max()
     if steps.dissipated.max() <= least:
         x, f, df = (values[-len(k) - 1 :] for values in loading)
+        same = _Cubic(x - start, f, df)
         ratio: Array = np.ones(len(loading.x))
-        return _WayBack(_Cubic(x - start, f, df), ratio, k[:0], "along first loading: elastic")
+        return _WayBack(same, ratio, k[:0], "along first loading: elastic")
     way = _last_unloading(steps, k, least)
-    on = way[steps.closed[way]][::-1]  # by rising displacement
-    off = way[~steps.closed[way]]
+    closed = steps.closed[way]
+    on = way[closed][::-1]  # by rising displacement
+    off = way[~closed]
     x = steps.x[on]
     y = steps.y[on]
     z = _opening(x, y, steps.x[off])
     curve = _cubic(np.append(0.0, x - z), np.append(0.0, y), touching=True)
-    secant = loading.f[-len(k)] / (loading.x[-len(k)] - start)
+    first = -len(k)  # the first step with contact
+    secant = loading.f[first] / (loading.x[first] - start)
     curve.df[0] = min(curve.df[0], _SOFTER * secant)
     deepest = loading.x == x[-1]
     shift = _shift(loading, steps.dissipated[k], _SAME * y[-1])
-    travel = loading.x - start - (z - start) * shift / shift[deepest]
+    opens_later = (z - start) * shift / shift[deepest]
+    travel = loading.x - start - opens_later
     ratio = _meeting(curve, travel, loading.f)
-    ratio[loading.x <= start] = ratio[loading.x > start][0]
+    is_touching = loading.x > start
+    ratio[~is_touching] = ratio[is_touching][0]
     ratio[deepest] = 1.0
     said = f"from {steps.at(x[-1])} in {len(on)} steps, opens at {steps.at(z)}"
     if not len(off):
@@ -199,9 +213,11 @@ def _last_unloading(steps: RunSteps, k: np.ndarray, least: float) -> np.ndarray:
 def _shift(loading: _Cubic, dissipated: Array, least: float) -> Array:
     """``int dD/P`` at the nodes of ``loading``, with the dissipation at its last nodes; forces are
     taken to be ``least`` at least."""
-    lost = np.append(np.zeros(len(loading.x) - len(dissipated)), dissipated)
+    before_contact = np.zeros(len(loading.x) - len(dissipated))
+    lost = np.append(before_contact, dissipated)
     force = (loading.f[1:] + loading.f[:-1]) / 2
-    return np.append(0.0, np.cumsum(np.diff(lost) / force.clip(least)))
+    shifts = np.diff(lost) / force.clip(least)
+    return np.append(0.0, np.cumsum(shifts))
 
 
 def _errors_back(
@@ -214,7 +230,8 @@ def _errors_back(
     for way in _unloadings(steps, k):
         x = steps.x[way]
         y = steps.y[way]
-        told = curve.at(x * curve.length, x[0] * curve.length).load / curve.force
+        delta = x * curve.length
+        told = curve.at(delta, delta[0]).load / curve.force
         errors[x[0]] = (told - y) / y[0]
     others = dict(errors)
     if len(back.steps):
@@ -240,7 +257,8 @@ def _errors_back(
 def _worst(curve: JointCurve, errors: dict[float, Array]) -> Array:
     """The largest of the ``errors`` of each way back, at the nodes that it begins at."""
     known = sorted(errors)
-    return np.interp(curve.x, known, [np.abs(errors[x]).max() for x in known])
+    largest = [np.abs(errors[x]).max() for x in known]
+    return np.interp(curve.x, known, largest)
 
 
 def _unloadings(steps: RunSteps, k: np.ndarray) -> list[np.ndarray]:
@@ -265,7 +283,8 @@ def _meeting(curve: _Cubic, u: Array, y: Array) -> Array:
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
         r = np.exp(middle)
-        stiff = r * curve.at(u / r)[0] > y
+        unloading, _ = curve.at(u / r)
+        stiff = r * unloading > y
         low = np.where(stiff, middle, low)
         high = np.where(stiff, high, middle)
     return np.exp((low + high) / 2)
@@ -278,14 +297,16 @@ def _cubic(x: Array, f: Array, touching: bool = False) -> _Cubic:
     from scipy.interpolate import PchipInterpolator
 
     if np.isnan(f).any():
-        return _Cubic(x, 0 * x + np.nan, 0 * x + np.nan)
+        unknown = 0 * x + np.nan
+        return _Cubic(x, unknown, unknown)
     df = PchipInterpolator(x, f)(x, 1)
     last = (f[-1] - f[-2]) / (x[-1] - x[-2])
     df[-1] = max(df[-1], _LEAST * last, key=abs)
     if touching:
         power = np.log(f[2] / f[1]) / np.log(x[2] / x[1])
         bend = 8 * (0.5**power - 0.5)
-        df[0] = max(df[1] + bend * f[1] / x[1], 0.0)
+        steeper = bend * f[1] / x[1]
+        df[0] = max(df[1] + steeper, 0.0)
     return _Cubic(x, f, df)
 
 
@@ -305,11 +326,13 @@ def _steps_asked(x: Array, left_out: Array) -> str:
     """How many steps of first loading leave errors of 1 %, from those ``left_out`` at the steps
     ``x``, which fall with the square of the step's length; below `_EARLY` of the largest x, near
     first touch, they fall far more slowly."""
-    worst = float(np.abs(left_out[x > _EARLY * x[-1]]).max())
+    is_late = x > _EARLY * x[-1]
+    worst = float(np.abs(left_out[is_late]).max())
     where = f"above {_EARLY:.0%} of the largest displacement"
     if worst <= _WANTED:
         return f"the {len(x)} of this run are enough {where}: largest error {worst:.2%}"
-    wanted = int(np.ceil(len(x) * np.sqrt(worst / _WANTED)))
+    shorter = np.sqrt(worst / _WANTED)
+    wanted = int(np.ceil(len(x) * shorter))
     return f"about {wanted} of equal length on first loading, instead of {len(x)}; {where}"
 
 

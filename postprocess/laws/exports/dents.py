@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch
 
 _SAMPLES = 4000  # of phi, up to its largest argument
@@ -69,7 +69,8 @@ def _losing(curve: JointCurve, z: Array, dz: Array, h: Array) -> tuple[Array, Ar
     """``z`` and ``dz`` raised where energy would be gained."""
     width = np.diff(curve.x)
     dr = curve.dratio
-    phi = _largest_phi(curve, _MARGIN * np.maximum(h[:-1], h[1:]))  # (n - 1,), between nodes
+    between = _MARGIN * np.maximum(h[:-1], h[1:])
+    phi = _largest_phi(curve, between)  # (n - 1,)
     # at the nodes
     at_nodes = np.maximum(np.append(0.0, phi), np.append(phi, 0.0))
     least_slope = np.maximum(-dr * at_nodes, 0.0)

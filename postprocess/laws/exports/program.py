@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.exports import dents, element
 from archord.postprocess.laws.fitted_law import FittedLaw
-from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.law import ROUND_OFF
 

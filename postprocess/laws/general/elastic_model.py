@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import line_contact
 
 TABLE = Path(__file__).parent / "elastic_model.json"

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.factor_model import (
     FRICTION,
@@ -31,7 +32,7 @@ from archord.postprocess.laws.general.factor_model import (
     factor_model,
 )
 from archord.postprocess.laws.general.general_law import NODES, joint_numbers
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
 from archord.report.table import Table
 

@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic
-from archord.postprocess.laws.general.joint import Array
 
 TABLE = Path(__file__).parent / "factor_model.json"
 FRICTION = "friction"

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 
 _BLOCK = 32  # columns of a factor at a time, which caches hold
 _WIDE = 1.0  # prior variance of the linear mean's coefficients over the variance of the rest
@@ -49,7 +49,8 @@ class Kernel:
 
     def at(self, points: Array) -> Array:
         """Variances ``(n,)`` at points ``(n, d)``."""
-        return 1 + _WIDE * (1 + (points**2).sum(1))
+        of_mean = 1 + (points**2).sum(1)
+        return 1 + _WIDE * of_mean
 
 
 class Process:
@@ -76,8 +77,9 @@ class Process:
             size = left.shape[1]
             left[np.diag_indices(size)] += kernel.noise
             left -= self.factor[start:, :start] @ self.factor[columns, :start].T
+            lower = np.linalg.cholesky(left[:size])
             # of an upper triangle, of which LAPACK exchanges no rows
-            inverse = np.linalg.inv(np.linalg.cholesky(left[:size]).T).T
+            inverse = np.linalg.inv(lower.T).T
             self.factor[start:, columns] = left @ inverse.T
             self.inverses.append(inverse)
         unknown = np.isnan(values)
@@ -92,7 +94,8 @@ class Process:
         for i, inverse in enumerate(self.inverses):
             start = i * _BLOCK
             rows = slice(start, start + _BLOCK)
-            found[rows] = inverse @ (right[rows] - self.factor[rows, :start] @ found[:start])
+            left = right[rows] - self.factor[rows, :start] @ found[:start]
+            found[rows] = inverse @ left
         return found
 
     @cached_property
@@ -100,12 +103,15 @@ class Process:
         """Logarithm of the likelihood of all data."""
         known = self.count > 0
         count = self.count[known]
-        told = np.cumsum(np.log(np.diag(self.factor)))[count - 1]
-        return -float((0.5 * count * np.log(np.maximum(self.size[known], 1e-300)) + told).sum())
+        size = np.maximum(self.size[known], 1e-300)
+        determinants = np.cumsum(np.log(np.diag(self.factor)))
+        of_outputs = 0.5 * count * np.log(size) + determinants[count - 1]
+        return -float(of_outputs.sum())
 
     def means(self, points: Array) -> Array:
         """Means ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
-        return self._reduced(self.kernel.between(self.points, points)).T @ self.weights
+        reduced = self._reduced(self.kernel.between(self.points, points))
+        return reduced.T @ self.weights
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations ``(m, outputs)`` of values at ``points`` ``(m, d)``."""

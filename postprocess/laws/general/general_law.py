@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.factor_model import (
     FRICTION,
@@ -21,7 +22,7 @@ from archord.postprocess.laws.general.factor_model import (
     gain,
 )
 from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent, line_contact_level
 from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
@@ -261,7 +262,7 @@ def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
 
 def reduce_joint(
     joint: Elastic,
-    lost: Loss | None = None,
+    lost: Loss | None,
     added: Gain | None = None,
     of_elastic: Gain | None = None,
 ) -> JointCurve:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
@@ -39,7 +40,7 @@ from archord.postprocess.laws.general.hardening_model import (
     terms,
     unsure,
 )
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, by_joint, first_loading, rms_largest
 from archord.postprocess.laws.general.yield_model import (
     Loss,
@@ -83,16 +84,20 @@ class Hardened:
         """The joint that was solved in ``runs``."""
         numbers = joint_numbers(joint)
         nodes = first_loading(runs)
-        inside = (nodes[:, 0] >= _RANGE[0]) & (nodes[:, 0] <= _RANGE[1])
+        begin, end = _RANGE
+        at = nodes[:, 0]
+        inside = (at >= begin) & (at <= end)
         x, y, peak, _ = nodes[inside].T
         elastic = elastic_model()
         of_bodies = Elastic(*numbers[1:5])
-        side = sides_of(numbers)[0]
-        begins = first_yield(elastic, bool(numbers[0]), of_bodies, Yielding(*numbers[5:]).of(side))
+        side, *_ = sides_of(numbers)
+        s = Yielding(*numbers[5:]).of(side)
+        begins = first_yield(elastic, bool(numbers[0]), of_bodies, s)
         without = elastic.at(of_bodies, x)
         excess = mesh_excess(side, x / begins)
         force = np.log(y / without.y) - excess
-        return cls(numbers, flows(joint), x, force, np.log(peak / without.peak) - excess)
+        pressure = np.log(peak / without.peak) - excess
+        return cls(numbers, flows(joint), x, force, pressure)
 
     @property
     def plane(self) -> str:
@@ -106,7 +111,8 @@ class Hardened:
 
     def off(self, model: Model) -> Array:
         """The errors of ln P."""
-        return self.state(model)[1].force - self.force
+        _, lost = self.state(model)
+        return lost.force - self.force
 
     def derivatives(self, model: Model, found: Strains, lost: Loss) -> Array:
         """d(ln P)/d(coefficients) ``(k, 2 terms)`` of pin and block, as if the s of the other body
@@ -120,7 +126,8 @@ class Hardened:
             body = BODIES[i]
             higher: Array = found.s.copy()
             higher[i] *= 1 + _SMALL
-            of_s = (loss(self.numbers, Yielding(*higher), self.x).force - lost.force) / _SMALL
+            of_higher = loss(self.numbers, Yielding(*higher), self.x)
+            of_s = (of_higher.force - lost.force) / _SMALL
             strain = found.strain[i]
             at = At(self.x, curve_at(mean, strain), found.s[1 - i], begins)
             slope = slope_at(mean, strain, found.s[i])
@@ -132,12 +139,14 @@ class Hardened:
 
 def slope_at(mean: Flow, strain: Array, s: Array) -> Array:
     """d(ln s)/d(ln strain) of a `mean_flow`, which is ``s`` at ``strain`` (all ``(k,)``)."""
-    return np.log(mean((1 + _SMALL) * strain) / s) / np.log1p(_SMALL)
+    higher = mean((1 + _SMALL) * strain)
+    return np.log(higher / s) / np.log1p(_SMALL)
 
 
 def feedback(of: Array, numbers: Sequence[float], body: str, at: At) -> Array:
     """d(ln eps_rep)/d(ln s) ``(k,)`` with the coefficients ``of`` all `TERMS`; see `terms`."""
-    higher = at._replace(own=at.own._replace(s=at.own.s * (1 + _SMALL)))
+    stronger = at.own._replace(s=at.own.s * (1 + _SMALL))
+    higher = at._replace(own=stronger)
     change = terms(numbers, body, higher) - terms(numbers, body, at)
     return of @ change / np.log1p(_SMALL)
 
@@ -151,10 +160,11 @@ def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, 
         names = [f"{plane} {body}" for body in BODIES]
         values = np.concatenate([model.get(name, _GUESS) for name in names])
         free = np.tile(_FREE, 2)
+        guess = np.tile(_GUESS, 2)
         for _ in range(_AGAIN if start else _ITERATIONS):
             model |= dict(zip(names, np.split(values, 2), strict=True))
             rows = [np.diag(1 / free)]
-            misses = [(values - np.tile(_GUESS, 2)) / free]
+            misses = [(values - guess) / free]
             for joint in own:
                 found, lost = joint.state(model)
                 weight = 1 / (_SCATTER * np.sqrt(len(joint.x) / 5))
@@ -178,7 +188,9 @@ def fit_peak(joints: list[Hardened], model: Model) -> dict[str, float]:
                 rises.append(peak_rise(found, rises_of(joint.given, found), lost))
                 misses.append(joint.peak - lost.peak)
         rise = np.concatenate(rises)
-        factors[plane] = float(f"{rise @ np.concatenate(misses) / (rise @ rise):.4g}")
+        miss = np.concatenate(misses)
+        factor = rise @ miss / (rise @ rise)
+        factors[plane] = float(f"{factor:.4g}")
     return factors
 
 

@@ -21,8 +21,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
 from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss, yield_places
 
@@ -39,8 +40,9 @@ INPUTS = (
     *("1", "x", "s", "share", "soft", "weaker", "apart", "clearance"),
     *("rise", "bend", "gain", "onset"),
 )
-# (terms, 2) the places of the two inputs that make each of `TERMS`
-_FACTORS = np.array([[INPUTS.index(name) for name in (*of.split(), "1")[:2]] for of in TERMS])
+_PAIRS = [(*term.split(), "1")[:2] for term in TERMS]  # the inputs that make each of `TERMS`
+# (terms, 2) their places
+_FACTORS = np.array([[INPUTS.index(name) for name in pair] for pair in _PAIRS])
 _WIDTH = 0.7  # standard deviation of ln(strain)
 _PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
 STRAINS = np.exp(_WIDTH * _PLACES)  # over eps_rep
@@ -115,7 +117,8 @@ def curve_at(mean: Flow, strain: Array) -> Curve:
     """A `mean_flow` about ``strain`` (any shape)."""
     below, s, above = mean(np.stack([strain / WIDE, strain, WIDE * strain]))
     rise = np.log(above / below) / (2 * np.log(WIDE))
-    return Curve(s, rise, np.log(above * below / s**2))
+    bend = np.log(above * below / s**2)
+    return Curve(s, rise, bend)
 
 
 class At(NamedTuple):
@@ -135,6 +138,8 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
     share, soft = (p, p * m) if body == "pin" else (1 - p, (1 - p) * n)
     ls = np.log(at.own.s)
     weaker = np.clip(np.log(at.other) - ls, -_ALIKE, _ALIKE)
+    gain = ls - np.log(first[BODIES.index(body)])
+    begins = at.begins(at.own.s) / at.x
     of = {
         "1": 1.0,
         "x": np.log(np.maximum(at.x, _NEAREST)),
@@ -146,8 +151,8 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
         "clearance": np.log(clearance / 0.005),
         "rise": at.own.rise,
         "bend": at.own.bend,
-        "gain": np.minimum(ls - np.log(first[BODIES.index(body)]), _LARGEST_GAIN),
-        "onset": np.minimum(at.begins(at.own.s) / at.x, _EARLIEST) ** 2,
+        "gain": np.minimum(gain, _LARGEST_GAIN),
+        "onset": np.minimum(begins, _EARLIEST) ** 2,
     }
     inputs = np.empty((len(INPUTS), *ls.shape))
     for k, name in enumerate(INPUTS):
@@ -180,9 +185,12 @@ def representative(
     def predicted(i: int, at: At) -> Array:
         return np.tensordot(model[f"{plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
 
+    clearance = numbers[4]
+    none = np.zeros(len(x))
     for i in hardens:
-        straight = Curve(s[i, 0], np.zeros(len(x)), np.zeros(len(x)))
-        strain[i] = numbers[4] * np.exp(predicted(i, At(x, straight, s[1 - i, 0], begins)))
+        straight = Curve(s[i, 0], none, none)
+        at = At(x, straight, s[1 - i, 0], begins)
+        strain[i] = clearance * np.exp(predicted(i, at))
     # of a body that does not harden nothing is missed: its row of the Jacobian is the identity's
     miss = np.log(_SHIFTS) + np.zeros_like(s)
     step: Array = np.zeros_like(strain)
@@ -193,7 +201,7 @@ def representative(
             s[i] = curve.s
         for i, curve in curves.items():
             at = At(x, curve, s[1 - i], begins)
-            miss[i] = np.log(shifted[i] / numbers[4]) - predicted(i, at)
+            miss[i] = np.log(shifted[i] / clearance) - predicted(i, at)
         step = _step(miss, step)
         strain *= np.exp(-step)
         if np.abs(step).max() <= _CLOSE:
@@ -206,12 +214,15 @@ def representative(
 def _step(miss: Array, last: Array) -> Array:
     """Newton's step ``(2, k)`` by what is missed ``(2, 3, k)`` at the `_SHIFTS`, at most half of
     the ``last`` one where it turns back, which ends cycles around kinks of curves."""
-    (a, b), (c, d) = (miss[:, 1:] - miss[:, :1]) / np.log1p(_SMALL)
+    jacobian = (miss[:, 1:] - miss[:, :1]) / np.log1p(_SMALL)
+    (a, b), (c, d) = jacobian
     a = np.maximum(a, _FLATTEST)
     d = np.maximum(d, _FLATTEST)
     pin, block = miss[:, 0]
-    step = np.stack([d * pin - b * block, a * block - c * pin]) / (a * d - b * c)
-    farthest = np.where(step * last < 0, np.abs(last) / 2, _FARTHEST)
+    determinant = a * d - b * c
+    step = np.stack([d * pin - b * block, a * block - c * pin]) / determinant
+    turns_back = step * last < 0
+    farthest = np.where(turns_back, np.abs(last) / 2, _FARTHEST)
     return np.clip(step, -farthest, farthest)
 
 
@@ -219,7 +230,8 @@ def gains(numbers: Sequence[float], given: Flows, x: float) -> Array:
     """``s_eff/s`` of the bodies that harden at ``x``; one of none."""
     found = representative(hardening_model()["strain"], numbers, given, np.array([x]))
     hardens = [i for i, flow in enumerate(given) if flow is not None]
-    return np.append(1.0, found.s[hardens, 0] / np.array(numbers[5:])[hardens])
+    s = np.array(numbers[5:])
+    return np.append(1.0, found.s[hardens, 0] / s[hardens])
 
 
 def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:

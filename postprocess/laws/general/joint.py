@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.materials.elasticity import contact_modulus
 
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from archord.scene.presets.joint import Scene
     from archord.scene.sections.bodies import Solid
 
-Array = npt.NDArray[np.floating]
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
 # fall of P in a block of W, times (W/R)^2
 _SOFTER = 1.4  # of like elastic bodies

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 from archord.report.readable import json_of
 
 # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
@@ -167,7 +167,8 @@ class JointCurve:
             known &= (x <= 0) | (most <= self.reach)
         x = np.where(numbers, x, 0.0)
         most = np.where(numbers, most, 0.0)
-        if (np.maximum(x, most) > self.reach).any():
+        is_beyond = np.maximum(x, most) > self.reach
+        if is_beyond.any():
             end = f"{self.x[-1]:g} dR"
             said = f"archord: beyond {end}, where the joint's table ends, it goes on straight"
             warnings.warn(said, stacklevel=2)
@@ -175,13 +176,12 @@ class JointCurve:
         returning = x < most
         if returning.any() and self.yields:
             below = self._way_back(x, most, state)
-            state = CurveState(
-                *(np.where(returning, *pair) for pair in zip(below, state, strict=True))
-            )
-        state = CurveState(*(np.where(x <= 0, 0.0, values) for values in state))
-        load = np.where(numbers, state.load, np.nan)
-        others = (np.where(known, values, np.nan) for values in state[1:])
-        stiffness, error, peak, angle = others
+            pairs = zip(below, state, strict=True)
+            state = CurveState(*(np.where(returning, *pair) for pair in pairs))
+        is_open = x <= 0
+        load, *others = (np.where(is_open, 0.0, values) for values in state)
+        load = np.where(numbers, load, np.nan)
+        stiffness, error, peak, angle = (np.where(known, values, np.nan) for values in others)
         return CurveState(
             load * self.force,
             stiffness * self.force / self.length,
@@ -203,7 +203,8 @@ class JointCurve:
         """The displacement (any shape) at which the joint opens on its way back from ``deepest``;
         nan beyond the table if it yields."""
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
-        known = most <= (self.reach if self.yields else _NUMBER)
+        reach = self.reach if self.yields else _NUMBER
+        known = most <= reach
         most = np.where(known, most, 0.0)
         travel = self._travel(most, self._ratio(most))
         opens = np.maximum(most - travel - self._toe(most), 0.0)
@@ -216,26 +217,25 @@ class JointCurve:
         peak, _ = hermite(self.x, self.peak, self.dpeak, x)
         angle, _ = hermite(self.x, self.angle, self.dangle, x)
         error = y * np.interp(x, self.x, self.error)
-        return CurveState(y, dy, error, peak * root, np.minimum(angle * root, self.widest))
+        semi_angle = np.minimum(angle * root, self.widest)
+        return CurveState(y, dy, error, peak * root, semi_angle)
 
     def _way_back(self, x: Array, most: Array, first: CurveState) -> CurveState:
         """The dimensionless state on the way back from ``most``, never above ``first`` loading."""
         ratio = self._ratio(most)
         travel = self._travel(most, ratio)
-        a, bend = bent(x - most + travel, travel, self._toe(most))
+        left = x - most + travel
+        a, bend = bent(left, travel, self._toe(most))
         y, dy = self._curve(self.back, self.dback, np.maximum(a / ratio, 0.0))
         y = ratio * y
         dy = np.where(a > 0, bend * dy, 0.0)
         above = y > first.load
+        load = np.where(above, first.load, y)
+        stiffness = np.where(above, first.stiffness, dy)
         largest, _ = self._curve(self.y, self.dy, most)
+        error = largest * np.interp(most, self.x, self.back_error)
         unknown = np.full_like(y, np.nan)
-        return CurveState(
-            np.where(above, first.load, y),
-            np.where(above, first.stiffness, dy),
-            largest * np.interp(most, self.x, self.back_error),
-            unknown,
-            unknown,
-        )
+        return CurveState(load, stiffness, error, unknown, unknown)
 
     def _ratio(self, most: Array) -> Array:
         ratio, _ = hermite(self.x, self.ratio, self.dratio, most)
@@ -257,16 +257,20 @@ class JointCurve:
             touch_y, touch_dy = first_touch(self.touch, np.clip(x, 1e-290, self.x[1]))
             y = np.where(early, touch_y, y)
             dy = np.where(early, touch_dy, dy)
-        return np.where(x <= 0, 0.0, y), np.where(x <= 0, 0.0, dy)
+        is_open = x <= 0
+        return np.where(is_open, 0.0, y), np.where(is_open, 0.0, dy)
 
     def _inverse(self, f: Array, df: Array, y: Array) -> Array:
         """The ``x`` at which the rising curve ``f`` is ``y``; 0 where ``y <= 0``."""
         i = interval(f, y)
         piece = Piece.of(self.x, f, df, i)
-        goal = np.clip(y, f[i], f[i + 1])
+        begin = f[i]
+        end = f[i + 1]
+        goal = np.clip(y, begin, end)
         low = np.zeros_like(goal)
         high = np.ones_like(goal)
-        t = (goal - f[i]) / np.where(f[i + 1] > f[i], f[i + 1] - f[i], 1.0)
+        rise = np.where(end > begin, end - begin, 1.0)
+        t = (goal - begin) / rise
         for _ in range(_BRACKETED):
             value, slope = piece.at(t)
             miss = value - goal
@@ -274,14 +278,18 @@ class JointCurve:
             high = np.where(miss < 0, high, t)
             last = t
             t = last - miss / np.maximum(slope, 1e-100)
-            t = np.where((t - low) * (high - t) < 0, (low + high) / 2, t)
-            if not (np.abs(t - last) >= 1e-12).any():
+            astray = (t - low) * (high - t) < 0
+            t = np.where(astray, (low + high) / 2, t)
+            moved = np.abs(t - last)
+            if not (moved >= 1e-12).any():
                 break
-        end = self.x[-1] + (y - f[-1]) / np.maximum(df[-1], 1e-100)
-        x = np.where(y > f[-1], end, self.x[i] + piece.width * t)
+        past_end = (y - f[-1]) / np.maximum(df[-1], 1e-100)
+        inside = self.x[i] + piece.width * t
+        x = np.where(y > f[-1], self.x[-1] + past_end, inside)
         if self.touch.size:
             early = (y > 0) & (y < f[1])
-            x = np.where(early, touch_displacement(self.touch, np.where(early, y, 1.0)), x)
+            at_touch = touch_displacement(self.touch, np.where(early, y, 1.0))
+            x = np.where(early, at_touch, x)
         return np.where(y > 0, x, 0.0)
 
     def to_json(self) -> str:
@@ -310,7 +318,9 @@ class JointCurve:
 def first_touch(touch: Array, x: Array) -> tuple[Array, Array]:
     """``y`` and ``dy/dx`` of the logarithmic law of ``touch`` ``(3,)`` at ``x > 0``."""
     a, b, c = touch
-    return line_contact(x, a + x * (b + c * x), b + 2 * c * x)
+    F = a + x * (b + c * x)
+    slope = b + 2 * c * x
+    return line_contact(x, F, slope)
 
 
 def touch_displacement(touch: Array, y: Array) -> Array:
@@ -321,18 +331,21 @@ def touch_displacement(touch: Array, y: Array) -> Array:
     x = y * (a + log) / np.pi
     for _ in range(_ITERATIONS):
         miss = np.pi * x / y - a - x * (b + c * x) - log
-        x = x - miss / (np.pi / y - b - 2 * c * x)
+        slope = np.pi / y - b - 2 * c * x
+        x = x - miss / slope
     return x
 
 
 def line_contact(x: Array, F: Array, slope: Array) -> tuple[Array, Array]:
     """``y`` and ``dy/dx`` at ``x > 0`` where F(x) and its ``slope`` are these: ``t = 1/y`` solves
     ``pi x t - ln(1 + t) = F``, which is convex in t, by Newton's method."""
-    t = (F + np.log1p(F / (np.pi * x))) / (np.pi * x)
+    pi_x = np.pi * x
+    t = (F + np.log1p(F / pi_x)) / pi_x
     for _ in range(_ITERATIONS):
-        miss = np.pi * x * t - np.log1p(t) - F
-        t = t - miss / (np.pi * x - 1 / (1 + t))
-    return 1 / t, (np.pi - slope / t) / (np.pi * x * t - t / (1 + t))
+        miss = pi_x * t - np.log1p(t) - F
+        t = t - miss / (pi_x - 1 / (1 + t))
+    softened = pi_x * t - t / (1 + t)
+    return 1 / t, (np.pi - slope / t) / softened
 
 
 def line_contact_level(x: float, y: float, dy: float) -> tuple[float, float]:
@@ -348,7 +361,8 @@ def bent(a: Array, travel: Array, toe: Array) -> tuple[Array, Array]:
     ``travel`` t and ``toe`` w, which is t at t and 0 at -w, negative below."""
     cut = _BEND * toe
     root = np.maximum(np.hypot(a, toe), 1e-300)
-    share = travel / np.maximum(travel + np.hypot(travel, toe) - cut, 1e-300)
+    end = travel + np.hypot(travel, toe) - cut
+    share = travel / np.maximum(end, 1e-300)
     return share * (a + root - cut), share * (1 + a / root)
 
 
@@ -373,7 +387,9 @@ class Piece(NamedTuple):
         rise = last - f
         begin = width * df
         end = width * last_df
-        return cls(width, f, begin, 3 * rise - 2 * begin - end, begin + end - 2 * rise)
+        second = 3 * rise - 2 * begin - end
+        third = begin + end - 2 * rise
+        return cls(width, f, begin, second, third)
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Values, and slopes by t."""
@@ -387,11 +403,13 @@ def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
     i = interval(nodes, x)
     inside = np.clip(x, nodes[0], nodes[-1])
     piece = Piece.of(nodes, f, df, i)
-    value, rise = piece.at((inside - nodes[i]) / piece.width)
+    t = (inside - nodes[i]) / piece.width
+    value, rise = piece.at(t)
     slope = rise / piece.width
     return value + slope * (x - inside), slope
 
 
 def interval(nodes: Array, x: Array) -> npt.NDArray[np.intp]:
     """The last i below the last node with ``nodes[i] <= x``, or 0."""
-    return np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
+    below = np.searchsorted(nodes, x, "right") - 1
+    return np.clip(below, 0, len(nodes) - 2)

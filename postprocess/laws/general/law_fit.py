@@ -25,6 +25,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, minimize
 
+from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.general.elastic_model import (
     TABLE,
@@ -37,7 +38,7 @@ from archord.postprocess.laws.general.elastic_model import (
 )
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.general_law import NODES, joint_numbers, way_back
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.yield_model import (
     DATA,
     ELASTIC_BELOW,
@@ -91,8 +92,9 @@ def exponents(degree: int) -> Array:
 def fit_elastic(joints: Elastic, x: Array, y: Array, peak: Array, angle: Array) -> ElasticModel:
     """The model of elastic ``joints`` ``(m,)`` from ``y``, p0 R/(E* dR) and eps ``(m, k)`` at ``x``
     ``(k,)``, by least squares of relative errors of y, and of the two others."""
-    F = np.pi * x / y + np.log(y / (1 + y))
-    F_weights = 1 / (np.pi * x / y - 1 / (1 + y))  # -d(ln y)/dF
+    compliance = np.pi * x / y
+    F = compliance + np.log(y / (1 + y))
+    F_weights = 1 / (compliance - 1 / (1 + y))  # -d(ln y)/dF
     root = np.sqrt(y)
     return ElasticModel(
         F=_polynomials(joints, x, F, F_weights, *_TERMS["F"]),
@@ -129,8 +131,12 @@ class NodeRun:
         """That of a run which has all its steps."""
         each = curve.scene.load.stage_steps
         unit = curve.E_star * curve.dR
-        columns = [curve.delta / curve.dR, curve.P / unit, curve.p0 * curve.R / unit, curve.eps]
-        return cls(np.column_stack(columns)[np.cumsum(each) - 1], each[0])
+        x = curve.delta / curve.dR
+        y = curve.P / unit
+        peak = curve.p0 * curve.R / unit
+        of_steps = np.column_stack([x, y, peak, curve.eps])
+        last_of_stages = np.cumsum(each) - 1
+        return cls(of_steps[last_of_stages], each[0])
 
     @property
     def loading(self) -> int:
@@ -174,8 +180,10 @@ def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
     numbers, as `joint_numbers` has them."""
     found: dict[Numbers, list[NodeRun]] = defaultdict(list)
     for joint, runs in by_joint(folder).items():
-        if not (joint.hardens or joint.friction or joint.large_strain):
-            found[tuple(float(f"{value:.6g}") for value in joint_numbers(joint))] += runs
+        if joint.hardens or joint.friction or joint.large_strain:
+            continue
+        rounded = (float(f"{value:.6g}") for value in joint_numbers(joint))
+        found[tuple(rounded)] += runs
     return dict(found)
 
 
@@ -187,17 +195,21 @@ def fit_law(
     elastic: dict[Numbers, Array] = {}
     yielding: dict[Numbers, list[NodeRun]] = {}
     for numbers, runs in solved.items():
-        if np.isinf(numbers[5:]).all():
+        strengths = numbers[5:]
+        if np.isinf(strengths).all():
             elastic[numbers] = runs[0].nodes
         else:
             yielding[numbers] = runs
-    x, *quantities = np.moveaxis(np.array([*elastic.values()]), -1, 0)
-    model = fit_elastic(Elastic(*np.array([*elastic]).T[1:5]), x[0], *quantities)
+    nodes = np.array([*elastic.values()])
+    x, *quantities = np.moveaxis(nodes, -1, 0)
+    columns = np.array([*elastic]).T
+    model = fit_elastic(Elastic(*columns[1:5]), x[0], *quantities)
     alone = {numbers: runs for numbers, runs in yielding.items() if PIN_ALONE in sides_of(numbers)}
     pins = yielding_joints(model, alone)
-    kernels = {PIN_ALONE: fit_side(pins, PIN_ALONE)}
-    joints = yielding_joints(model, yielding, side_model(pins, PIN_ALONE, kernels[PIN_ALONE]))
-    return model, joints, kernels | {side: fit_side(joints, side) for side in SIDES[1:]}
+    of_pins = fit_side(pins, PIN_ALONE)
+    joints = yielding_joints(model, yielding, side_model(pins, PIN_ALONE, of_pins))
+    kernels = {side: fit_side(joints, side) for side in SIDES[1:]}
+    return model, joints, {PIN_ALONE: of_pins} | kernels
 
 
 def first_loading(runs: list[NodeRun]) -> Array:
@@ -205,9 +217,11 @@ def first_loading(runs: list[NodeRun]) -> Array:
     same nodes."""
     coarse = max((run for run in runs if run.steps == 1), key=lambda run: run.loading)
     nodes = coarse.nodes[: coarse.loading].copy()
+    forces = nodes[:, 1:3]  # and p0
     for run in runs:
         if run.steps == 2 and run.loading == len(nodes):
-            nodes[:, 1:3] = 2 * run.nodes[: len(nodes), 1:3] - nodes[:, 1:3]
+            finer = run.nodes[: len(nodes), 1:3]
+            forces[:] = 2 * finer - forces
     return nodes
 
 
@@ -225,7 +239,8 @@ def yielding_joints(
         yielding = Yielding(*numbers[5:])
         x, *quantities = first_loading(runs).T
         base = model.at(joint, x)
-        total = np.log(np.divide(quantities, [base.y, base.peak, base.angle]))
+        over_elastic = np.divide(quantities, [base.y, base.peak, base.angle])
+        total = np.log(over_elastic)
         plane = "strain" if numbers[0] else "stress"
         elastic = model.at(joint, _FINE)
         unloaded = [run for run in runs if run.steps == 1 and len(run.back) > 2]
@@ -239,8 +254,10 @@ def yielding_joints(
                 of_pins = total_loss({PIN_ALONE: pins}, model, joint, yielding, _LAW).peak
             x0, lost = onset(side, model, joint, yielding, _LAW, of_pins)
             back += [(len(rows), deepest / x0, *told) for deepest, *told in ways]
-            excess = mesh_excess(side, x / x0)
-            told = _at_multiples(x / x0, curves - [excess, excess, 0 * excess])
+            multiples = x / x0
+            excess = mesh_excess(side, multiples)
+            corrected = curves - [excess, excess, 0 * excess]
+            told = _at_multiples(multiples, corrected)
             rows.append((SIDES.index(side), numbers, x0, lost, *told))
     columns = (np.array(column) for column in zip(*rows, strict=True))
     indices, given, onsets, of_others, counts, losses = columns
@@ -255,12 +272,14 @@ def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
     """How many of the `MULTIPLES` the nodes ``u`` ``(n,)`` reach, and ``lost`` ``(3, n)`` there;
     nan beyond."""
     known = u > ELASTIC_BELOW * 1.05
-    count = int(np.searchsorted(MULTIPLES, u[-1] * _SPACING)) if known.sum() > 1 else 0
+    reached = u[-1] * _SPACING
+    count = int(np.searchsorted(MULTIPLES, reached)) if known.sum() > 1 else 0
     curves = np.full((3, len(MULTIPLES)), np.nan)
     if count:
         at = np.log([ELASTIC_BELOW, *u[known]])
         of = np.insert(lost[:, known], 0, 0.0, axis=1)
-        spline = CubicSpline(at, of, axis=1, bc_type=((1, np.zeros(3)), "not-a-knot"))
+        begins_flat = (1, np.zeros(3))
+        spline = CubicSpline(at, of, axis=1, bc_type=(begins_flat, "not-a-knot"))
         curves[:, :count] = spline(np.log(MULTIPLES[:count]))
     return count, curves
 
@@ -270,12 +289,14 @@ def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ..
     which count more where little is left, and over the largest force how far P is from that way,
     rms, and at the first point of reloading, nan without one."""
     deepest, largest = run.back[0]
-    unit = deepest * largest / np.interp(deepest, _FINE, elastic.y)
+    elastic_force = np.interp(deepest, _FINE, elastic.y)
+    unit = deepest * largest / elastic_force
 
     def off(way: Array, points: Array) -> Array:
-        below = points[:, 0] - deepest
-        y = way_back(_FINE, elastic.y, elastic.slope, below, largest, *(way * unit))
-        return (y - points[:, 1]) / largest
+        x, y = points.T
+        below = x - deepest
+        told = way_back(_FINE, elastic.y, elastic.slope, below, largest, *(way * unit))
+        return (told - y) / largest
 
     weights = 1 / (_LITTLE + run.back[:, 1] / largest)
     most = min(1.5, deepest / unit)
@@ -289,8 +310,10 @@ def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ..
         for travel, share, toe in _WAYS[plane]
     ]
     travel, toe = found = min(tries, key=lambda way: way.cost).x
-    rms = np.sqrt(np.mean(off(found, run.back[1:]) ** 2))
-    reloaded = run.nodes[run.loading + len(run.back) - 1 :, :2]
+    errors = off(found, run.back[1:])
+    rms = np.sqrt(np.mean(errors**2))
+    first_of_reloading = run.loading + len(run.back) - 1
+    reloaded = run.nodes[first_of_reloading:, :2]
     again = abs(off(found, reloaded[:1])[0]) if len(reloaded) else np.nan
     return tuple(map(float, (deepest, travel, toe, rms, again)))
 
@@ -300,7 +323,8 @@ def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
     out."""
     data = joints.of(side)
     shape = np.concatenate([data["peak"], data["angle"]], axis=1)
-    values = {"force": data["force"], "shape": shape, "back": data["back"][:, :2] - [1, 0]}
+    back = data["back"][:, :2] - [1, 0]
+    values = {"force": data["force"], "shape": shape, "back": back}
     found: dict[str, Any] = {"kernels": {}, "spread": {}}
     for name, of in values.items():
         points = data["back_inputs" if name == "back" else "inputs"]
@@ -319,19 +343,25 @@ def fit_kernel(points: Array, values: Array, noise: float) -> Kernel:
 
     def cost(logarithms: Array) -> float:
         *lengths, noise = np.exp(logarithms)
-        return -Process(Kernel(np.array(lengths), noise), points, values).likelihood
+        kernel = Kernel(np.array(lengths), noise)
+        return -Process(kernel, points, values).likelihood
 
     inputs = points.shape[1]
     start = np.log([*_LENGTHS[:inputs], noise])
-    bounds = np.log([(0.1, 60.0)] * inputs + [(1e-7, 0.1)])
-    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x
+    lengths_within = [(0.1, 60.0)] * inputs
+    bounds = np.log([*lengths_within, (1e-7, 0.1)])
+    most = {"maxiter": 60}
+    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=most).x
     *lengths, noise = (float(f"{value:.4g}") for value in np.exp(found))
     return Kernel(np.array(lengths), noise)
 
 
 def rms_largest(errors: Array) -> str:
     """The cell of ``errors`` ``(n,)``: their root mean square and the largest; a dash of none."""
-    return f"{np.sqrt(np.mean(errors**2)):.2f}/{np.abs(errors).max():.1f}" if len(errors) else "-"
+    if not len(errors):
+        return "-"
+    rms = np.sqrt(np.mean(errors**2))
+    return f"{rms:.2f}/{np.abs(errors).max():.1f}"
 
 
 def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
@@ -341,7 +371,8 @@ def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
         "process", "joints", "P 0.1 to 2 dR", "P 2 to 3 dR", "soft pins, to 3 dR", "inside", left=1
     )
     for side in SIDES:
-        off, deviation = side_model(joints, side, kernels[side]).processes["force"].left_out()
+        force = side_model(joints, side, kernels[side]).processes["force"]
+        off, deviation = force.left_out()
         chosen = joints.rows(side)
         x = MULTIPLES * joints.x0[chosen, None]
         strain, p, m, *_ = joints.numbers[chosen].T[..., None]

@@ -13,13 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import general_law
-from archord.postprocess.laws.general.joint import (
-    FIXED_PAIRS,
-    Array,
-    LawJoint,
-    LawRangeWarning,
-)
+from archord.postprocess.laws.general.joint import FIXED_PAIRS, LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.doubts import kind
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 
 
 def spline_slopes(at: Array, values: Array, flat: bool = False) -> Array:
@@ -20,11 +20,13 @@ def spline_slopes(at: Array, values: Array, flat: bool = False) -> Array:
     right[0, 0] = not flat
     right[-1, -1] = 1
     i = np.arange(1, n - 1)
-    matrix[i, i - 1] = width[i]
-    matrix[i, i] = 2 * (width[i - 1] + width[i])
-    matrix[i, i + 1] = width[i - 1]
-    right[i, i - 1] = 3 * width[i]
-    right[i, i] = 3 * width[i - 1]
+    before = width[:-1]
+    after = width[1:]
+    matrix[i, i - 1] = after
+    matrix[i, i] = 2 * (before + after)
+    matrix[i, i + 1] = before
+    right[i, i - 1] = 3 * after
+    right[i, i] = 3 * before
     if n > 2:
         _one_cubic(matrix[::-1, ::-1], right[::-1, ::-1], width[::-1])
     if n > 2 and not flat:
@@ -37,8 +39,10 @@ def _one_cubic(matrix: Array, right: Array, width: Array) -> None:
     """Set the first rows of `spline_slopes` such that the first two cubics are one."""
     first, second = width[:2]
     both = first + second
+    of_first = (2 * both + first) * second / both
+    of_second = first**2 / both
     matrix[0, :2] = second, both
-    right[0, :2] = (2 * both + first) * second / both, first**2 / both
+    right[0, :2] = of_first, of_second
 
 
 def monotone_slopes(at: Array, values: Array) -> Array:
@@ -51,13 +55,18 @@ def monotone_slopes(at: Array, values: Array) -> Array:
     one = width[:-1] + 2 * width[1:]
     other = 2 * width[:-1] + width[1:]
     slopes = np.zeros(values.shape)
-    mean = (one + other) * before * after
-    np.divide(mean, one * after + other * before, out=slopes[..., 1:-1], where=before * after > 0)
+    product = (one + other) * before * after
+    weighted = one * after + other * before
+    goes_on = before * after > 0
+    np.divide(product, weighted, out=slopes[..., 1:-1], where=goes_on)
     for end, beside in ((0, 1), (-1, -2)):
         own = secants[..., end]
-        bend = (own - secants[..., beside]) * width[end] / (width[end] + width[beside])
+        difference = own - secants[..., beside]
+        bend = difference * width[end] / (width[end] + width[beside])
         most = 3 * own
-        slopes[..., end] = np.clip(own + bend, np.minimum(most, 0.0), np.maximum(most, 0.0))
+        low = np.minimum(most, 0.0)
+        high = np.maximum(most, 0.0)
+        slopes[..., end] = np.clip(own + bend, low, high)
     return slopes
 
 

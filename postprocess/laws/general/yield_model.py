@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel, elastic_model
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
-from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.joint_curve import Piece, interval
 from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
 
@@ -111,7 +111,8 @@ def yield_places(
 ) -> Callable[[npt.ArrayLike], Array]:
     """`first_yield` of a joint by s."""
     pressure = left * model.pressure(joint, _GRID) / _pressure_at_yield(strain, _GRID)
-    over = np.log(np.maximum.accumulate(pressure))
+    rising = np.maximum.accumulate(pressure)
+    over = np.log(rising)
 
     def place(s: npt.ArrayLike) -> Array:
         found = np.interp(np.log(s), over, np.log(_GRID))
@@ -143,11 +144,13 @@ def mesh_excess(side: str, u: Array) -> Array:
     if side != "stress block":
         return np.zeros_like(u)
     beyond = np.log(np.maximum(u / _EXCESS_BEGINS, 1.0))
-    return _MOST_EXCESS * (1 - np.exp(-beyond / _EXCESS_GROWS))
+    grown = 1 - np.exp(-beyond / _EXCESS_GROWS)
+    return _MOST_EXCESS * grown
 
 
 def _pressure_at_yield(strain: bool, x: Array) -> Array:
-    return 0.95 + (0.5 if strain else 0.12) * np.exp(-x / 0.35)
+    of_hertz = 0.5 if strain else 0.12
+    return 0.95 + of_hertz * np.exp(-x / 0.35)
 
 
 def features(side: str, joints: Elastic, yielding: Yielding, lost: npt.ArrayLike) -> Array:
@@ -159,9 +162,10 @@ def features(side: str, joints: Elastic, yielding: Yielding, lost: npt.ArrayLike
     if side == PIN_WEAKER:
         inputs += [np.log(yielding.pin / s), lost]
     elif side != PIN_ALONE:
-        share = s / (yielding.block if side == "stress pin" else yielding.pin)
+        other = yielding.block if side == "stress pin" else yielding.pin
+        weaker = 1 - s / other
         plane = side.split()[0]
-        inputs += [np.minimum((1 - share) / within, 1.0) for within in _STRONGER[plane]]
+        inputs += [np.minimum(weaker / within, 1.0) for within in _STRONGER[plane]]
     return np.stack(np.broadcast_arrays(*inputs), axis=-1)
 
 
@@ -191,10 +195,11 @@ class YieldModel:
     def processes(self) -> dict[str, Process]:
         """The process of each name."""
         shape = np.concatenate([self.peak, self.angle], axis=1)
+        back = self.back - [1, 0, 0, 0]
         return {
             "force": Process(self.kernels["force"], self.inputs, self.force),
             "shape": Process(self.kernels["shape"], self.inputs, shape),
-            "back": Process(self.kernels["back"], self.back_inputs, self.back - [1, 0, 0, 0]),
+            "back": Process(self.kernels["back"], self.back_inputs, back),
         }
 
     def at(self, inputs: Array, x0: Array, x: Array, asked: Asked = True) -> Loss:
@@ -205,7 +210,8 @@ class YieldModel:
         u = np.log(x / x0)
         begun = asked & (u > _AT[0])  # the others are not computed, which takes half the time
         # of all x alike, or P would jump where one node more is known
-        known = min(np.searchsorted(np.log(MULTIPLES), u.max()) + 1, len(MULTIPLES))
+        reached = np.searchsorted(np.log(MULTIPLES), u.max())
+        known = min(reached + 1, len(MULTIPLES))
         u = u[begun]
         each = np.broadcast_to(inputs, (len(x), inputs.shape[-1]))[begun]
         rows = each if inputs.ndim > 1 else inputs[None]
@@ -215,7 +221,8 @@ class YieldModel:
         force, slope, peak, angle, deviation = _curves(nodes[:, :known], u).T
         way, uncertain = self.processes["back"].predict(np.column_stack([each, u]))
         travel, toe, misfit, again = way.T
-        errors = [self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again]
+        of_travel = self.spread["back"] * uncertain[:, 0]
+        errors = [of_travel, _NINE_IN_TEN * misfit, again]
         told = Loss(
             force=force,
             slope=slope / x[begun],
@@ -262,7 +269,8 @@ def _share_of_pin(pin: Array, block: Array) -> Array:
     `_BLENDED` and more."""
     excess = np.zeros(len(pin))
     weaker = (pin < block) & ~_alike(pin, block)
-    excess[weaker] = np.log(block[weaker] / pin[weaker]) / _BLENDED
+    ratio = block[weaker] / pin[weaker]
+    excess[weaker] = np.log(ratio) / _BLENDED
     return smooth_step(excess)
 
 
@@ -286,17 +294,17 @@ def total_loss(
     total = Loss(none, none, none, none, none, none + 1, none, none)
     for side, told in models.items():
         x0, lost = onset(side, model, joint, yielding, x, total.peak)
-        if (ELASTIC_BELOW * x0 >= x[-1]).all():
+        begins = ELASTIC_BELOW * x0
+        if (begins >= x[-1]).all():
             continue
         inputs = features(side, joint, yielding, lost)
         own = told.at(inputs, x0, x, asked if side == last else True)
-        begun = np.clip(np.log(x / (ELASTIC_BELOW * x0)) / 0.2, 0.0, 1.0)
+        begun = np.clip(np.log(x / begins) / 0.2, 0.0, 1.0)
+        deviations = [total.deviation, own.deviation, begun * MESH_ERROR[side]]
         total = Loss(
             force=total.force + own.force,
             slope=total.slope + own.slope,
-            deviation=np.linalg.norm(
-                [total.deviation, own.deviation, begun * MESH_ERROR[side]], axis=0
-            ),
+            deviation=np.linalg.norm(deviations, axis=0),
             peak=total.peak + own.peak,
             angle=total.angle + own.angle,
             travel=total.travel + begun * (own.travel - total.travel),
@@ -314,14 +322,16 @@ def _curves(nodes: Array, u: Array) -> Array:
     slopes = _spline(len(at)) @ values
     i = interval(at, u)
     row = np.arange(len(u)) if len(nodes) == len(u) else 0
-    width = (at[i + 1] - at[i])[:, None]
-    t = (u - at[i])[:, None] / width
+    begin = at[i]
+    width = (at[i + 1] - begin)[:, None]
+    t = (u - begin)[:, None] / width
     first = values[row, i]
     last = values[row, i + 1]
     piece = Piece.between(width, first, last, slopes[row, i], slopes[row, i + 1])
     curves, rises = piece.at(t)
+    slope = rises[:, :1] / width
     deviation = first + np.clip(t, 0.0, 1.0) * (last - first)
-    return np.column_stack([curves[:, 0], rises[:, :1] / width, curves[:, 1:3], deviation[:, 3]])
+    return np.column_stack([curves[:, 0], slope, curves[:, 1:3], deviation[:, 3]])
 
 
 @cache
@@ -370,7 +380,8 @@ class SolvedJoints:
     def rows(self, side: str) -> npt.NDArray[np.intp]:
         """Those of one of `SIDES`, from the joint known to most `MULTIPLES` down."""
         chosen = np.flatnonzero(self.side == SIDES.index(side))
-        return chosen[np.lexsort((self.x0[chosen], -self.count[chosen]))]
+        order = np.lexsort((self.x0[chosen], -self.count[chosen]))
+        return chosen[order]
 
     def of(self, side: str) -> dict[str, Array]:
         """What `YieldModel` takes of the joints of one of `SIDES`."""
@@ -378,14 +389,17 @@ class SolvedJoints:
         beyond = np.arange(len(MULTIPLES)) >= self.count[chosen, None]
         curves = {name: np.where(beyond, np.nan, getattr(self, name)[chosen]) for name in _CURVES}
         own = self.numbers[chosen].T
-        inputs = features(side, Elastic(*own[1:5]), Yielding(*own[5:]), self.lost[chosen])
+        elastic = Elastic(*own[1:5])
+        yielding = Yielding(*own[5:])
+        inputs = features(side, elastic, yielding, self.lost[chosen])
         place = np.full(len(self.numbers), -1)
         place[chosen] = np.arange(len(chosen))
         rows = place[self.back[:, 0].astype(int)]
         u = self.back[:, 1]
         told = (rows >= 0) & (u > ELASTIC_BELOW)
         deep = np.column_stack([inputs[rows[told]], np.log(u[told])])
-        return {"inputs": inputs, **curves, "back_inputs": deep, "back": self.back[told, 2:]}
+        back = self.back[told, 2:]
+        return {"inputs": inputs, **curves, "back_inputs": deep, "back": back}
 
 
 def sides_of(numbers: Any) -> tuple[str, ...]:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import general_law
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import Identification
 
 _STEPS = 30  # of loading, and about as many of the way back

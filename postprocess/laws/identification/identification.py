@@ -20,8 +20,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import general_law
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.identification.measured import MeasuredCurve
 from archord.postprocess.laws.identification.unknowns import (

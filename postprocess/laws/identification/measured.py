@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 from archord.report.errors import InputError, shown
 from archord.scene.file import read_text
 
@@ -132,7 +132,7 @@ def _require_one_reading(
 
 
 def _other_units(
-    path: Path, heads: list[str], units: tuple[str, str], *, are_units: bool = False
+    path: Path, heads: list[str], units: tuple[str, str], *, are_units: bool
 ) -> list[str]:
     """What there is to say of ``heads`` whose unit in brackets is none of the ``units``, or which
     ``are_units`` themselves, with or without brackets."""
