@@ -51,10 +51,12 @@ class Comparison:
         values = self.values[name]
         first = values[0]
         nothing = _NOTHING * np.abs(values).max(initial=0.0)
+        difference = values - first
+        size = np.abs(first)
         with np.errstate(divide="ignore", invalid="ignore"):
-            relative = (values - first) / np.abs(first)
-        unknown = np.where(np.abs(values - first) <= nothing, 0.0, np.nan)
-        return np.where(np.abs(first) > nothing, relative, unknown)
+            relative = difference / size
+        unknown = np.where(np.abs(difference) <= nothing, 0.0, np.nan)
+        return np.where(size > nothing, relative, unknown)
 
 
 def compare_runs(runs: list[Run]) -> Comparison:
@@ -129,8 +131,9 @@ def _common_columns(runs: Sequence[Run]) -> Curves:
         before = float(run.scene.fits and len(fitted) > 1)
         load = np.array(run.path) - before
         loaded = load > _SAME
-        table = {"load": load[loaded]}
-        tables.append(table | {name: np.array(run.columns[name])[loaded] for name in names})
+        columns = {name: np.array(run.columns[name]) for name in names}
+        table = {"load": load} | columns
+        tables.append({name: values[loaded] for name, values in table.items()})
     if not names or not all(len(table["load"]) for table in tables):
         raise InputError(f"{first.folder}: shares no load with the others.")
     after_fits = ", after press fits" if len(fitted) > 1 else ""
@@ -151,7 +154,7 @@ def _curves_of_joints(runs: Sequence[Run]) -> Curves:
         stress = units[0].stress
         force = units[0].force_of(None)
         labels = {"delta": f"delta [{length}]", "P": f"P [{force}]", "p0": f"p0 [{stress}]"}
-        per = {"delta": np.ones_like(R), "P": np.ones_like(R), "p0": np.ones_like(R)}
+        per = dict.fromkeys(labels, np.ones_like(R))
     else:
         gap = gap_name(min(curve.dR for curve in curves))
         labels = {"delta": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}

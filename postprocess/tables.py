@@ -39,17 +39,21 @@ _OF_A_RUN = {  # what a comparison tells of each run
 def run_text(run: Run, width: int = 0) -> str:
     """State, joint, history, peaks, cost and warnings of a run, in lines no longer than ``width``
     if that is given."""
+    room = width or _LONG
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
     status = words.get(run.status, run.status)
     said = [f"{status}; {run.steps} of {len(run.scene.targets)} steps"]
     if run.message:
         said.append(run.message)
     state = ": ".join([str(run.folder), *said])
-    parts = [*_lines(state, width or _LONG), "", _named(facts_of(run), width)]
+    facts = _named(facts_of(run), room)
+    parts = [*_lines(state, room), "", facts]
     if run.steps:
         history = _thinned(history_table(run), run.folder / "history.csv", width)
-        parts += ["", history, "", *_lines(peaks_of(run), width or _LONG)]
-    return "\n".join([*parts, "", _named(cost_of(run), width)])
+        peaks = _lines(peaks_of(run), room)
+        parts += ["", history, "", *peaks]
+    cost = _named(cost_of(run), room)
+    return "\n".join([*parts, "", cost])
 
 
 def sweep_text(sweep: Sweep) -> str:
@@ -63,7 +67,8 @@ def sweep_text(sweep: Sweep) -> str:
         lines.append(f"in all cases: {', '.join(said)}")
     ends = [name for name in shown_columns(cases) if name != "delta"]
     names = ["case", "run", *sweep.moving, "status", *ends]
-    lines += ["", _thinned(_table_of(cases[names]), sweep.folder / "cases.csv")]
+    table = _table_of(cases[names])
+    lines += ["", _thinned(table, sweep.folder / "cases.csv")]
     for case, message in zip(cases["case"], cases["message"], strict=True):
         if message:
             lines.append(f"case {case}: {message}")
@@ -95,10 +100,12 @@ def probe_text(probe: Probe, angles: Iterable[float]) -> str:
     """A quantity along an edge or a line, its largest and smallest value and where they are, and
     its values at ``angles``."""
     unit = f" {probe.unit}".rstrip()
+    table = _thinned(_table_of(probe.frame()), "-o FILE.csv")
     force = f"{probe.by or 'force'} = {probe.force:.6g} {probe.per}"
-    lines = [_thinned(_table_of(probe.frame()), "-o FILE.csv"), ""]
-    lines.append(f"{probe.quantity} along {probe.place}, step {probe.step}, {force}")
-    for name, k in (("largest", probe.largest), ("smallest", probe.smallest)):
+    what = f"{probe.quantity} along {probe.place}, step {probe.step}, {force}"
+    lines = [table, "", what]
+    extremes = {"largest": probe.largest, "smallest": probe.smallest}
+    for name, k in extremes.items():
         lines.append(f"{name}: {probe.values[k]:.6g}{unit} {probe.where(k)}")
     for angle in angles:
         lines.append(f"at {angle:g}°: {probe.at(angle):.6g}{unit}")
@@ -108,7 +115,8 @@ def probe_text(probe: Probe, angles: Iterable[float]) -> str:
 def names_of(runs: Iterable[Run]) -> list[str]:
     """Names of the runs' folders; their paths where two of the names are the same."""
     names = [run.folder.resolve().name for run in runs]
-    return names if len(set(names)) == len(names) else [str(run.folder) for run in runs]
+    are_different = len(set(names)) == len(names)
+    return names if are_different else [str(run.folder) for run in runs]
 
 
 def first_of_each_kind(warnings: list[str]) -> list[str]:
@@ -139,7 +147,8 @@ def spread(table: Table, most: int) -> int:
     how many it had."""
     n = len(table.rows)
     if n > most:
-        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, most)]
+        kept = np.linspace(0, n - 1, most)
+        table.rows = [table.rows[round(k)] for k in kept]
     return n
 
 
@@ -150,7 +159,8 @@ def named_table(
     are ``cut`` on request."""
     table = Table("", "", left=2)
     for name, text in rows:
-        first, *more = textwrap.wrap(text, room, break_long_words=cut, break_on_hyphens=cut) or [""]
+        lines = textwrap.wrap(text, room, break_long_words=cut, break_on_hyphens=cut)
+        first, *more = lines or [""]
         table.add(name[:longest], first)
         for line in more:
             table.add("", line)
@@ -160,15 +170,17 @@ def named_table(
 def _table_of(frame: Any) -> Table:
     from archord.postprocess.arrays.frames import with_headings  # with pandas
 
+    headings = with_headings(frame)
     rows = frame.itertuples(index=False)
-    return Table(*with_headings(frame), rows=(map(_cell, row) for row in rows))
+    return Table(*headings, rows=(map(_cell, row) for row in rows))
 
 
 def _named(rows: Iterable[tuple[str, str]], width: int) -> str:
-    """Text behind names, wrapped to lines no longer than ``width`` (or `_LONG`)."""
+    """Text behind names, wrapped to lines no longer than ``width``."""
     pairs = list(rows)
     longest = max(len(name) for name, _ in pairs)
-    return str(named_table(pairs, max(_NARROW, (width or _LONG) - 2 - longest)))
+    room = max(_NARROW, width - 2 - longest)
+    return str(named_table(pairs, room))
 
 
 def _lines(text: str, width: int) -> list[str]:
@@ -199,8 +211,9 @@ def facts_of(run: Run) -> Iterator[tuple[str, str]]:
 def history_table(run: Run) -> Table:
     """The `shown_columns` of all steps."""
     names = shown_columns(run.columns)
+    headings = map(run.heading, names)
     columns = ([f"{value:.6g}" for value in run.columns[name]] for name in names)
-    return Table(*map(run.heading, names), rows=zip(*columns, strict=True))
+    return Table(*headings, rows=zip(*columns, strict=True))
 
 
 def peaks_of(run: Run) -> str:
@@ -273,8 +286,9 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
                 cells.append(_percent(relative[r, k]))
         table.add(*cells)
     last = ["", "largest difference"]
-    for size in np.abs(np.nan_to_num(relative[1:])).max(axis=1):
-        last += ["", _percent(size)]
+    sizes = np.abs(np.nan_to_num(relative[1:]))
+    for largest in sizes.max(axis=1):
+        last += ["", _percent(largest)]
     table.add(*last)
     return table
 

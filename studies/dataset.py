@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 from archord.postprocess.laws.general.law_fit import EARLY, NodeRun, first_loading, solved_in
 from archord.report.files import replacing, write_rows
 from archord.studies.law_design import FRESH, Drawn, Row, joints, sweep_file
@@ -40,7 +40,8 @@ def scenes(number: int) -> list[Row]:
 def _shares() -> list[tuple[str, int]]:
     """How many of all joints are of each kind, as in the check of the law."""
     ends = np.cumsum([0, *FRESH.values()])
-    shares = np.diff(np.round(ends * JOINTS / ends[-1]))
+    scaled = np.round(ends * JOINTS / ends[-1])
+    shares = np.diff(scaled)
     return [(kind, int(share)) for kind, share in zip(FRESH, shares, strict=True)]
 
 
@@ -49,10 +50,12 @@ def _runs(joint: Drawn) -> list[Row]:
     many steps where it yields early."""
     if np.isinf(joint.first):
         return [joint.own | {"load.displacement": _ELASTIC}]
+    end = _ELASTIC[-1]
     late = [joint.first * 0.95 * 1.2**k for k in range(30)]
     early = [x for x in _ELASTIC if x < 0.8 * joint.first]
-    loading = [*early, *(x for x in late if x < 2.9), _ELASTIC[-1]]
-    back = [_ELASTIC[-1] * part for part in _BACK]
+    before_end = [x for x in late if x < 2.9]
+    loading = [*early, *before_end, end]
+    back = [end * part for part in _BACK]
     runs = [joint.own | {"load.displacement": [*loading, *back]}]
     if min(joint.numbers[5:]) < EARLY:
         runs.append(joint.own | {"load.displacement": loading, "load.steps": 2})
@@ -77,7 +80,8 @@ def write_tables(sweep: Path, folder: Path) -> list[Path]:
     table = []
     curves: list[dict[str, object]] = []
     for number, (numbers, runs) in enumerate(solved, 1):
-        table.append({"joint": number} | _short(dict(zip(NUMBERS, numbers, strict=True))))
+        named = dict(zip(NUMBERS, numbers, strict=True))
+        table.append({"joint": number} | _short(named))
         curves += [{"joint": number} | _short(row) for row in _curve(runs)]
     files = [folder / "joints.csv", folder / "curves.csv"]
     for file, rows in zip(files, (table, curves), strict=True):
@@ -105,12 +109,11 @@ def _curve(runs: Sequence[NodeRun]) -> Iterable[dict[str, Any]]:
     for run in runs:
         if run.steps > 1 or len(run.back) < 2:
             continue
-        deepest = float(run.back[0, 0])
-        largest = float(run.back[0, 1])
-        extrapolated = float(np.interp(deepest, nodes[:, 0], nodes[:, 1]))
+        (deepest, largest), *points = run.back.tolist()
+        extrapolated = float(np.interp(deepest, x, y))
         error = _MESH_ERROR * largest + abs(extrapolated - largest)
-        for point in run.back[1:]:
-            yield _row(f"back from {deepest:.4g}", point[0], point[1], error)
+        for delta, force in points:
+            yield _row(f"back from {deepest:.4g}", delta, force, error)
 
 
 def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:
@@ -118,7 +121,8 @@ def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:
     fine = [run for run in runs if run.steps == 2 and run.loading == len(nodes)]
     if not fine:
         return np.zeros(len(nodes))
-    return np.abs(fine[0].nodes[: len(nodes), 1] / nodes[:, 1] - 1)
+    finer = fine[0].nodes[: len(nodes), 1]
+    return np.abs(finer / nodes[:, 1] - 1)
 
 
 def _row(

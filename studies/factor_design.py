@@ -17,8 +17,8 @@ from itertools import cycle
 
 import numpy as np
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.factor_model import FRICTION, LARGE_STRAIN, LARGEST
-from archord.postprocess.laws.general.joint import Array
 from archord.studies.hardening_design import hardened
 from archord.studies.law_design import (
     ELEMENT_SIZE,

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import (
     CLEARANCES,
@@ -35,7 +36,6 @@ from archord.postprocess.laws.general.general_law import (
     SMALLEST_S,
     law_of_numbers,
 )
-from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.law_fit import EARLY
 from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
 from archord.scene.sections.errors import toml_value

@@ -48,9 +48,12 @@ class DeckMesh:
 
     def forces(self, of_dofs: Array) -> Array:
         """Nodal forces ``(n, d)`` that do the work of the forces on the dofs."""
-        out = np.zeros((max(len(of_dofs), self.dofs.max() + 1), self.x.shape[1]))
+        n_dofs = max(len(of_dofs), self.dofs.max() + 1)
+        out = np.zeros((n_dofs, self.x.shape[1]))
         out[: len(of_dofs)] = of_dofs
-        np.add.at(out, self.middles[:, :8], _OF_MIDDLE[:, None] * out[self.middles[:, 8:]])
+        around = self.middles[:, :8]
+        on_middles = out[self.middles[:, 8:]]
+        np.add.at(out, around, _OF_MIDDLE[:, None] * on_middles)
         return out[self.dofs]
 
 
@@ -69,7 +72,8 @@ def surface_name(interaction: Interaction, side: int) -> str:
 def deck_mesh(system: System) -> DeckMesh:
     """The mesh of ``system``, of degree 2 and on one rank."""
     problem = system.problem
-    cells = _Cells(system, {body.name: problem.cells_of(body) for body in problem.bodies})
+    of_bodies = {body.name: problem.cells_of(body) for body in problem.bodies}
+    cells = _Cells(system, of_bodies)
     x = cells.x
     elements = dict(cells.elements)
     surfaces = {}
@@ -83,20 +87,25 @@ def deck_mesh(system: System) -> DeckMesh:
     for interaction in problem.interactions:
         disc, opposite = interaction.surfaces
         if isinstance(disc, Rigid):
-            rim, ring = _ring(disc.circle, _mean_length(x, surfaces[opposite].nodes))
+            length = _mean_length(x, surfaces[opposite].nodes)
+            rim, ring = _ring(disc.circle, length)
             ring += len(x)
             x = np.concatenate([x, rim])
-            number = sum(map(len, elements.values())) + np.arange(len(ring))
+            n_before = sum(map(len, elements.values()))
+            number = n_before + np.arange(len(ring))
             name = surface_name(interaction, 0)
             elements[name] = ring
             node_sets[name] = np.unique(ring)
             edge = np.ones(len(ring), dtype=np.int64)
             surfaces[name] = DeckSurface(number, edge, ring[:, [1, 2, 5]])
-    used = np.unique(np.concatenate([own.ravel() for own in elements.values()]))
+    of_elements = [own.ravel() for own in elements.values()]
+    used = np.unique(np.concatenate(of_elements))
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))
     elements = {name: place[own] for name, own in elements.items()}
-    node_sets = {name: place[own][place[own] >= 0] for name, own in node_sets.items()}
+    for name, own in node_sets.items():
+        places = place[own]
+        node_sets[name] = places[places >= 0]
     surfaces = {name: replace(s, nodes=place[s.nodes]) for name, s in surfaces.items()}
     return DeckMesh(x[used], used, cells.middles, elements, node_sets, surfaces)
 

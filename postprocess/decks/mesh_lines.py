@@ -22,10 +22,9 @@ def mesh_lines(model: DeckModel, heading: str) -> list[str]:
     words = _MODELS.get(model.problem.kinematics.name, f"thickness {number(model.thick)}, forces")
     lines = ["*HEADING", f"archord: {heading}; {words} times {whole} are of the whole"]
     lines.append("*NODE, NSET=ALL_NODES")
-    x = _drawn(model)
-    for i in range(len(x)):
-        place = [number(x[i, axis]) for axis in range(x.shape[1])]
-        lines.append(", ".join([str(i + 1), *place]))
+    for node, x in enumerate(_drawn(model), 1):
+        place = [number(coordinate) for coordinate in x]
+        lines.append(", ".join([str(node), *place]))
     if model.own:
         lines.append("*NODE, NSET=DRIVES")
         lines += [f"{node}, 0., 0." for node in model.own.values()]
@@ -36,7 +35,8 @@ def mesh_lines(model: DeckModel, heading: str) -> list[str]:
         for element in np.column_stack([numbers, nodes + 1]):
             lines += continued(element)
         first += len(nodes)
-    sets = {name: surface.nodes for name, surface in mesh.surfaces.items()} | mesh.node_sets
+    of_surfaces = {name: surface.nodes for name, surface in mesh.surfaces.items()}
+    sets = of_surfaces | mesh.node_sets
     for name, nodes in sets.items():
         lines.append(f"*NSET, NSET={label(name)}")
         listed = np.unique(nodes) + 1
@@ -60,11 +60,13 @@ def _drawn(model: DeckModel) -> Array:
     x = model.mesh.x.copy()
     for i in model.problem.interactions:
         nodes = model.mesh.surfaces[surface_name(i, 0)].nodes
-        normal = np.zeros_like(x)
-        np.add.at(normal, nodes, _outward(model.mesh.x[nodes])[:, None])
+        normals = np.zeros_like(x)
+        of_sides = _outward(model.mesh.x[nodes])
+        np.add.at(normals, nodes, of_sides[:, None])
         at = np.unique(nodes)
-        length = np.linalg.norm(normal[at], axis=1)
-        x[at] += i.interference * normal[at] / length[:, None]
+        normal = normals[at]
+        length = np.linalg.norm(normal, axis=1)
+        x[at] += i.interference * normal / length[:, None]
     return x
 
 

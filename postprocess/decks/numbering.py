@@ -65,7 +65,7 @@ class Numbering(NamedTuple):
 
 
 @cache
-def numbering(kind: basix.CellType, *, mirrored: bool = False) -> Numbering:
+def numbering(kind: basix.CellType, *, mirrored: bool) -> Numbering:
     """The numbering of elements on cells of this ``kind``, also on ``mirrored`` ones, whose
     determinant is negative."""
     corners = np.array(_CORNERS[kind])

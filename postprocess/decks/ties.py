@@ -47,12 +47,16 @@ class Ties:
 
         def order(name: str) -> tuple[int, float]:
             surface = mesh.surfaces[name]
-            return self._n_taken(surface), _mean_length(mesh, surface) if in_plane else 0.0
+            length = _mean_length(mesh, surface) if in_plane else 0.0
+            return self._n_taken(surface), length
 
-        names = sorted((surface_name(interaction, side) for side in (0, 1)), key=order)
+        both = [surface_name(interaction, side) for side in (0, 1)]
+        names = sorted(both, key=order)
         if in_plane:
-            return self._equations(*(mesh.surfaces[name] for name in names))
-        tie = f"*TIE, NAME={label(interaction.name)}, ADJUST=NO{reach(self._model, interaction)}"
+            tied, opposite = (mesh.surfaces[name] for name in names)
+            return self._equations(tied, opposite)
+        over_gap = reach(self._model, interaction)
+        tie = f"*TIE, NAME={label(interaction.name)}, ADJUST=NO{over_gap}"
         return [tie, ", ".join(f"{label(name)}_SURFACE" for name in names)]
 
     def _equations(self, tied: DeckSurface, opposite: DeckSurface) -> list[str]:
@@ -86,17 +90,19 @@ class Ties:
 def reach(model: DeckModel, interaction: Interaction) -> str:
     """The parameter of ``*TIE`` in space that lets it tie surfaces over the gap that they are drawn
     with; empty where they touch. Without it nodes are left loose, and warnings alone say so."""
-    gaps = [
-        np.abs((pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found])
-        for pair in model.system.contact.interface(interaction.name).pairs
-    ]
+    gaps = []
+    for pair in model.system.contact.interface(interaction.name).pairs:
+        along_normal = (pair.separation * pair.projection.normal).sum(axis=1)
+        gaps.append(np.abs(along_normal[pair.projection.found]))
     gap = float(np.concatenate(gaps).max(initial=0.0))
     shortest = np.inf
     for side in (0, 1):
         nodes = model.mesh.surfaces[surface_name(interaction, side)].nodes
-        corners = model.mesh.x[nodes[:, : nodes.shape[1] // 2]]
+        n_corners = nodes.shape[1] // 2
+        corners = model.mesh.x[nodes[:, :n_corners]]
         edges = np.roll(corners, 1, axis=1) - corners
-        shortest = min(shortest, float(np.linalg.norm(edges, axis=2).min()))
+        lengths = np.linalg.norm(edges, axis=2)
+        shortest = min(shortest, float(lengths.min()))
     if gap <= _TOUCHING * shortest:
         return ""
     return f", POSITION TOLERANCE={number(_REACH * gap)}"
@@ -109,13 +115,17 @@ def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:
     start, end, middle = (edges[None, :, k] for k in range(3))
     slope = (end - start) / 2
     bend = (start + end) / 2 - middle
-    t = np.clip(_dot(x[:, None] - middle, slope) / _dot(slope, slope), -2, 2)
+    points = x[:, None]
+
+    def off(t: Array) -> Array:
+        return middle + t * slope + t**2 * bend - points
+
+    t = np.clip(_dot(points - middle, slope) / _dot(slope, slope), -2, 2)
     for _ in range(_ITERATIONS):
         along = slope + 2 * t[..., None] * bend
-        off = middle + t[..., None] * slope + t[..., None] ** 2 * bend - x[:, None]
-        t = np.clip(t - _dot(off, along) / _dot(along, along), -2, 2)
-    off = middle + t[..., None] * slope + t[..., None] ** 2 * bend - x[:, None]
-    distance = np.linalg.norm(off, axis=-1)
+        step = _dot(off(t[..., None]), along) / _dot(along, along)
+        t = np.clip(t - step, -2, 2)
+    distance = np.linalg.norm(off(t[..., None]), axis=-1)
     distance[np.abs(t) > 1 + _BEYOND] = np.inf
     nearest = distance.argmin(axis=1)
     every = np.arange(len(x))

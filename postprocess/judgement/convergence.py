@@ -85,7 +85,7 @@ class Refined:
         or do not shrink."""
         found = math.inf
         if len(curves) > 2:
-            fine, middle, coarse = self._at_common_steps(curves[:3])[1]
+            _, (fine, middle, coarse) = self._at_common_steps(curves[:3])
             finer = middle - fine
             coarser = coarse - middle
             if finer @ coarser > 0:
@@ -103,9 +103,11 @@ class Refined:
         them."""
         common, (fine, coarse) = self._at_common_steps(curves[:2])
         ratio = self.coarser[0].scene.joint.h / self.run.scene.joint.h
-        shift = richardson(fine - coarse, ratio, self.order(curves).value)
+        order = self.order(curves).value
+        shift = richardson(fine - coarse, ratio, order)
         relative = shift / np.where(fine == 0, 1.0, fine)
-        return curves[0] * np.interp(self.run.numbers, common, relative)
+        everywhere = np.interp(self.run.numbers, common, relative)
+        return curves[0] * everywhere
 
     def _at_common_steps(self, curves: Sequence[Array]) -> tuple[Array, list[Array]]:
         """The numbers of the steps ``(m,)`` that the finest runs have in common, and the values of
@@ -120,7 +122,8 @@ class Refined:
             value = curve[chosen]
             apart = delta - run.delta[chosen]
             if apart.any():
-                value = value + _slope(run.delta, curve)[chosen] * apart
+                slope = _slope(run.delta, curve)[chosen]
+                value = value + slope * apart
             values.append(value)
         return common, values
 

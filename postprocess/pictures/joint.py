@@ -34,7 +34,8 @@ def magnification(scene: Scene, fields: Fields) -> float:
     R = scene.joint.radius
     dR = abs(scene.joint.dR)
     near = np.hypot(*fields.coordinates.T) < _NEAR * R
-    moved = max(float(np.abs(fields.displacement[near]).max()), abs(fields.delta))
+    largest = float(np.abs(fields.displacement[near]).max())
+    moved = max(largest, abs(fields.delta))
     visible = _VISIBLE * R / dR
     recognisable = _FARTHEST * R / (dR + moved)
     wanted = max(1.0, min(visible, recognisable))
@@ -55,14 +56,16 @@ def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = Tru
     X = fields.coordinates
     pin = fields.body_of_node == BODIES["pin"]
     distance = np.maximum(np.hypot(*X.T), scene.joint.radius / 2)
-    start = X * (1 - scene.joint.dR / distance)[:, None]
+    inward = 1 - scene.joint.dR / distance
+    start = X * inward[:, None]
     start[pin] = X[pin] + [0.0, scene.joint.pin_depth]
     now = fields.deformed if displaced else X
     return start + factor * (now - start)
 
 
 def _load(scene: Scene, delta: float) -> str:
-    return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name(scene.joint.dR, 'ΔR')}"
+    dR = scene.joint.dR
+    return f"δ = {delta / abs(dR):.4g} {gap_name(dR, 'ΔR')}"
 
 
 def _over(divisor: float) -> dict[str, Any]:
@@ -93,10 +96,12 @@ def force_panel(axes: Any, run: Run) -> None:
     axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.units['P']}]")
     axes.set(title="force of the joint", xlim=(min(delta), None), ylim=(min(P), None))
     axes.grid(alpha=0.3)
-    clearance = axes.secondary_xaxis("top", **_over(abs(scene.joint.dR)))
-    clearance.set_xlabel(f"δ / {gap_name(scene.joint.dR, 'ΔR')}")
+    dR = scene.joint.dR
+    in_clearances = axes.secondary_xaxis("top", **_over(abs(dR)))
+    in_clearances.set_xlabel(f"δ / {gap_name(dR, 'ΔR')}")
     stiffness = scene.E_star * scene.joint.radius * scene.thickness
-    axes.secondary_yaxis("right", **_over(stiffness)).set_ylabel("P / (E* R)")
+    without_unit = axes.secondary_yaxis("right", **_over(stiffness))
+    without_unit.set_ylabel("P / (E* R)")
 
 
 def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
@@ -107,9 +112,10 @@ def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     for i, step in enumerate(steps or shown_steps(run)):
         arcs = run.contact(step)
         both = len(arcs) > 1
+        load = _load(scene, run.path[step - 1])
         for side, arc in arcs.items():
             angle, pressure = arc.facet_means()
-            style: dict[str, Any] = {"ls": "-", "label": _load(scene, run.path[step - 1])}
+            style: dict[str, Any] = {"ls": "-", "label": load}
             if both and side == "pin":
                 style = {"ls": "--"}
             axes.plot(np.degrees(angle), pressure, color=f"C{i}", lw=1.4, **style)
@@ -120,7 +126,8 @@ def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     axes.set_xticks(np.arange(0, reach + 1, reach / 6))
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
-    axes.secondary_yaxis("right", **_over(scene.E_star)).set_ylabel("p / E*")
+    without_unit = axes.secondary_yaxis("right", **_over(scene.E_star))
+    without_unit.set_ylabel("p / E*")
 
 
 def field_panel(axes: Any, run: Run, step: int | None = None, field: str = "") -> None:

@@ -38,7 +38,8 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     extents = " by ".join(f"{extent:g}" for extent in np.ptp(mesh.x, axis=0))
     plural = f"{mesh.kind.name}s".replace("hedrons", "hedra")
     kind = f"{plural} of order {mesh.order}"
-    extent = f"{extents} from {place(mesh.x.min(axis=0))}"
+    lowest = place(mesh.x.min(axis=0))
+    extent = f"{extents} from {lowest}"
     head = f"{name}: {len(mesh.cells)} {kind}, {len(mesh.x)} nodes, {extent}"
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
     size = "area" if is_plane else "volume"
@@ -47,15 +48,16 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     for name, inside in cells.items():
         n_parts = parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1
         worst = [f"{values[inside].min(initial=1.0):.2g}" for values in good]
-        bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", n_parts, *worst)
-    columns = ["facet set", "of", "circle", "facets", "length", "shortest", "longest"]
-    if not is_plane:
-        columns = ["facet set", "of", "middle", "cylinder", *columns[3:]]
-        columns[5] = "area"
+        total = area[inside].sum()
+        bodies.add(name, inside.sum(), f"{total:.6g}", n_parts, *worst)
+    row = _facet_row if is_plane else _face_row
+    shape = ["circle"] if is_plane else ["middle", "cylinder"]
+    size = "length" if is_plane else "area"
+    columns = ["facet set", "of", *shape, "facets", size, "shortest", "longest"]
     facets = Table(*columns, left=columns.index("facets"))
     for name in mesh.facet_sets:
-        row = _facet_row if is_plane else _face_row
-        facets.add(name, *row(mesh, mesh.facets_of(name), cells))
+        entries = row(mesh, mesh.facets_of(name), cells)
+        facets.add(name, *entries)
     points = Table("point set", "nodes", left=1)
     for name, nodes in mesh.point_sets.items():
         points.add(name, len(nodes))
@@ -89,12 +91,18 @@ def _face_row(
         mean = mesh.x[corners].mean(axis=(0, 1))
         middle = place(mean.round(9) + 0.0)
     said = f"R {cylinder.radius:.8g}" if cylinder else ""
-    ends = mesh.x[entities_of(kind, facets, 1)[:, :2]]
+    edges = entities_of(kind, facets, 1)
+    ends = mesh.x[edges[:, :2]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     area = Patches(mesh.x, facets, kind, mesh.order).areas().sum()
-    sizes = [area, length.min(initial=np.inf), length.max(initial=0.0)]
-    numbers = [f"{value:.5g}" for value in sizes]
-    return [_owners(mesh, facets, cells), middle, said, len(facets), *numbers]
+    owners = _owners(mesh, facets, cells)
+    return [owners, middle, said, len(facets), *_sizes(area, length)]
+
+
+def _sizes(whole: float, length: np.ndarray) -> list[str]:
+    """The ``whole`` of a set, and the shortest and the longest ``length`` ``(k,)`` in it."""
+    sizes = [whole, length.min(initial=np.inf), length.max(initial=0.0)]
+    return [f"{value:.5g}" for value in sizes]
 
 
 def _facet_row(
@@ -112,16 +120,12 @@ def _facet_row(
         x, y = centre.round(9) + 0.0
         said.append(f"({x:.5g}, {y:.5g}) R {radius:.8g}")
         if edges.shape[1] == 2:
-            said.append(f"sagitta {length.max() ** 2 / (8 * radius):.2g}")
+            sagitta = length.max() ** 2 / (8 * radius)
+            said.append(f"sagitta {sagitta:.2g}")
     if len(nodes) and (count == 2).all():
         said.append("closed")
-    sizes = [length.sum(), length.min(initial=np.inf), length.max(initial=0.0)]
-    return [
-        _owners(mesh, edges, cells),
-        ", ".join(said),
-        len(edges),
-        *(f"{value:.5g}" for value in sizes),
-    ]
+    owners = _owners(mesh, edges, cells)
+    return [owners, ", ".join(said), len(edges), *_sizes(length.sum(), length)]
 
 
 def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
@@ -132,27 +136,27 @@ def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection, PolyCollection
 
-    size = np.ptp(mesh.x, axis=0)
-    figure = new_figure(9.0, float(np.clip(9.0 * size[1] / size[0], 3.0, 12.0)))
-    axes, colours, faint = figure.add_subplot(), colormaps["tab10"], colormaps["Pastel2"]
-    sides = mesh.x[along(sides_of(mesh.kind, mesh.cells))]
+    width, height = np.ptp(mesh.x, axis=0)
+    figure = new_figure(9.0, float(np.clip(9.0 * height / width, 3.0, 12.0)))
+    axes = figure.add_subplot()
+    colours = colormaps["tab10"]
+    faint = colormaps["Pastel2"]
     around = [0, 1, 2] if mesh.kind == TRIANGLE else [0, 1, 3, 2]
     for k, (name, tags) in enumerate(mesh.cell_sets.items()):
-        inside = mesh.x[mesh.cells[np.isin(mesh.bodies, tags)]][:, around]
-        axes.add_collection(
-            PolyCollection(inside, facecolors=[faint(k % 8)], label=name, zorder=-len(inside))
-        )
+        own = mesh.cells[np.isin(mesh.bodies, tags)]
+        style: dict[str, Any] = {"facecolors": [faint(k % 8)], "zorder": -len(own)}
+        cells = PolyCollection(mesh.x[own][:, around], label=name, **style)
+        axes.add_collection(cells)
+    sides = mesh.x[along(sides_of(mesh.kind, mesh.cells))]
     axes.add_collection(LineCollection(sides, colors="0.5", linewidths=0.3, zorder=1))
-    for k, (name, tags) in enumerate(mesh.facet_sets.items()):
-        edges = mesh.x[along(mesh.facets[np.isin(mesh.tags, tags)])]
-        above = 3 - len(edges) / len(mesh.facets)
-        axes.add_collection(
-            LineCollection(
-                edges, colors=[colours(k % 10)], linewidths=2.0, label=name, zorder=above
-            )
-        )
-    for k, (name, nodes) in enumerate(mesh.point_sets.items()):
-        axes.plot(*mesh.x[nodes].T, ".", color=colours((k + len(mesh.facet_sets)) % 10), label=name)
+    for k, name in enumerate(mesh.facet_sets):
+        own = mesh.facets_of(name)
+        above = 3 - len(own) / len(mesh.facets)
+        style = {"colors": [colours(k % 10)], "linewidths": 2.0, "zorder": above}
+        edges = LineCollection(mesh.x[along(own)], label=name, **style)
+        axes.add_collection(edges)
+    for k, (name, nodes) in enumerate(mesh.point_sets.items(), len(mesh.facet_sets)):
+        axes.plot(*mesh.x[nodes].T, ".", color=colours(k % 10), label=name)
     axes.autoscale_view()
     axes.set_aspect("equal")
     figure.legend(loc="outside right upper")
@@ -175,7 +179,8 @@ def _draw_solids(mesh: MeshArrays, target: Path) -> Path:
             colour = colormaps["tab10"](k % 10)
             triangles = _triangles(mesh, facets)
             axes.plot_trisurf(*mesh.x.T, triangles=triangles, color=colour, **faint)
-            axes.text(*mesh.x[triangles].mean(axis=(0, 1)), name, zorder=3)
+            middle = mesh.x[triangles].mean(axis=(0, 1))
+            axes.text(*middle, name, zorder=3)
     axes.set_aspect("equal")
     return save_figure(figure, target)
 

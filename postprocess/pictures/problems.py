@@ -63,7 +63,8 @@ def field_panel(axes: Any, run: Run, step: int | None = None, field: str = "") -
     farthest = np.abs(fields.displacement).max()
     factor = 1.0
     if farthest > 0 and not run.has_contact:
-        factor = max(float(f"{_MAGNIFIED * size / farthest:.0e}"), 1.0)
+        wanted = _MAGNIFIED * size / farthest
+        factor = max(float(f"{wanted:.0e}"), 1.0)
     x = fields.coordinates + factor * fields.displacement
     everywhere = np.ones(len(fields.cells), dtype=bool)
     draw_field(axes, run, fields, x, everywhere, everywhere, field)
@@ -137,7 +138,8 @@ def draw_field(
     style = {"cmap": colours.map, "vmin": colours.low, "vmax": colours.high}
     if of_cells:
         grey = np.isnan(in_cells) | (in_cells == 0)
-        of_triangles = np.repeat(np.where(grey, np.nan, in_cells)[shown], triangles.shape[1])
+        coloured = np.where(grey, np.nan, in_cells)
+        of_triangles = np.repeat(coloured[shown], triangles.shape[1])
         drawn = axes.tripcolor(*x.T, flat, facecolors=of_triangles, **style)
     else:
         drawn = axes.tripcolor(*x.T, flat, values, shading="gouraud", **style)
@@ -152,7 +154,8 @@ def field_values(run: Run, fields: Fields, field: str) -> tuple[Array, str, str]
     yielded = fields.peeq is not None and fields.peeq.any()
     name = _FIELDS.get(field, field) or ("peeq" if yielded else "von_mises")
     label, scale = field_words(run, name)
-    return scale * _values(run, fields, name), label, OF_PEEQ if name == "peeq" else "viridis"
+    values = scale * _values(run, fields, name)
+    return values, label, OF_PEEQ if name == "peeq" else "viridis"
 
 
 def _without_colours(known: Array) -> str:
@@ -239,7 +242,8 @@ def draw_outline(axes: Any, fields: Fields, x: Array, **style: Any) -> None:
     limits as they are."""
     from matplotlib.collections import LineCollection
 
-    axes.add_collection(LineCollection(list(_EDGE @ x[fields.outline()]), **style), autolim=False)
+    parabolas = _EDGE @ x[fields.outline()]
+    axes.add_collection(LineCollection(list(parabolas), **style), autolim=False)
 
 
 def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
@@ -253,7 +257,7 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
 
 
 def edge_panel(
-    axes: Any, run: Run, edges: Sequence[str], quantity: str = "", steps: Sequence[int] = ()
+    axes: Any, run: Run, edges: Sequence[str], quantity: str, steps: Sequence[int]
 ) -> None:
     """A ``quantity`` of `Run.probe` (the hoop stress) along ``edges`` at ``steps`` (up to four).
     Raises `InputError`."""

@@ -61,7 +61,8 @@ class View(NamedTuple):
         towards = towards / np.linalg.norm(towards)
         right = np.cross([0.0, 1.0, 0.0], towards)
         right = right / np.linalg.norm(right)
-        return cls(right, np.cross(towards, right), towards)
+        up = np.cross(towards, right)
+        return cls(right, up, towards)
 
     def flat(self, x: Array) -> Array:
         """Points ``(..., 3)`` as they are drawn ``(..., 2)``."""
@@ -81,16 +82,21 @@ def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
     getattr(grid, of_what)["value"] = values
     if cut:
         axis, place = _plane_of(run, fields, cut)
-        grid = grid.clip(normal=np.eye(3)[axis], origin=place * np.eye(3)[axis])
+        normal = np.eye(3)[axis]
+        grid = grid.clip(normal=normal, origin=place * normal)
     grid.cell_data["middle"] = grid.cell_centers().points
     surface = grid.extract_surface(nonlinear_subdivision=1).triangulate()
     triangles = surface.faces.reshape(-1, 4)[:, 1:].copy()
-    outward = surface.points[triangles].mean(axis=1) - surface.cell_data["middle"]
-    inside_out = (_normals(surface.points[triangles]) * outward).sum(axis=1) < 0
+    corners = surface.points[triangles]
+    outward = corners.mean(axis=1) - surface.cell_data["middle"]
+    along = (_normals(corners) * outward).sum(axis=1)
+    inside_out = along < 0
     triangles[inside_out] = triangles[inside_out, ::-1]
     x = surface.points + surface.point_data["displacement"]
     found = getattr(surface, of_what)["value"]
-    return Skin(x[triangles], found if of_cells else found[triangles].mean(axis=1))
+    if not of_cells:
+        found = found[triangles].mean(axis=1)
+    return Skin(x[triangles], found)
 
 
 def field_panel(
@@ -104,12 +110,16 @@ def field_panel(
     fields = run.fields(step or shown_step(run))
     values, label, map_name = field_values(run, fields, field)
     skin = skin_of(run, fields, values, cut)
-    shown = np.where(skin.values == 0, np.nan, skin.values) if map_name == OF_PEEQ else skin.values
+    shown = skin.values
+    if map_name == OF_PEEQ:
+        shown = np.where(shown == 0, np.nan, shown)
     normal = _normals(skin.corners)
-    view = _best_view(normal, np.abs(np.nan_to_num(shown)), cut)
+    size = np.abs(np.nan_to_num(shown))
+    view = _best_view(normal, size, cut)
     # Faces that look away are hidden, but their triangles can be nearer than those before them.
     facing = np.flatnonzero(normal @ view.towards > 0)
-    order = facing[np.argsort(skin.corners[facing].mean(axis=1) @ view.towards)]
+    nearness = skin.corners[facing].mean(axis=1) @ view.towards
+    order = facing[np.argsort(nearness)]
     known = shown[np.isfinite(shown)]
     colours = colours_for(known, map_name)
     painted = _painted(colours, shown[order], normal[order], view)
@@ -155,19 +165,26 @@ def _best_view(normal: Array, size: Array, cut: str) -> View:
     """The view that shows most of a field of this ``size`` ``(k,)`` on faces with these ``normal``
     vectors ``(k, 3)``; of a cut, one of those that look into it."""
     views = []
-    for signs in product((1, -1), (1, -1), (1, -1)):
+    for signs in product((1, -1), repeat=3):
         if cut and signs[AXES.index(cut.strip()[0])] < 0:
             continue
         views.append(View.from_octant(signs))
-    return max(views, key=lambda view: float(np.maximum(normal @ view.towards, 0) @ size))
+
+    def shows(view: View) -> float:
+        facing = np.maximum(normal @ view.towards, 0)
+        return float(facing @ size)
+
+    return max(views, key=shows)
 
 
 def _painted(colours: Colours, values: Array, normal: Array, view: View) -> Array:
     """Colours ``(k, 4)`` of faces, darker where they are seen from the side."""
-    scaled = (values - colours.low) / max(colours.high - colours.low, np.finfo(float).tiny)
+    span = max(colours.high - colours.low, np.finfo(float).tiny)
+    scaled = (values - colours.low) / span
     painted = colours.map(np.clip(np.nan_to_num(scaled), 0, 1))
     painted[~np.isfinite(values), :3] = _ELASTIC
-    light = _DARKEST + (1 - _DARKEST) * np.abs(normal @ view.towards)
+    facing = np.abs(normal @ view.towards)
+    light = _DARKEST + (1 - _DARKEST) * facing
     painted[:, :3] *= light[:, None]
     return painted
 
@@ -185,8 +202,10 @@ def _draw_axes(axes: Any, view: View) -> None:
     inset = axes.inset_axes([-0.08, -0.08, 0.26, 0.26])
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
     inset.axis("off")
-    for name, end in zip(AXES, view.flat(np.eye(3)), strict=True):
-        inset.annotate("", end, (0, 0), arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0})
+    ends = view.flat(np.eye(3))
+    arrow = {"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0}
+    for name, end in zip(AXES, ends, strict=True):
+        inset.annotate("", end, (0, 0), arrowprops=arrow)
         inset.text(*(1.4 * end), name, ha="center", va="center", fontsize="small")
 
 
@@ -205,7 +224,8 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     carried = np.abs(pressure) if is_tied else pressure
     pressed = carried > _PRESSED * carried.max(initial=0.0)
     colours = colours_for(pressure, "viridis")
-    drawn = PolyCollection(places, array=np.where(pressed, pressure, np.nan), cmap=colours.map)
+    shown = np.where(pressed, pressure, np.nan)
+    drawn = PolyCollection(places, array=shown, cmap=colours.map)
     low = colours.low if is_tied else 0.0
     drawn.set(clim=(low, colours.high), edgecolor="face", linewidth=0.2)
     axes.add_collection(drawn)

@@ -30,10 +30,11 @@ def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
     tangent, joined = _tangents(fields.coordinates[nodes], nodes)
     stresses = {}
     if fields.stress is not None:
-        stresses = _stresses(fields.stress[nodes], tangent)
+        stress = fields.stress[nodes]
+        stresses = _stresses(stress, tangent)
         if kinematics(run.scene.analysis.plane).has_hoop:
             stresses["along"] = stresses["hoop"]
-            stresses["hoop"] = fields.stress[nodes][..., 2]
+            stresses["hoop"] = stress[..., 2]
     values = nodal(run, fields, quantity, nodes, **stresses)
     found = _once(fields, nodes, joined, s, values)
     if not radius:
@@ -47,8 +48,9 @@ def _stresses(stress: Array, tangent: Array) -> dict[str, Array]:
     xx, yy, _, xy = np.moveaxis(stress, -1, 0)
     c, d = np.moveaxis(tangent, -1, 0)
     along = xx * c**2 + yy * d**2 + 2 * xy * c * d
+    across = xx + yy - along
     shear = (yy - xx) * c * d + xy * (c**2 - d**2)
-    return {"hoop": along, "normal": xx + yy - along, "shear": shear}
+    return {"hoop": along, "normal": across, "shear": shear}
 
 
 def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> Along:
@@ -74,7 +76,8 @@ def _once(fields: Fields, nodes: np.ndarray, joined: np.ndarray, s: Array, value
     last node of a facet that is ``joined`` to the next one is the first node there."""
     shown = np.ones(nodes.shape, dtype=bool)
     shown[:, 2] = ~joined
-    return Along(fields.coordinates[nodes[shown]], s[shown], values[shown])
+    x = fields.coordinates[nodes[shown]]
+    return Along(x, s[shown], values[shown])
 
 
 def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
@@ -89,12 +92,13 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     nodes = all_facets[on_edge]
     _, once = np.unique(nodes[:, 1], return_index=True)
     nodes = nodes[once]
-    height = x[nodes[:, 0]] @ [1.0, 1e-3]
+    starts = x[nodes[:, 0]]
+    height = starts @ [1.0, 1e-3]
     radius = 0.0
     circle = circle_through(x[np.unique(nodes)])
     if circle is not None:
         centre, radius = circle
-        begin = angles_about(x[nodes[:, 0]], centre)
+        begin = angles_about(starts, centre)
         end = angles_about(x[nodes[:, 2]], centre)
         turned = (end - begin + 180) % 360 - 180
         if turned.sum() < 0:
@@ -118,7 +122,8 @@ def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
     """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet
     without a corner their mean; and which facets ``(k,)`` are so followed by the next."""
     by_ends = [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]]  # of the parabola, at its nodes
-    tangent = unit(np.einsum("qa,fai->fqi", by_ends, x))
+    slopes = np.einsum("qa,fai->fqi", by_ends, x)
+    tangent = unit(slopes)
     here, after = np.nonzero(nodes[:, 2:] == nodes[:, 0])
     cosine = (tangent[here, 2] * tangent[after, 0]).sum(axis=1)
     smooth = cosine > _SMOOTH
