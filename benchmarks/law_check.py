@@ -23,11 +23,12 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
 
+from archord.materials.material import Array
 from archord.postprocess.laws.calibration import fit
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.general_law import joint_numbers, law_of_numbers
 from archord.postprocess.laws.general.hardening_model import flows
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.law_fit import (
     SOFT,
@@ -76,20 +77,29 @@ def off(joint: LawJoint, runs: list[NodeRun]) -> Off:
     nodes = first_loading(runs)
     x, y, peak, angle = nodes[nodes[:, 0] <= _END].T
     told = law.at(x)
-    relative = 100 * (told.load / y - 1)
+    relative = _per_cent(told.load, y)
     errors = {name: relative[_within(x, ends)] for name, ends in _RANGES.items()}
     usual = _within(x, _USUAL)
     before = usual & (x < x[-1])
-    slope = CubicSpline(np.log(x), np.log(y))(np.log(x), 1) * y / x
-    errors["stiffness"] = (100 * (told.stiffness - slope) / np.maximum(slope, y / x))[before]
-    errors["own stiffness"] = (100 * (told.stiffness / slope - 1))[before]
-    errors["p0"] = (100 * (told.peak_pressure / peak - 1))[usual]
+    ln_x = np.log(x)
+    ln_y = CubicSpline(ln_x, np.log(y))
+    slope = ln_y(ln_x, 1) * y / x
+    of_stiffness = 100 * (told.stiffness - slope) / np.maximum(slope, y / x)
+    errors["stiffness"] = of_stiffness[before]
+    errors["own stiffness"] = _per_cent(told.stiffness, slope)[before]
+    errors["p0"] = _per_cent(told.peak_pressure, peak)[usual]
     errors["eps"] = np.degrees(told.angle - angle)[usual]
     for run in runs:
         if run.steps == 1 and len(run.back) > 3 and run.back[0, 0] <= _END:
             for name, value in _back(law, run).items():
                 errors[name] = np.append(errors.get(name, []), value)
-    return Off(kind, errors, np.abs(told.load - y)[usual] <= told.error[usual])
+    inside = np.abs(told.load - y) <= told.error
+    return Off(kind, errors, inside[usual])
+
+
+def _per_cent(told: Array, solved: Array) -> Array:
+    """The relative error of what is ``told``."""
+    return 100 * (told / solved - 1)
 
 
 def _within(x: Array, ends: tuple[float, float]) -> npt.NDArray[np.bool_]:
@@ -101,7 +111,8 @@ def kind_of(numbers: Numbers) -> str:
     """Plane and what yields of the joint with these ``numbers``, in words; and whether the pin is
     soft."""
     strain, p, m, _, _, pin, block = numbers
-    body = f"{'pin' if pin < block else 'block'} {'alone' if np.isinf(pin + block) else 'weaker'}"
+    weaker = "pin" if pin < block else "block"
+    body = f"{weaker} {'alone' if np.isinf(pin + block) else 'weaker'}"
     if np.isinf(min(pin, block)):
         body = "elastic"
     elif np.isclose(pin, block):
@@ -126,18 +137,23 @@ def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
     told = way(state.load)
     errors = {}
     for name, share in _LEFT.items():
-        if y[-1] < share * largest:
-            ends = np.searchsorted(told, share * largest), np.searchsorted(solved, share * largest)
-            errors[name] = np.array([100 * (fine[ends[0]] - fine[ends[1]])])
-    loading = PchipInterpolator(*np.insert(run.nodes[: run.loading, :2], 0, 0.0, axis=0).T)(fine)
+        left = share * largest
+        if y[-1] < left:
+            told_end = fine[np.searchsorted(told, left)]
+            solved_end = fine[np.searchsorted(solved, left)]
+            errors[name] = np.array([100 * (told_end - solved_end)])
+    nodes = np.insert(run.nodes[: run.loading, :2], 0, 0.0, axis=0)
+    loading = PchipInterpolator(*nodes.T)(fine)
     returned = trapezoid(solved, fine) - trapezoid(told, fine)
+    work = trapezoid(loading, fine)
     off = 100 * (state.load - y)[1:] / largest
     again = run.nodes[run.loading + len(x) - 1 :, :2]
     x_again, y_again = again[again[:, 0] <= x[0]].T
+    told_again = law.at(x_again, x[0]).load
     return errors | {
         "back": np.array([np.sqrt(np.mean(off**2))]),
-        "energy": np.array([100 * returned / trapezoid(loading, fine)]),
-        "reloaded": 100 * (law.at(x_again, x[0]).load - y_again) / largest,
+        "energy": np.array([100 * returned / work]),
+        "reloaded": 100 * (told_again - y_again) / largest,
         "back inside": np.abs(off) <= 100 * state.error[1:] / largest,
     }
 
@@ -162,7 +178,8 @@ def table_of(found: list[Off]) -> Table:
     for kind, members in sorted(kinds.items()):
         cells = []
         for name in names:
-            cells.append(rms_largest(_joined(one.errors.get(name) for one in members)))
+            errors = _joined(one.errors.get(name) for one in members)
+            cells.append(rms_largest(errors))
         inside = _joined(one.inside for one in members)
         back_inside = _joined(one.errors.get("back inside") for one in members)
         cells += [f"{part.mean():.0%}" if len(part) else "-" for part in (inside, back_inside)]

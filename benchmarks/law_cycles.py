@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import trapezoid
 
+from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import law_of_numbers
-from archord.postprocess.laws.general.joint import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.yield_model import stored_joints
 

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from archord.benchmarks.law_check import kind_of
+from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import joint_numbers
-from archord.postprocess.laws.general.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest
 from archord.postprocess.run import Run
 from archord.report.table import Table

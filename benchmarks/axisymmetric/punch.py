@@ -18,7 +18,7 @@ from archord.solver.problem import Body, Interaction, Load, Problem, Support
 ALUMINIUM = 70e3  # MPa
 
 
-def punch_mesh(finer: int = 1) -> TaggedMesh:
+def punch_mesh(finer: int) -> TaggedMesh:
     """The punch stands on the foundation's top y = 0 by a circle of radius 40."""
     names = ["punch top", "punch side", "punch base", "punch axis", "fillet"]
     names += ["top", "side", "base", "axis"]

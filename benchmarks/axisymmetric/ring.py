@@ -18,7 +18,7 @@ RING_LENGTH = 0.5
 FIT = 0.001  # the interference in radius
 
 
-def fit_mesh(n: int = 10) -> TaggedMesh:
+def fit_mesh(n: int) -> TaggedMesh:
     """Rectangles in quadrilaterals: ``n`` across each body and along the ring, finer toward the
     edge of the contact."""
 

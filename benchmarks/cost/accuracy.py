@@ -61,7 +61,8 @@ def run(
             scene = varied(case.scene, analysis={"accuracy": wanted})
             outcome = Case(f"{case.name} {wanted:g}", scene).solve(folder)
             found = outcome.accuracy
-            error = difference(_curve(case.scene, outcome), known, float(np.abs(known).max()))
+            largest = float(np.abs(known).max())
+            error = difference(_curve(case.scene, outcome), known, largest)
             said(f"{case.name}: {wanted:g}: {found.estimated} estimated, {error:.1e} true")
             if found.estimated is None or found.estimated > wanted:
                 faults.append(f"{case.name}: {wanted:g} was not reached")
@@ -91,7 +92,8 @@ def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarr
     def curve(mesh: int, substeps: int) -> np.ndarray:
         level = family.scene_of(mesh, substeps)
         assert level is not None
-        found = np.array(_curve(level, Case(f"{case.name} {mesh} {substeps}", level).solve(folder)))
+        outcome = Case(f"{case.name} {mesh} {substeps}", level).solve(folder)
+        found = np.array(_curve(level, outcome))
         said(f"{case.name}: reference on mesh {mesh}, {substeps} substeps: {found[-1]:.9g}")
         return found
 
@@ -105,4 +107,5 @@ def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarr
 
 
 def _curve(scene: Scene, outcome: Outcome) -> list[float]:
-    return [m["delta"] if scene.force_controlled else m["P"] for m in outcome.steps]
+    name = "delta" if scene.force_controlled else "P"
+    return [measures[name] for measures in outcome.steps]

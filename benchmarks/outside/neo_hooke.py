@@ -46,7 +46,8 @@ class NeoHooke(Material):
         stretch = np.ones_like(J)
         for _ in range(_NEWTON if self.plane == "stress" else 0):
             stress = mu * (stretch**2 - 1) + lam * np.log(J * stretch)
-            stretch = stretch - stress / (2 * mu * stretch + lam / stretch)
+            slope = 2 * mu * stretch + lam / stretch
+            stretch = stretch - stress / slope
         return stretch
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
@@ -56,11 +57,14 @@ class NeoHooke(Material):
         F, J, inverse = _deformation(strain)
         stretch = self._thickness(J)
         k = lam * np.log(J * stretch) - mu
-        slope = lam / (1 + lam / (2 * mu * stretch**2)) if self.plane == "stress" else lam
+        slope = lam
+        if self.plane == "stress":
+            slope = lam / (1 + lam / (2 * mu * stretch**2))
         stress = mu * F + k[:, None] * inverse
         dyads = inverse[:, :, None] * inverse[:, None, :]
-        tangent = (slope - k)[:, None, None] * dyads + (k / J)[:, None, None] * _COFACTORS
-        return stress, tangent + mu * np.eye(4), state
+        by_volume = (slope - k)[:, None, None] * dyads
+        by_inverse = (k / J)[:, None, None] * _COFACTORS
+        return stress, by_volume + by_inverse + mu * np.eye(4), state
 
     def energy(self, stress: Array) -> Array:
         """Energy density ``(n,)`` of stresses ``(n, 4)`` of small strains."""
@@ -73,7 +77,8 @@ class NeoHooke(Material):
         stretch = self._thickness(J)
         log = np.log(J * stretch)
         stretches = (F**2).sum(axis=1) + stretch**2
-        return mu / 2 * (stretches - 3) - mu * log + lam / 2 * log**2
+        of_volume = lam / 2 * log**2
+        return mu / 2 * (stretches - 3) - mu * log + of_volume
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
         """Cauchy's stress ``(n, 4)``, ``P F^T / J``."""
@@ -86,7 +91,8 @@ class NeoHooke(Material):
         yy = P_yx * F_yx + P_yy * F_yy
         zz = mu * (stretch**2 - 1) + lam * np.log(J * stretch)
         xy = P_xx * F_yx + P_xy * F_yy
-        return np.stack([xx, yy, zz, xy], axis=1) / (J * stretch)[:, None]
+        volume = J * stretch
+        return np.stack([xx, yy, zz, xy], axis=1) / volume[:, None]
 
 
 def _deformation(gradient: Array) -> tuple[Array, Array, Array]:

@@ -70,20 +70,23 @@ def judged(runs: Runs, tables: Tables) -> Table:
 def chord_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C1."""
     row = columns(tables["fig2"], plane=plane)
-    inside = row["x/l"] < 0.95  # the last facets hold the edge of the contact
-    outer = row["x/l"][inside] > 0.5
+    place = row["x/l"]
+    inside = place < 0.95  # the last facets hold the edge of the contact
+    outer = place[inside] > 0.5
     off = {
         name: np.abs(row[name] - row["py/p0"])[inside]
         for name in ("Persson", "parabola", "ellipse")
     }
     largest = {name: float(off[name].max()) for name in ("Persson", "parabola")}
-    return (
-        f"of p0, x/l < 0.95: Persson within {largest['Persson']:.1%}, parabola within "
-        f"{largest['parabola']:.1%}; for "
-        f"x/l > 0.5 the parabola is off by up to {off['parabola'][outer].max():.0%}, the ellipse "
-        "by "
-        f"{off['ellipse'][outer].max():.0%}"
-    ), largest
+    parabola = off["parabola"][outer].max()
+    ellipse = off["ellipse"][outer].max()
+    said = (
+        f"of p0, x/l < 0.95: Persson within {largest['Persson']:.1%}, "
+        f"parabola within {largest['parabola']:.1%}; "
+        f"for x/l > 0.5 the parabola is off by up to {parabola:.0%}, "
+        f"the ellipse by {ellipse:.0%}"
+    )
+    return said, largest
 
 
 def peak_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
@@ -110,12 +113,14 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C3."""
     row = columns(tables["fig4"], plane=plane)
     run = runs.curve("elastic", plane)
+    x = row[X]
     off = {name: row[name] / row[Y] - 1 for name in ("paper", "johnson", "radzimovsky")}
-    at = int(np.argmin(np.abs(row[X] - 0.5)))
-    deviation = float(np.abs(off["paper"])[row[X] >= 0.2].max())
+    at = int(np.argmin(np.abs(x - 0.5)))
+    deviation = float(np.abs(off["paper"])[x >= 0.2].max())
     joint = LawJoint.from_scene(run.scene)
     laws = [find_law(name) for name in ("johnson", "radzimovsky")]
-    ends = [float(law.force(joint, law.limit(joint))) / (run.E_star * run.dR) for law in laws]
+    at_limits = [float(law.force(joint, law.limit(joint))) for law in laws]
+    ends = [force / (run.E_star * run.dR) for force in at_limits]
     said = (
         f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR "
         f"and by up to {deviation:.1%} from 0.2 dR on; "
@@ -130,25 +135,30 @@ def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C4."""
     run = runs.curve(FULL_YIELD, plane)
     angle, pressure = runs.run(FULL_YIELD, plane).arc(side="hole").facet_means()
-    middle = pressure[angle < 0.5 * run.eps[-1]] / strength(run)
+    yield_stress = strength(run)
+    inner = angle < 0.5 * run.eps[-1]
+    middle = pressure[inner] / yield_stress
     mean = columns(tables["fig5b"], plane=plane)["P/(A sigY)"][-1]
     low = middle.min()
     high = middle.max()
     said = (
-        f"p0/sigY = {run.p0[-1] / strength(run):.3f}; "
+        f"p0/sigY = {run.p0[-1] / yield_stress:.3f}; "
         f"p over the inner half of the arc {low:.2f} to {high:.2f} sigY; P/A = {mean:.3f} sigY"
     )
-    return said, {"": float(max(abs(high - 1), abs(low - 1), mean - 1, 0))}
+    deviation = max(abs(high - 1), abs(low - 1), mean - 1, 0)
+    return said, {"": float(deviation)}
 
 
 def plastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C5."""
     pairs = [pair for pair in JOINTS.values() if pair[1] is not None]
-    of_pair = [{"plane": plane, "dR/R [%]": dR, "sigY/E* [%]": sigma} for dR, sigma in pairs]
-    last = [float(columns(tables["fig7"], **where)["P/P(eq. 12)"][-1]) for where in of_pair]
-    ratios = [
-        f"{value:.3f} ({dR} %, {sigma} %)" for value, (dR, sigma) in zip(last, pairs, strict=True)
-    ]
+    last = []
+    ratios = []
+    for dR, sigma in pairs:
+        where = {"plane": plane, "dR/R [%]": dR, "sigY/E* [%]": sigma}
+        ratio = columns(tables["fig7"], **where)["P/P(eq. 12)"]
+        last.append(float(ratio[-1]))
+        ratios.append(f"{last[-1]:.3f} ({dR} %, {sigma} %)")
     off = np.abs(1 / np.array(last) - 1)
     return f"P/P(eq. 12) at 2 dR: {', '.join(ratios)}", {"": float(off.max())}
 
@@ -179,9 +189,13 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     R leaves them out.
     """
     assert elastic.folder is not None
-    fields = [read_fields(elastic.folder, elastic.scene, k + 1) for k in range(len(elastic.delta))]
-    centroid = fields[0].coordinates[fields[0].cells[:, :3]].mean(axis=1)
-    stress = np.array([0 * centroid[:, 0], *(f.von_mises for f in fields)])
+    steps = range(1, len(elastic.delta) + 1)
+    fields = [read_fields(elastic.folder, elastic.scene, step) for step in steps]
+    first = fields[0]
+    corners = first.coordinates[first.cells[:, :3]]
+    centroid = corners.mean(axis=1)
+    x, y = centroid.T
+    stress = np.array([0 * x, *(of_step.von_mises for of_step in fields)])
     delta = np.append(0.0, elastic.delta)
     above = stress >= yield_stress
     cell = np.arange(len(centroid))
@@ -189,18 +203,20 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     low = stress[step - 1, cell]
     high = stress[step, cell]
     share = (yield_stress - low) / np.maximum(high - low, 1e-300)
-    reached = delta[step - 1] + share * (delta[step] - delta[step - 1])
+    before = delta[step - 1]
+    reached = before + share * (delta[step] - before)
     when = np.where(above.any(axis=0), reached, np.inf)
-    pin = fields[0].body == BODIES["pin"]
+    pin = first.body == BODIES["pin"]
     from_centre = centroid + np.where(pin[:, None], [0.0, elastic.dR], 0.0)
     radius = np.linalg.norm(from_centre, axis=1)
-    depth = np.where(pin, elastic.R - radius, radius - elastic.R - elastic.dR) / elastic.R
-    angle = np.degrees(np.arctan2(centroid[:, 0], -centroid[:, 1]))
+    below_surface = np.where(pin, elastic.R - radius, radius - elastic.R - elastic.dR)
+    depth = below_surface / elastic.R
+    angle = np.degrees(np.arctan2(x, -y))
     in_corner = (angle > _CORNER) & (near_contact < 1)
     when[(depth > near_contact) | in_corner] = np.inf
-    first = int(np.argmin(when))
-    found = float(when[first]) / elastic.dR, "pin" if pin[first] else "block"
-    return FirstYield(*found, float(depth[first]), float(angle[first]))
+    k = int(np.argmin(when))
+    body = "pin" if pin[k] else "block"
+    return FirstYield(float(when[k]) / elastic.dR, body, float(depth[k]), float(angle[k]))
 
 
 def onset(runs: Runs, tables: Tables, plane: Plane) -> Found:
@@ -208,7 +224,8 @@ def onset(runs: Runs, tables: Tables, plane: Plane) -> Found:
     run = runs.curve("elastic_0.1", plane)
     anywhere = first_yield(run, 0.001)
     near = first_yield(run, 0.001, near_contact=0.5)
-    deviation = abs(min(near.delta, anywhere.delta) / 1.18 - 1)
+    earliest = min(near.delta, anywhere.delta)
+    deviation = abs(earliest / 1.18 - 1)
     return f"first of all {anywhere}; near the contact {near}", {"the onset": deviation}
 
 
@@ -216,19 +233,20 @@ def force_over_angle(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C7."""
     at_angle = "eq. 9 or 12 at the same angle"
     elastic = columns(tables["fig9"], plane=plane, joint="elastic")
-    low = elastic["tan(eps/2)"] < 0.4
-    unit = np.interp(0.4, elastic["tan(eps/2)"], elastic[Y])
+    tangent = elastic["tan(eps/2)"]
+    low = tangent < 0.4
+    unit = np.interp(0.4, tangent, elastic[Y])
     off_by = {name: np.abs(elastic[name] - elastic[Y])[low] for name in (at_angle, "Persson")}
     law, exact = (off.max() / unit for off in off_by.values())
     yielding = columns(tables["fig9"], plane=plane, joint="plastic")
     off = yielding[at_angle] / yielding[Y] - 1
     known = off[np.isfinite(off) & (yielding[X] > 0.5)]
     worst = known[np.abs(known).argmax()]
-    return (
+    said = (
         f"tan(eps/2) < 0.4: eq. 9 off by up to {law:.0%} of P(0.4), Persson by up to {exact:.1%}; "
-        "plastic: eq. 12 "
-        f"at the same angle off by up to {worst:+.0%}"
-    ), {"": float(max(law, abs(worst)))}
+        f"plastic: eq. 12 at the same angle off by up to {worst:+.0%}"
+    )
+    return said, {"": float(max(law, abs(worst)))}
 
 
 _JUDGES: tuple[Callable[[Runs, Tables, Plane], Found], ...] = (

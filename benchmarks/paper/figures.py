@@ -8,7 +8,7 @@ groups.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,49 +64,64 @@ def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
     """Write ``name``.csv and ``name``.png into ``folder``; returns them. The parts have the same
     headings."""
     table = folder / f"{name}.csv"
-    layout = LAYOUTS[name]
-    rows: list[Part] = []
-    for part in parts:
-        filled = np.broadcast_arrays(*(np.asarray(value, dtype=object) for value in part.values()))
-        rows += [dict(zip(part, cells, strict=True)) for cells in zip(*filled, strict=True)]
-    write_rows(
-        [
-            {key: f"{v:.10g}" if isinstance(v, float) else v for key, v in row.items()}
-            for row in rows
-        ],
-        table,
-    )
-
+    rows = [row for part in parts for row in rows_of(part)]
+    write_rows(rows, table)
     canvas = new_figure(9, 4.5)
-    axes = canvas.subplots()
-    drawn = [part for part in parts if layout.get("where", {}).items() <= scalars(part).items()]
-    kinds = list(dict.fromkeys(kind_of(part) for part in drawn))
-    for part in drawn:
-        colour = f"C{kinds.index(kind_of(part))}"
-        axes.plot(part[layout["x"]], part[layout["y"]], ls="", color=colour, **MARKS[part["plane"]])
-        for line in layout.get("lines", []):
-            axes.plot(part[layout["x"]], part[line], "-", lw=1, color=colour)
-    for plane in dict.fromkeys(part["plane"] for part in drawn):
-        axes.plot([], [], ls="", color="black", label=f"ours, plane {plane}", **MARKS[plane])
-    for line in layout.get("lines", []):
-        axes.plot([], [], "-", lw=1, color="C0" if len(kinds) == 1 else "0.5", label=line)
-    for law, style in zip(layout.get("laws", []), LINES, strict=False):
-        axes.plot(drawn[0][layout["x"]], drawn[0][law], style, lw=1, color="black", label=law)
-    for k, kind in enumerate(kinds if len(kinds) > 1 else []):
-        axes.plot([], [], "s", ms=6, color=f"C{k}", label=kind)
-    axes.set(xlabel=layout["x"], ylabel=layout["y"], title=layout["title"])
-    canvas.legend(loc="outside right upper", frameon=False)
-    axes.grid(alpha=0.3)
+    draw(canvas, parts, LAYOUTS[name])
     picture = folder / f"{name}.png"
     with replacing(picture) as new:
         save(canvas, new)
     return [table, picture]
 
 
+def rows_of(part: Part) -> Iterator[Part]:
+    """The rows of a ``part`` as they are written, with ten digits."""
+    values = [np.asarray(value, dtype=object) for value in part.values()]
+    columns = np.broadcast_arrays(*values)
+    for cells in zip(*columns, strict=True):
+        row = zip(part, cells, strict=True)
+        yield {key: f"{v:.10g}" if isinstance(v, float) else v for key, v in row}
+
+
+def draw(canvas: Any, parts: list[Part], layout: dict[str, Any]) -> None:
+    """Draw those of the ``parts`` that the ``layout`` asks for: marks for ours, lines for laws."""
+    axes = canvas.subplots()
+    x = layout["x"]
+    y = layout["y"]
+    lines = layout.get("lines", [])
+    laws = layout.get("laws", [])
+    where = layout.get("where", {})
+    drawn = [part for part in parts if where.items() <= scalars(part).items()]
+    kinds = list(dict.fromkeys(kind_of(part) for part in drawn))
+    for part in drawn:
+        colour = f"C{kinds.index(kind_of(part))}"
+        axes.plot(part[x], part[y], ls="", color=colour, **MARKS[part["plane"]])
+        for line in lines:
+            axes.plot(part[x], part[line], "-", lw=1, color=colour)
+    for plane in dict.fromkeys(part["plane"] for part in drawn):
+        axes.plot([], [], ls="", color="black", label=f"ours, plane {plane}", **MARKS[plane])
+    grey = "C0" if len(kinds) == 1 else "0.5"
+    for line in lines:
+        axes.plot([], [], "-", lw=1, color=grey, label=line)
+    first = drawn[0]
+    for law, style in zip(laws, LINES, strict=False):
+        axes.plot(first[x], first[law], style, lw=1, color="black", label=law)
+    if len(kinds) > 1:
+        for k, kind in enumerate(kinds):
+            axes.plot([], [], "s", ms=6, color=f"C{k}", label=kind)
+    axes.set(xlabel=x, ylabel=y, title=layout["title"])
+    canvas.legend(loc="outside right upper", frameon=False)
+    axes.grid(alpha=0.3)
+
+
 def kind_of(part: Part) -> str:
     """What tells a part from others beside its plane, as the legend says it."""
-    named = ((key.split(" [%]"), value) for key, value in scalars(part).items() if key != "plane")
-    return ", ".join(f"{key[0]} = {value}{' %' if key[1:] else ''}" for key, value in named)
+    named = []
+    for key, value in scalars(part).items():
+        name, per_cent, _ = key.partition(" [%]")
+        if name != "plane":
+            named.append(f"{name} = {value}{' %' if per_cent else ''}")
+    return ", ".join(named)
 
 
 def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
@@ -153,14 +168,18 @@ def fig2(runs: Runs, plane: Plane) -> list[Part]:
     run = runs.curve("elastic", plane)
     parts = []
     for fraction in (2.0, 1.5, 1.0, 0.5):
-        k = int(np.argmin(np.abs(run.delta / run.dR - fraction)))
+        off = np.abs(run.delta / run.dR - fraction)
+        k = int(np.argmin(off))
         eps, x, py = chord_profile(run, k + 1)
-        phi = arc_angle(2 * np.sin(eps / 2) * x, eps, 1.0)
+        along_chord = 2 * np.sin(eps / 2) * x
+        phi = arc_angle(along_chord, eps, 1.0)
         stretch = np.cos(eps / 2) / np.cos(phi - eps / 2) ** 2
-        pressure = persson_pressure(LawJoint.from_scene(run.scene), run.P[k], np.array(eps), phi)
+        joint = LawJoint.from_scene(run.scene)
+        pressure = persson_pressure(joint, run.P[k], np.array(eps), phi)
         shape = np.where(x < 1, 1 - x**2, 0.0)
         projected = pressure * np.cos(phi) / stretch
-        ratios = {"py/p0": py / run.p0[k], "Persson": projected / run.p0[k]}
+        p0 = run.p0[k]
+        ratios = {"py/p0": py / p0, "Persson": projected / p0}
         parts.append(
             {
                 "plane": plane,
@@ -179,9 +198,11 @@ def fig3(runs: Runs, plane: Plane) -> list[Part]:
     run = runs.curve("elastic", plane)
     joint = LawJoint.from_scene(run.scene)
     unit = run.E_star * run.dR
-    johnson = hertz(joint, law_force("johnson", run) * unit).peak_pressure / unit
+    force = law_force("johnson", run) * unit
+    johnson = hertz(joint, force).peak_pressure / unit
     ours = run.p0 * run.R / unit
-    winkler = find_law("paper").at_displacement(joint, run.delta).peak_pressure / unit
+    paper = find_law("paper").at_displacement(joint, run.delta)
+    winkler = paper.peak_pressure / unit
     laws = {
         "Winkler, k = 0.85": winkler,
         "Johnson": johnson,
@@ -194,7 +215,8 @@ def fig4(runs: Runs, plane: Plane) -> list[Part]:
     """Force over delta: ours, eq. 9, Johnson and Radzimovsky as printed and with the limit that the
     paper states."""
     run = runs.curve("elastic", plane)
-    return [curve(run) | {name: law_force(name, run) for name in LAYOUTS["fig4"]["laws"]}]
+    laws = {name: law_force(name, run) for name in LAYOUTS["fig4"]["laws"]}
+    return [curve(run) | laws]
 
 
 def fig5(runs: Runs, plane: Plane) -> list[Part]:

@@ -68,7 +68,8 @@ def process(scene: AnyScene, folder: Path, given: Problem | None = None) -> Proc
     system = system_of(scene, given)
     mesh = deck_mesh(system)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "deck.inp").write_text(deck(system, mesh, scene.targets), encoding="utf-8")
+    text = deck(system, mesh, scene.targets)
+    (folder / "deck.inp").write_text(text, encoding="utf-8")
     old = tuple(f"deck.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
     return Process(
         "CalculiX",
@@ -95,12 +96,15 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
     p0 = None
     centre = view_of(scene).arc_centre
     if centre is not None:
-        arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
-        angle = np.arctan2(mesh.x[:, 0] - centre[0], centre[1] - mesh.x[:, 1])
+        pin_surface = surface_name(system.problem.interactions[0], 0)
+        arc = np.unique(mesh.surfaces[pin_surface].nodes)
+        from_centre = mesh.x - centre
+        angle = np.arctan2(from_centre[:, 0], -from_centre[:, 1])
         pressure = read_nodal(text, "CONTACT", mesh)[:, 3]
         pressed = arc[pressure[arc] > 0]
         p0 = axis_pressure(angle[pressed], pressure[pressed])
-    increments = [line.split() for line in (folder / "deck.sta").read_text().splitlines()]
+    status = (folder / "deck.sta").read_text()
+    increments = [line.split() for line in status.splitlines()]
     counted = [row for row in increments if len(row) > 5 and row[0].isdigit() and row[3].isdigit()]
     return SecondOpinion(
         mesh,
@@ -122,7 +126,8 @@ def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, 
         for drive, rate in m.rates.items():
             alike = m.whole and np.ptp(rate) == 0
             factor = share * rate[0] if alike else math.nan
-            force = factor * step_forces(printed, label(m.node_set))[:, m.axis]
+            of_set = step_forces(printed, label(m.node_set))
+            force = factor * of_set[:, m.axis]
             forces[drive] = force + forces.get(drive, 0.0)
     return forces
 
@@ -135,7 +140,8 @@ def read_printed(text: str) -> Printed:
         if header:
             found.append((header, []))
         elif found and line.strip() and not line.lstrip()[0].isalpha():
-            found[-1][1].append([float(_EXPONENT.sub("E", word)) for word in line.split()])
+            _, rows = found[-1]
+            rows.append([float(_EXPONENT.sub("E", word)) for word in line.split()])
     return [(h[1], h[2], float(h[3]), np.array(rows, dtype=float)) for h, rows in found]
 
 
@@ -144,9 +150,11 @@ def step_forces(printed: Printed, nodes: str) -> Array:
     time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts."""
     forces = {}
     for quantity, name, time, rows in printed:
-        if (quantity, name) == ("total force", nodes) and abs(time - round(time)) < 1e-4:
-            forces[round(time)] = rows[0]
-    return np.array([forces[k] for k in sorted(forces)]).reshape(-1, 3)
+        step = round(time)
+        if (quantity, name) == ("total force", nodes) and abs(time - step) < 1e-4:
+            forces[step] = rows[0]
+    of_steps = [forces[step] for step in sorted(forces)]
+    return np.array(of_steps).reshape(-1, 3)
 
 
 def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
@@ -163,7 +171,8 @@ def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
     element = rows[:, 0].astype(int) - 1
     count = np.bincount(element, minlength=len(area))
     total = np.bincount(element, rows[:, 2], minlength=len(area))
-    return float((total / np.maximum(count, 1)) @ area)
+    mean = total / np.maximum(count, 1)
+    return float(mean @ area)
 
 
 def areas(x: Array) -> Array:
@@ -191,10 +200,13 @@ def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
     Columns 4 to 13 of a record are the node, from 14 on twelve to a component.
     """
     values = np.zeros((len(mesh.x), 6))
-    for line in text.rpartition(f" -4  {block}")[2].partition("\n -3")[0].splitlines():
+    _, _, from_block = text.rpartition(f" -4  {block}")
+    last_block, _, _ = from_block.partition("\n -3")
+    for line in last_block.splitlines():
         if line.startswith(" -1"):
+            node = int(line[3:13]) - 1
             found = [float(line[k : k + 12]) for k in range(13, len(line.rstrip()), 12)]
-            values[int(line[3:13]) - 1, : len(found)] = found
+            values[node, : len(found)] = found
     return values
 
 

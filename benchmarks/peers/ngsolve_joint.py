@@ -33,21 +33,24 @@ def mesh_joint(size: float, growth: float, order: int):
 
     def body(name: str, circle: tuple[float, float], *outer: tuple[float, float, str]):
         y, radius = circle
-        path = occ.WorkPlane().MoveTo(0, y - radius).Arc(radius, 90, f"{name}_arc", size)
+        bottom = occ.WorkPlane().MoveTo(0, y - radius)
+        path = bottom.Arc(radius, 90, f"{name}_arc", size)
         for x, z, edge in outer:
             path.LineTo(x, z, f"{name}_{edge}")
-        face = occ.Face(path.Close(f"{name}_axis").Wire())
+        outline = path.Close(f"{name}_axis").Wire()
+        face = occ.Face(outline)
         face.name = name
         return face
 
     pin = body("pin", PIN, (0, -DR, "top"))
     block = body("block", BLOCK, (WIDTH, 0, "top"), (WIDTH, -WIDTH, ""), (0, -WIDTH, ""))
-    geometry = occ.OCCGeometry(occ.Compound([pin, block]), dim=2)
+    both = occ.Compound([pin, block])
+    geometry = occ.OCCGeometry(both, dim=2)
     grading = growth if order > 2 else 0.6 * growth
-    mesh = ng.Mesh(
-        geometry.GenerateMesh(maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1)
+    straight = geometry.GenerateMesh(
+        maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1
     )
-    return mesh.Curve(order)
+    return ng.Mesh(straight).Curve(order)
 
 
 class Joint:
@@ -83,20 +86,26 @@ class Joint:
         else:
             (a, e) = self._trial(u)
             (b, f) = self._trial(v)
-            self.form += ((LAME + 2 * MU / 3) * a * b + 2 * MU * e * f) * dx
+            volumetric = (LAME + 2 * MU / 3) * a * b
+            deviatoric = 2 * MU * e * f
+            self.form += (volumetric + deviatoric) * dx
         self.contact = ng.ContactBoundary(mesh.Boundaries("pin_arc"), mesh.Boundaries("block_arc"))
         place = ng.CF((ng.x, ng.y))
         depth = (place + u - place.Other() - u.Other()) * self.contact.normal
-        self.contact.AddEnergy(ng.IfPos(depth, PENALTY / 2 * depth * depth, 0))
+        penalty = PENALTY / 2 * depth * depth
+        self.contact.AddEnergy(ng.IfPos(depth, penalty, 0))
         self.contact.Update(self.u, self.form, intorder=2 * order - 2, maxdist=20 * DR)
 
     def _trial(self, u):
         """Trace of the strain and its deviator (xx, yy, zz, sqrt(2) xy), less the plastic strain if
         there is any."""
         grad = ng.Grad(u)
-        trace = grad[0, 0] + grad[1, 1]
+        xx = grad[0, 0]
+        yy = grad[1, 1]
+        trace = xx + yy
+        mean = trace / 3
         shear = (grad[0, 1] + grad[1, 0]) / math.sqrt(2)
-        deviator = ng.CF((grad[0, 0] - trace / 3, grad[1, 1] - trace / 3, -trace / 3, shear))
+        deviator = ng.CF((xx - mean, yy - mean, -mean, shear))
         return trace, deviator - self.strain if self.plastic else deviator
 
     def _energy(self, u):
@@ -105,14 +114,16 @@ class Joint:
         norm = ng.sqrt(e * e + 1e-30)  # differentiable at zero
         beyond = YIELD * norm - YIELD**2 / (4 * MU)
         inside = self.yielding * norm - YIELD / (2 * MU)
-        return (LAME / 2 + MU / 3) * trace * trace + ng.IfPos(inside, beyond, MU * e * e)
+        volumetric = (LAME / 2 + MU / 3) * trace * trace
+        return volumetric + ng.IfPos(inside, beyond, MU * e * e)
 
     def _returned(self):
         """Plastic strain of the present displacement. Compiled: Interpolate takes 18 times as long
         without."""
         _, e = self._trial(self.u)
         excess = 1 - YIELD / (2 * MU) / ng.sqrt(e * e + 1e-30)
-        return (self.strain + ng.IfPos(excess, excess, 0) * e).Compile()
+        growth = ng.IfPos(excess, excess, 0) * e
+        return (self.strain + growth).Compile()
 
     def commit(self) -> None:
         """Take over the plastic strain of the present displacement."""

@@ -49,15 +49,18 @@ class UpperTriangle:
 
     def __init__(self, dofs, free) -> None:
         """``free`` ``(n,)`` numbers the unconstrained dofs, -1 elsewhere."""
-        rows, cols = np.broadcast_arrays(free[dofs][:, :, None], free[dofs][:, None, :])
+        unknowns = free[dofs]
+        rows, cols = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
         n = int(free.max()) + 1
         self.kept = (rows >= 0) & (cols >= rows)
         places = rows[self.kept] * n + cols[self.kept]
         keys, self.slot = np.unique(places, return_inverse=True)
         indptr = np.searchsorted(keys, n * np.arange(n + 1))
-        self.matrix = sparse.csr_matrix((np.zeros(len(keys)), keys % n, indptr), (n, n))
+        columns = keys % n
+        zeros = np.zeros(len(keys))
+        self.matrix = sparse.csr_matrix((zeros, columns, indptr), (n, n))
         self.matrix.indptr = indptr.astype(np.int32)
-        self.matrix.indices = (keys % n).astype(np.int32)
+        self.matrix.indices = columns.astype(np.int32)
         for library in sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*")):
             os.environ.setdefault(
                 "PYPARDISO_MKL_RT", str(library)
@@ -72,8 +75,10 @@ class UpperTriangle:
         RuntimeError."""
         self.matrix.data = np.bincount(self.slot, blocks[self.kept], len(self.matrix.indices))
         # PyPardisoSolver.solve would order the unknowns each time (phase 11).
+        is_ordered = self.solver.phase == 23
+        phases = (23,) if is_ordered else (11, 23)
         try:
-            for phase in (23,) if self.solver.phase == 23 else (11, 23):
+            for phase in phases:
                 self.solver.set_phase(phase)
                 x = self.solver._call_pardiso(self.matrix, b[:, None])
         except self.fault as error:
@@ -89,32 +94,44 @@ def return_map(strain, history, sigy: float):
     """
     xx, yy, shear = np.moveaxis(strain, -1, 0)
     volumetric = xx + yy
+    mean = volumetric / 3
     deviator = np.stack([xx, yy, 0 * xx, shear / 2], axis=-1) - history
-    deviator[..., :3] -= (volumetric / 3)[..., None]
+    deviator[..., :3] -= mean[..., None]
     s = 2 * MU * deviator
-    norm = np.maximum(np.sqrt((s[..., :3] ** 2).sum(-1) + 2 * s[..., 3] ** 2), 1e-300)
+    normal = (s[..., :3] ** 2).sum(-1)
+    squared = normal + 2 * s[..., 3] ** 2
+    norm = np.maximum(np.sqrt(squared), 1e-300)
     radius = np.sqrt(2 / 3) * sigy
     plastic = norm > radius
     ratio = np.where(plastic, radius / norm, 1.0)
     n = s / norm[..., None]
     stress = ratio[..., None] * s
-    new = history + np.where(plastic, (norm - radius) / (2 * MU), 0.0)[..., None] * n
-    stress[..., :3] += ((LAME + 2 * MU / 3) * volumetric)[..., None]
+    growth = np.where(plastic, (norm - radius) / (2 * MU), 0.0)
+    new = history + growth[..., None] * n
+    bulk_modulus = LAME + 2 * MU / 3
+    pressure = bulk_modulus * volumetric
+    stress[..., :3] += pressure[..., None]
     # Box 3.2: bulk modulus, 2 mu theta times the deviatoric projection, less 2 mu theta n x n
     # (perfect plasticity).
     bulk = np.array([[1.0, 1, 0], [1, 1, 0], [0, 0, 0]])
     projection = np.diag([1, 1, 0.5]) - bulk / 3
-    directions = n[..., [0, 1, 3]]
-    tangent = (LAME + 2 * MU / 3) * bulk + 2 * MU * ratio[..., None, None] * projection
+    in_plane = [0, 1, 3]
+    directions = n[..., in_plane]
+    deviatoric = 2 * MU * ratio[..., None, None] * projection
+    tangent = bulk_modulus * bulk + deviatoric
     dyad = directions[..., :, None] * directions[..., None, :]
-    tangent -= (2 * MU * ratio * plastic)[..., None, None] * dyad
-    return stress[..., [0, 1, 3]], tangent, new
+    along_flow = 2 * MU * ratio * plastic
+    tangent -= along_flow[..., None, None] * dyad
+    return stress[..., in_plane], tangent, new
 
 
 def shapes(xi):
     """Quadratic shape functions ``(..., 3)`` of a facet's ends and midpoint at ``xi`` in [-1,
     1]."""
-    return np.stack([xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi * xi], axis=-1)
+    first = xi * (xi - 1) / 2
+    last = xi * (xi + 1) / 2
+    middle = 1 - xi * xi
+    return np.stack([first, last, middle], axis=-1)
 
 
 class Joint:
@@ -131,8 +148,10 @@ class Joint:
         self.dofs = int(basis.N)
         self.cells = len(cells)
         self.zero = np.zeros(basis.N)
-        grad = np.stack([basis.basis[a][0].grad for a in range(12)], axis=-1)  # (2, 2, m, q, 12)
-        B = np.stack([grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]], axis=-2)
+        gradients = [basis.basis[a][0].grad for a in range(12)]
+        grad = np.stack(gradients, axis=-1)  # (2, 2, m, q, 12)
+        shear = grad[0, 1] + grad[1, 0]
+        B = np.stack([grad[0, 0], grad[1, 1], shear], axis=-2)
         self.weight = basis.dx
         self.B = B.reshape(len(cells), -1, 12)
         self.history = np.zeros((*self.weight.shape, 4))
@@ -140,15 +159,23 @@ class Joint:
         x, y = basis.doflocs  # of every dof
         vertical = np.zeros(basis.N, dtype=bool)
         vertical[basis.nodal_dofs[1]] = vertical[basis.facet_dofs[1]] = True
-        self.top = np.flatnonzero(vertical & (np.abs(y + DR) < 1e-9) & (x < R + DR / 2))
-        self.pin = vertical & (np.hypot(x, y + DR) < R + 1e-9)
-        fixed = (np.abs(y) < 1e-9) | (~vertical & (np.abs(x) < 1e-9))
+        on_diameter = np.abs(y + DR) < 1e-9
+        self.top = np.flatnonzero(vertical & on_diameter & (x < R + DR / 2))
+        from_pin_centre = np.hypot(x, y + DR)
+        self.pin = vertical & (from_pin_centre < R + 1e-9)
+        on_block_top = np.abs(y) < 1e-9
+        on_axis = np.abs(x) < 1e-9
+        fixed = on_block_top | (~vertical & on_axis)
         fixed[self.top] = True
         self.free = ~fixed
 
         self.rows = np.concatenate([basis.element_dofs.T, self._pair(basis)])
-        self.system = UpperTriangle(self.rows, np.where(fixed, -1, np.cumsum(~fixed) - 1))
-        self.C = return_map(np.zeros((1, 1, 3)), np.zeros((1, 1, 4)), np.inf)[1][0, 0]
+        number = np.cumsum(self.free) - 1
+        self.system = UpperTriangle(self.rows, np.where(fixed, -1, number))
+        unstrained = np.zeros((1, 1, 3))
+        virgin = np.zeros((1, 1, 4))
+        _, tangent, _ = return_map(unstrained, virgin, np.inf)
+        self.C = tangent[0, 0]
         self.unyielding = self._element_matrices(self.C[None, None])
 
     def _pair(self, basis):
@@ -159,13 +186,17 @@ class Joint:
             """Dofs ``(f, 3, 2)`` and nodes ``(f, 3, 2)`` of the facets on a circle, ends and
             midpoint, from the axis on."""
             of_cells = basis.element_dofs.T.reshape(-1, 6, 2)
-            dofs = of_cells[:, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]].reshape(-1, 3, 2)
+            edges = [[0, 1, 3], [1, 2, 4], [0, 2, 5]]
+            dofs = of_cells[:, edges].reshape(-1, 3, 2)
             x, y = basis.doflocs[:, dofs[..., 0]]
-            on = (np.abs(np.hypot(x, y - centre) - radius) < 1e-9).all(axis=1)
-            from_axis = np.argsort(x[on], axis=1)[:, [0, 2, 1], None]
+            off_circle = np.hypot(x, y - centre) - radius
+            on = (np.abs(off_circle) < 1e-9).all(axis=1)
+            x_on = x[on]
+            from_axis = np.argsort(x_on, axis=1)[:, [0, 2, 1], None]
             dofs = np.take_along_axis(dofs[on], from_axis, axis=1)
-            dofs = dofs[np.argsort(x[on].min(axis=1))]
-            return dofs, basis.doflocs[:, dofs[..., 0]].transpose(1, 2, 0)
+            dofs = dofs[np.argsort(x_on.min(axis=1))]
+            nodes = basis.doflocs[:, dofs[..., 0]]
+            return dofs, nodes.transpose(1, 2, 0)
 
         def angle(x):
             """About the pin's centre, from the axis."""
@@ -176,7 +207,8 @@ class Joint:
         (hole, hole_nodes) = arc(*BLOCK)
         N = shapes(gauss)
         x = N @ pin_nodes
-        slope = np.stack([gauss - 0.5, gauss + 0.5, -2 * gauss], axis=-1) @ pin_nodes
+        derivatives = np.stack([gauss - 0.5, gauss + 0.5, -2 * gauss], axis=-1)
+        slope = derivatives @ pin_nodes
         self.ds = weights * np.linalg.norm(slope, axis=-1)
         # The facet of the hole and the place on it (xi) that lie at the angle of x.
         self.angle = angle(x)
@@ -185,13 +217,17 @@ class Joint:
         xi = np.zeros_like(self.angle)
         for _ in range(5):
             y = (shapes(xi)[..., None] * hole_nodes[facet]).sum(-2)
-            xi += (self.angle - angle(y)) * 2 * len(ends) / (np.pi / 2)
+            missed = self.angle - angle(y)
+            xi += missed * 2 * len(ends) / (np.pi / 2)
         direction = np.stack([np.sin(self.angle), -np.cos(self.angle)], axis=-1)
         self.gap = ((y - x) * direction).sum(-1)
-        N = np.concatenate([np.broadcast_to(N, (len(pin), *N.shape)), -shapes(xi)], axis=-1)
-        self.N = (N[..., None] * direction[..., None, :]).reshape(-1, 12)
+        on_pin = np.broadcast_to(N, (len(pin), *N.shape))
+        N = np.concatenate([on_pin, -shapes(xi)], axis=-1)
+        normal = N[..., None] * direction[..., None, :]
+        self.N = normal.reshape(-1, 12)
         of_pin = np.broadcast_to(pin[:, None], (*xi.shape, 3, 2))
-        return np.concatenate([of_pin, hole[facet]], axis=-2).reshape(-1, 12)
+        dofs = np.concatenate([of_pin, hole[facet]], axis=-2)
+        return dofs.reshape(-1, 12)
 
     def _element_matrices(self, tangent):
         """Stiffness ``(m, 12, 12)`` of tangents ``(m, q, 3, 3)``."""
@@ -201,12 +237,15 @@ class Joint:
 
     def pressure(self, u):
         """Contact pressure ``(f, g)``."""
-        gap = self.gap - (self.N * u[self.rows[self.cells :]]).sum(-1).reshape(self.gap.shape)
+        of_contact = self.rows[self.cells :]
+        closing = (self.N * u[of_contact]).sum(-1)
+        gap = self.gap - closing.reshape(self.gap.shape)
         return PENALTY * np.maximum(-gap, 0)
 
     def _equilibrium(self) -> float:
         """Evaluate forces ``(n,)``, new history and tangent; the residual over the reaction."""
-        strain = (self.B @ self.u[self.rows[: self.cells], None]).reshape(*self.weight.shape, 3)
+        of_cells = self.rows[: self.cells]
+        strain = (self.B @ self.u[of_cells, None]).reshape(*self.weight.shape, 3)
         if np.isinf(self.sigy):
             stress = strain @ self.C
             self.next = self.history
@@ -219,11 +258,14 @@ class Joint:
         pressure = self.pressure(self.u)
         contact = (pressure * self.ds).reshape(-1, 1) * self.N
         stiffness = PENALTY * (pressure > 0) * self.ds
-        stiff = stiffness.reshape(-1, 1, 1) * (self.N[:, :, None] * self.N[:, None, :])
+        dyads = self.N[:, :, None] * self.N[:, None, :]
+        stiff = stiffness.reshape(-1, 1, 1) * dyads
         parts = np.concatenate([bulk, contact])
         self.forces = np.bincount(self.rows.ravel(), parts.ravel(), self.dofs)
         self.blocks = np.concatenate([blocks, stiff])
-        return float(np.linalg.norm(self.forces[self.free]) / np.abs(self.forces[self.top].sum()))
+        residual = np.linalg.norm(self.forces[self.free])
+        reaction = np.abs(self.forces[self.top].sum())
+        return float(residual / reaction)
 
     def _improve(self) -> None:
         self.u[self.free] -= self.system.solve(self.blocks, self.forces[self.free])
@@ -249,7 +291,8 @@ class Joint:
         length = self.ds.sum(axis=1)
         mean = (self.pressure(self.u) * self.ds).sum(axis=1) / length
         angle = (self.angle * self.ds).sum(axis=1) / length
-        return {"P": -2 * self.forces[self.top].sum(), "p0": axis_pressure(angle, mean)}
+        reaction = self.forces[self.top].sum()
+        return {"P": -2 * reaction, "p0": axis_pressure(angle, mean)}
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 PIN_RADIUS = 10.0
@@ -147,5 +147,4 @@ def _refine(gmsh: Any, size: Size) -> None:
     field = gmsh.model.mesh.field.add("MathEval")
     gmsh.model.mesh.field.setString(field, "F", size.field())
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
-    for option, value in _OPTIONS.items():
-        gmsh.option.setNumber(f"Mesh.{option}", value)
+    set_mesh_options(gmsh, _OPTIONS)

@@ -11,7 +11,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.sketch import Sketch
 
@@ -74,8 +74,7 @@ def _draw_revolved(sketch: Sketch, angle: float, gmsh: Any) -> None:
         if surfaces:
             gmsh.model.addPhysicalGroup(2, sorted(surfaces), name=name)
     _name_and_refine(sketch, 3, solids, gmsh.model)
-    for option, value in _OPTIONS.items():
-        gmsh.option.setNumber(f"Mesh.{option}", value)
+    set_mesh_options(gmsh, _OPTIONS)
 
 
 def _name_and_refine(sketch: Sketch, dim: int, parts: Mapping[str, list[int]], model: Any) -> None:

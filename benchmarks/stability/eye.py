@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from archord.geometry.meshes.fenicsx import set_mesh_options
+
 _AT = {"A": 25.0, "B": -28.0}  # x of the centre of each bore
 _EYE = (60.0, 32.0)  # half axes of the ellipse
 _CIRCLES = {
@@ -77,11 +79,9 @@ def _draw(gmsh: Any, edges: int) -> None:
         gmsh.model.addPhysicalGroup(1, curves, name=name)
     options = {"MeshSizeFromCurvature": edges, "MeshSizeMax": _COARSEST, "ElementOrder": 2}
     before = {key: gmsh.option.getNumber(f"Mesh.{key}") for key in options}
-    for key, value in options.items():
-        gmsh.option.setNumber(f"Mesh.{key}", value)
+    set_mesh_options(gmsh, options)
     gmsh.model.mesh.generate(2)
-    for key, value in before.items():
-        gmsh.option.setNumber(f"Mesh.{key}", value)
+    set_mesh_options(gmsh, before)
 
 
 def _on_circle(gmsh: Any, curve: int, centre: float, radius: float) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.postprocess.laws.general.joint import Array
+from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch
 
 TOUCH = np.array([2.39, -0.15, 0.05])
