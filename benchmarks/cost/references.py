@@ -88,25 +88,31 @@ def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> Limit:
     v = np.asarray(values)
 
     def misfit(order: float) -> float:
-        return _line(h, v, order)[1]
+        _, left = _line(h, v, order)
+        return left
 
     # the misfit over the order can have several minima: the best of a scan, then its neighbourhood
     scan = np.linspace(*_ORDERS, 33)
     best = int(np.argmin([misfit(order) for order in scan]))
-    bounds = scan[max(0, best - 1)], scan[min(len(scan) - 1, best + 1)]
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
+    before = scan[max(0, best - 1)]
+    after = scan[min(len(scan) - 1, best + 1)]
+    precise = {"xatol": 1e-9}
+    found = minimize_scalar(misfit, bounds=(before, after), method="bounded", options=precise)
     order = float(min(found.x, scan[best], key=misfit))
-    limit = _line(h, v, order)[0]
+    limit, _ = _line(h, v, order)
     without = [_line(np.delete(h, i), np.delete(v, i), order)[0] for i in range(len(h))]
-    return Limit(limit, order, float(np.abs(np.array(without) - limit).max()))
+    moved = np.abs(np.array(without) - limit)
+    return Limit(limit, order, float(moved.max()))
 
 
 def _line(h: Array, v: Array, order: float) -> tuple[float, float]:
     """The limit of ``v`` linear in ``h``^order, and the root mean square misfit over the spread of
     ``v``."""
     A = np.stack([np.ones_like(h), h**order], axis=1)
-    fit = np.linalg.lstsq(A, v, rcond=None)[0]
-    return float(fit[0]), float(np.sqrt(np.mean((A @ fit - v) ** 2)) / (np.ptp(v) or 1.0))
+    fit, *_ = np.linalg.lstsq(A, v, rcond=None)
+    misfit = np.sqrt(np.mean((A @ fit - v) ** 2))
+    spread = np.ptp(v) or 1.0
+    return float(fit[0]), float(misfit / spread)
 
 
 def mean_profile(families: Sequence[Sequence[Array]]) -> tuple[Array, float]:

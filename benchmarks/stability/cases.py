@@ -40,19 +40,24 @@ _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
-    joints = tomllib.loads(FILE.with_name("cases.toml").read_text(encoding="utf-8"))
     found = {}
-    for group, table in joints.items():
+    for group, table in _tables("cases.toml").items():
         for name, keys in table.items():
             found[name] = _case(name, group, keys, _joint, "P/(E* R)")  # compared by default
     for file in ("problems.toml", "space.toml"):
-        problems = tomllib.loads(FILE.with_name(file).read_text(encoding="utf-8"))
+        problems = _tables(file)
         bases = problems.pop("base")
         for group, table in problems.items():
             for name, keys in table.items():
-                merged = _merged(bases[keys.pop("base", group)], keys)
+                base = bases[keys.pop("base", group)]
+                merged = _merged(base, keys)
                 found[name] = _case(name, group, merged, _problem, "")
     return found
+
+
+def _tables(file: str) -> dict[str, Any]:
+    """The tables of a ``file`` beside this one."""
+    return tomllib.loads(FILE.with_name(file).read_text(encoding="utf-8"))
 
 
 def _merged(base: Any, keys: Any) -> Any:
@@ -144,11 +149,12 @@ def _drawn(blocks: str, triangles: bool) -> Path:
             cells = np.stack(corners, axis=2).reshape(-1, 4)
             if triangles:
                 cells = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+            nodes = np.column_stack([ids.ravel(), x.ravel(), y.ravel()])
+            numbers = start + np.arange(len(cells))
+            elements = np.column_stack([numbers, cells])
             rows = {
-                "*NODE": np.column_stack([ids.ravel(), x.ravel(), y.ravel()]),
-                f"*ELEMENT, TYPE=CPE{cells.shape[1]}, ELSET={name}": np.column_stack(
-                    [start + np.arange(len(cells)), cells]
-                ),
+                "*NODE": nodes,
+                f"*ELEMENT, TYPE=CPE{cells.shape[1]}, ELSET={name}": elements,
                 f"*NSET, NSET={name} left": ids[:, 0],
                 f"*NSET, NSET={name} right": ids[:, -1],
                 f"*NSET, NSET={name} bottom": ids[0],
@@ -187,7 +193,8 @@ def main() -> None:
     known = cases()
     values = json.loads(FILE.read_text(encoding="utf-8"))
     for name, case in known.items():
-        if name not in values and any(expected.value == FINE for expected in case.expected):
+        needs_fine = any(expected.value == FINE for expected in case.expected)
+        if needs_fine and name not in values:
             fine = replace(case, scene=fine_scene(case.scene))
             with tempfile.TemporaryDirectory() as folder:
                 last = fine.solve(Path(folder)).steps[-1]

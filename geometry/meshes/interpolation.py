@@ -48,7 +48,8 @@ class Interpolation:
     def __init__(self, kind: basix.CellType, x: Array, cells: np.ndarray, to: Array) -> None:
         self._element = element_of(kind, cells.shape[1])
         parts = _SIMPLICES[kind]
-        simplex, within = _located(x, cells[:, parts].reshape(-1, parts.shape[1]), to)
+        simplices = cells[:, parts].reshape(-1, parts.shape[1])
+        simplex, within = _located(x, simplices, to)
         cell, part = np.divmod(simplex, len(parts))
         self._nodes = cells[cell]
         barycentric = np.column_stack([1 - within.sum(axis=1), within])  # (k, d + 1)
@@ -68,7 +69,8 @@ class Interpolation:
             jacobian = np.einsum("jna,nai->nij", slopes, nodes)
             step = np.linalg.solve(jacobian, misfit[..., None])[..., 0]
             X[moving] += step
-            moving = moving[np.abs(step).max(axis=1) > _STRAIGHT]
+            length = np.abs(step).max(axis=1)
+            moving = moving[length > _STRAIGHT]
 
     def __call__(self, values: Array) -> Array:
         """Values ``(k, c)`` at the points from those ``(n, c)`` at the nodes."""
@@ -95,15 +97,17 @@ def _candidates(x: Array, simplices: np.ndarray, to: Array) -> tuple[np.ndarray,
     """Pairs ``(p,)`` of a point of ``to`` and a simplex whose bounding box it is in, or the
     nearest simplex."""
     d = x.shape[1]
-    straight = basix.ufl.element("P", "triangle" if d == 2 else "tetrahedron", 1, shape=(d,))
+    kind = "triangle" if d == 2 else "tetrahedron"
+    straight = basix.ufl.element("P", kind, 1, shape=(d,))
     cells = simplices.astype(np.int64, order="C")
     mesh = create_mesh(MPI.COMM_SELF, cells=cells, x=np.ascontiguousarray(x), e=straight)
     places = np.pad(to, ((0, 0), (0, 3 - d)))
     tree = bb_tree(mesh, mesh.topology.dim)
     found = compute_collisions_points(tree, places)
-    point = np.repeat(np.arange(len(to)), np.diff(found.offsets))
+    points = np.arange(len(to))
+    point = np.repeat(points, np.diff(found.offsets))
     cell = found.array
-    lost = np.setdiff1d(np.arange(len(to)), point)
+    lost = np.setdiff1d(points, point)
     if len(lost):
         every = np.arange(len(simplices), dtype=np.int32)
         middles = create_midpoint_tree(mesh, mesh.topology.dim, every)

@@ -40,13 +40,15 @@ def frame_of(columns: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataFra
 def with_headings(frame: pd.DataFrame) -> pd.DataFrame:
     """A copy of ``frame`` whose columns are headed ``name [unit]``, as archord's CSV files are."""
     units = frame.attrs["units"]
-    return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
+    headings = {name: f"{name} [{unit}]" for name, unit in units.items()}
+    return frame.rename(columns=headings)
 
 
 def write_frame(frame: pd.DataFrame, target: Path) -> Path:
     """Write ``frame`` as a CSV file; returns the ``target``. Raises `InputError`."""
+    headed = with_headings(frame)
     with writing(target) as new:
-        with_headings(frame).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
+        headed.to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
     return target
 
 
@@ -66,8 +68,9 @@ def read_frame(path: Path) -> pd.DataFrame:
     parts = {heading: heading.partition(" [") for heading in table}
     names = [name for name, _, _ in parts.values()]
     known = {heading: part for heading, part in parts.items() if names.count(part[0]) == 1}
-    table = table.rename(columns={heading: name for heading, (name, _, _) in known.items()})
-    return frame_of(table, {name: unit.removesuffix("]") for name, _, unit in known.values()})
+    name_of = {heading: name for heading, (name, _, _) in known.items()}
+    units = {name: unit.removesuffix("]") for name, _, unit in known.values()}
+    return frame_of(table.rename(columns=name_of), units)
 
 
 def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
@@ -79,13 +82,15 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
     positive when open. With friction there are slip and shear, positive along ``s``, and where the
     points stick. Slip, shear and the normal have components in space.
     """
-    units = dict.fromkeys(_LENGTHS, scene.units.length)
-    if scene.analysis.plane in ("axisymmetric", "space"):
-        units["weight"] = f"{scene.units.length}2"
+    plane = scene.analysis.plane
+    length = scene.units.length
+    units = dict.fromkeys(_LENGTHS, length)
+    if plane in ("axisymmetric", "space"):
+        units["weight"] = f"{length}2"
     units["angle"] = "rad"
     units |= dict.fromkeys(_STRESSES, scene.units.stress)
     parts = []
-    axes = "xyz" if scene.analysis.plane == "space" else "xy"
+    axes = "xyz" if plane == "space" else "xy"
     for side, arc in arcs.items():
         X = undeformed(arc, side, scene)
         u = arc.coordinates - X

@@ -70,8 +70,9 @@ class Springs:
         self.of_free.zeroRowsColumns(fixed.astype(PETSc.IntType), 0.0)
         self._x, self._y = self._matrix.createVecs()
         self.of_levels: Array = np.zeros(len(drives.rate))
+        of_disc = WEAK * spring_modulus(stiffness, softest)
         for disc in rigid.contact.rigid:
-            self.of_levels += WEAK * spring_modulus(stiffness, softest) * (disc.rate**2).sum(axis=1)
+            self.of_levels += of_disc * (disc.rate**2).sum(axis=1)
         n_dofs = drives.dimension * drives.n_owned
         self.last: tuple[Array, Array] = np.zeros(n_dofs), np.zeros(len(drives.rate))
         self.energy = 0.0

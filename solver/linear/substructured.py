@@ -52,8 +52,9 @@ def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | str:
     if len(interface) > _LARGEST_INTERFACE:
         return f"the interface has {len(interface)} unknowns, more than {_LARGEST_INTERFACE}"
     start, end = A.getOwnershipRange()
-    alone = end - start > ((interface >= start) & (interface < end)).sum()
-    if not len(interface) or not comm.allreduce(bool(alone), op=MPI.LAND):
+    n_shared = ((interface >= start) & (interface < end)).sum()
+    has_own = bool(end - start > n_shared)
+    if not len(interface) or not comm.allreduce(has_own, op=MPI.LAND):
         return "a rank has no unknowns of its own"
     return Substructures(A, interface, corners(V))
 
@@ -63,7 +64,8 @@ def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
     ranks, and of any others that are, as the contact's, the ones of the higher rank."""
     start, end = A.getOwnershipRange()
     local = np.asarray(A.getLGMap()[0].indices)
-    shared = _union(comm, local[(local < start) | (local >= end)])
+    is_ghost = (local < start) | (local >= end)
+    shared = _union(comm, local[is_ghost])
     offsets, columns, _ = A.getValuesCSR()
     across = np.flatnonzero((columns < start) | (columns >= end))
     row = start - 1 + np.searchsorted(offsets, across, side="right")
@@ -123,9 +125,8 @@ class Substructures(Strategy):
         corner = np.searchsorted(local[::size] // size, corner)  # all are on cells of this rank
         place = _places(rows, columns, last, corner, first // size, size)
         kept = np.flatnonzero(last)
-        self._arrays = tuple(
-            array.astype(np.int32, copy=False) + 1 for array in (rows, columns, kept, place)
-        )
+        arrays = (rows, columns, kept, place)
+        self._arrays = tuple(array.astype(np.int32, copy=False) + 1 for array in arrays)
         m = len(interface)
         self._b = np.zeros(len(local))
         self._reduced = np.zeros(m)
@@ -173,9 +174,8 @@ class Substructures(Strategy):
             )
         if status[0] < 0:
             return int(status[0])
-        return int(
-            self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
-        )
+        given = pointer(values), pointer(self._complement)
+        return int(self._kernels.schur_factorise(self._mumps, *given))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = A^-1 r``, called by PETSc; not a number if a block is singular."""
