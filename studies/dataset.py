@@ -109,10 +109,10 @@ def _curve(runs: Sequence[NodeRun]) -> Iterable[dict[str, Any]]:
     for run in runs:
         if run.steps > 1 or len(run.back) < 2:
             continue
-        (deepest, largest), *points = run.back.tolist()
+        deepest, largest = map(float, run.back[0])
         extrapolated = float(np.interp(deepest, x, y))
         error = _MESH_ERROR * largest + abs(extrapolated - largest)
-        for delta, force in points:
+        for delta, force in run.back[1:]:
             yield _row(f"back from {deepest:.4g}", delta, force, error)
 
 

@@ -57,7 +57,7 @@ class NeoHooke(Material):
         F, J, inverse = _deformation(strain)
         stretch = self._thickness(J)
         k = lam * np.log(J * stretch) - mu
-        slope = lam
+        slope: Array | float = lam
         if self.plane == "stress":
             slope = lam / (1 + lam / (2 * mu * stretch**2))
         stress = mu * F + k[:, None] * inverse

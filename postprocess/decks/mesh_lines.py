@@ -22,7 +22,7 @@ def mesh_lines(model: DeckModel, heading: str) -> list[str]:
     words = _MODELS.get(model.problem.kinematics.name, f"thickness {number(model.thick)}, forces")
     lines = ["*HEADING", f"archord: {heading}; {words} times {whole} are of the whole"]
     lines.append("*NODE, NSET=ALL_NODES")
-    for node, x in enumerate(_drawn(model), 1):
+    for node, x in enumerate(_drawn(model).tolist(), 1):
         place = [number(coordinate) for coordinate in x]
         lines.append(", ".join([str(node), *place]))
     if model.own:
