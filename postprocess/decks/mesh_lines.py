@@ -22,9 +22,10 @@ def mesh_lines(model: DeckModel, heading: str) -> list[str]:
     words = _MODELS.get(model.problem.kinematics.name, f"thickness {number(model.thick)}, forces")
     lines = ["*HEADING", f"archord: {heading}; {words} times {whole} are of the whole"]
     lines.append("*NODE, NSET=ALL_NODES")
-    for node, x in enumerate(_drawn(model).tolist(), 1):
-        place = [number(coordinate) for coordinate in x]
-        lines.append(", ".join([str(node), *place]))
+    x = _drawn(model)
+    for i in range(len(x)):
+        place = [number(x[i, axis]) for axis in range(x.shape[1])]
+        lines.append(", ".join([str(i + 1), *place]))
     if model.own:
         lines.append("*NODE, NSET=DRIVES")
         lines += [f"{node}, 0., 0." for node in model.own.values()]
