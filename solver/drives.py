@@ -29,6 +29,9 @@ from archord.solver.problem import Body, Problem, Rigid
 from archord.solver.turns import FiniteTurn
 
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
+# distance from the origin over the size of a body, from which on a rotation about the origin looks
+# like a displacement
+_FAR = 30.0
 _SAME_PLACE = 1e-9  # of the distance between two anchors
 _DEPENDENT = 1e-12  # of the squared length of a mean's gradient: what is left of it is round-off
 _PART = 1e-3  # of a combination of means that displacements cannot follow
@@ -249,12 +252,21 @@ class Drives:
         return np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
 
     def rigid_modes(self, body: Body) -> Array:
-        """The rigid motions ``(k, n_local, d)`` of the ``body``, of size 1 about. Collective."""
+        """The rigid motions ``(k, n_local, d)`` of the ``body``, of size 1 about: rotations about
+        the origin, of a body far from there about its middle. Collective."""
         nodes = self.nodes_of(body)
-        farthest = np.abs(self._x[nodes]).max(initial=0.0)
-        size = self.comm.allreduce(farthest, op=MPI.MAX)
+        x = self._x[nodes]
+        lowest = x.min(axis=0, initial=np.inf)
+        highest = x.max(axis=0, initial=-np.inf)
+        self.comm.Allreduce(MPI.IN_PLACE, lowest, op=MPI.MIN)
+        self.comm.Allreduce(MPI.IN_PLACE, highest, op=MPI.MAX)
+        extent = (highest - lowest).max()
+        size = np.maximum(np.abs(lowest), np.abs(highest)).max()
+        if size > _FAR * extent:
+            x = x - (lowest + highest) / 2
+            size = extent / 2
         modes = np.zeros((self.kinematics.n_rigid, self._n_local, self.dimension))
-        modes[:, nodes] = self.kinematics.rigid_motions(self._x[nodes] / size)
+        modes[:, nodes] = self.kinematics.rigid_motions(x / size)
         return modes
 
     def held(self, body: Body) -> bool:

@@ -21,9 +21,10 @@ from archord.solver.problem import Interaction, Rigid
 
 _MOST = 100  # iterations
 _AT_REST = 1e-3  # part of the forces that may be left
+_FAST = 0.1  # ratio of what is left by which iterations go on from there
 _ROUND_OFF = 1e-9  # the same, of the largest forces on the way
 _DAMPING = 10.0  # ratio of one damping to the next
-_BALANCED = 1e-6  # part of nodal forces below which their resultant is none
+_BALANCED = 1e-6  # part of forces below which their resultant on free motions is none
 _LOOSE = 1e-6  # part of a free motion that a body has at least which takes part in it
 
 
@@ -110,7 +111,8 @@ class RigidMotions:
         contact and forces push them; as it was where contact points find no partners on the way.
 
         The contact law alone resists. Newton's method finds the least energy, damped while forces
-        are large (Levenberg 1944), in steps of a facet at most.
+        are large (Levenberg 1944), in steps of a facet at most. Slip counts from there: where
+        forces push it goes on as long as it converges fast.
         """
         if not self.contact.pairs:
             return state
@@ -139,16 +141,19 @@ class RigidMotions:
     def _settled(self, load: float, u: Array, levels: Array) -> tuple[Array, Array]:
         """Displacements and levels where contact and forces balance. Raises `ProjectionError`."""
         applied = self._applied(load, levels)
+        is_pushed = bool(np.linalg.norm(applied))
         step: Array = np.zeros(len(self.free))
         damping = self.drives.stiffness
         least = np.inf
         most = 0.0
+        is_near = False
         for _ in range(_MOST):
             push = self._push(u, levels, load)
             left = push.force + applied
             size = float(np.linalg.norm(left))
             most = max(most, push.pressed)
-            if size > 2 * least:  # back to the place before, for a smaller step
+            before = least
+            if size > (1 if is_near else 2) * least:  # back to the place before, for a smaller step
                 u = u - np.tensordot(step, self.free, 1)
                 levels = levels - step @ self.levels
                 damping *= _DAMPING**2
@@ -157,8 +162,11 @@ class RigidMotions:
                 damping /= _DAMPING
                 best = push
                 best_left = left
+            if size <= _ROUND_OFF * most or (is_near and size > _FAST * before):
+                break
             scale = max(push.pressed, float(np.linalg.norm(applied)))
-            if size <= max(_AT_REST * scale, _ROUND_OFF * most):
+            is_near = is_near or size <= _AT_REST * scale
+            if is_near and not is_pushed:
                 break
             damped = best.stiffness + damping * np.eye(len(step))
             whole_step = np.linalg.solve(damped, best_left)
@@ -182,18 +190,21 @@ class RigidMotions:
 
     def least_push(self, load: float) -> float:
         """The least resultant of the forces that single drives prescribe at the ``load``, but for
-        forces that balance by themselves; 0 without any."""
+        forces that balance by themselves, or act on what is held; 0 without any."""
         drives = self.drives
         pushes: list[float] = []
+        weights = {int(k): float(w) for k, w in zip(drives.unknown, drives.weight, strict=True)}
         for level, value in enumerate(drives.values(load)):
             on_levels = np.zeros(len(drives.rate))
             forces = np.zeros_like(drives.applied[level])
+            size = 0.0
             if drives.moving[level]:
                 on_levels[level] = value / self.problem.whole
+                size = abs(on_levels[level]) * weights.get(level, 0.0)
             elif level not in drives.unknown:
                 forces = value * drives.applied[level]
             push = self.resultant(forces, on_levels)
-            size = self.comm.allreduce(float(np.abs(forces).sum()))
+            size += self.comm.allreduce(float(np.abs(forces).sum()))
             if push > _BALANCED * size:
                 pushes.append(push)
         return min(pushes, default=0.0)

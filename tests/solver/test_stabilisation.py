@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.geometry.curve import RigidCircle
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
@@ -17,6 +18,7 @@ from archord.solver.path.stepping import StepFailure, StepRules, march
 from archord.solver.path.system import System
 from archord.solver.problem import (
     Body,
+    Coupling,
     DeadLoad,
     Dirichlet,
     Drive,
@@ -62,6 +64,84 @@ def sleeves(comm=MPI.COMM_SELF, material=STEEL) -> Problem:
     ]
     interactions = [Interaction(name, surfaces) for name, surfaces in between.items()]
     return Problem(mesh, bodies, interactions, supports, symmetry=2.0, stabilise=True)
+
+
+@pytest.mark.parametrize("away", [0.0, 1e5])
+def test_what_is_held_is_not_loose_however_far_from_the_origin(away):
+    """Else weak springs never rest, and the slip of what touches newly counts from elsewhere."""
+    mesh = archord.rectangles({"lower": (away, -away, 4, 1), "upper": (away, 1 - away, 4, 1)}, 1.0)
+    problem = Problem(
+        mesh,
+        bodies=[Body("lower", STEEL), Body("upper", STEEL)],
+        interactions=[Interaction("rub", ("upper bottom", "lower top"), friction=0.3)],
+        supports=[Support("lower bottom"), Support("upper top", fixed="x")],
+        loads=[Load("press", on="upper top", direction="y", force=-100.0)],
+        steps=1,
+    )
+    system = System(problem)
+    springs = system.equilibrium.springs
+    assert [body.name for body in springs.rigid.loose] == ["upper"]
+    system.solve([1.0])
+    assert springs.idle
+
+
+def test_forces_on_what_is_held_push_nothing():
+    """Round-off of theirs was the least push, beside which springs carried too much: the run
+    stopped, as if nothing held the foot that is glued to a bar."""
+    mesh = archord.rectangles({"bar": (0, 0, 6, 2), "foot": (0.5, -0.5, 1, 0.5)}, 0.5)
+    problem = Problem(
+        mesh,
+        bodies=[Body("bar", STEEL), Body("foot", STEEL)],
+        interactions=[Interaction("glue", ("foot top", "bar bottom"), law="tied")],
+        couplings=[Coupling("end", "bar right", point=(6.5, 1.0))],
+        supports=[Support("bar left"), Support("foot bottom", fixed="y")],
+        loads=[
+            Load("shear", on="end", direction="y", force=2.0),
+            Load("bend", on="end", direction="rotation", force=3.0),
+            Load("pull", on="end", direction="x", force=6.0),
+        ],
+        steps=1,
+    )
+    system = System(problem)
+    assert system.equilibrium.springs.rigid.least_push(1.0) == 0.0
+    system.solve([1.0], StepRules(minimum=1.0))
+    assert system.reaction("bar left")[0] == pytest.approx(-6.0, rel=1e-6)
+
+
+def test_shear_does_not_depend_on_how_loose_bodies_came_to_rest():
+    """Slip counts from where they touch down, which is found to round-off: a thousandth of the
+    force off, the shear would be so, too."""
+
+    def shear(away: float) -> float:
+        boxes = {
+            "lower": (0.0, 0.0, 4.0, 1.0),
+            "middle": (0.4, 1.01, 2.7, 1.0),
+            "upper": (0.8, 2.03, 2.1, 1.0),
+        }
+        mesh = rectangles(boxes, 0.5, MPI.COMM_SELF)
+        mesh.mesh.geometry.x[:, 0] += away
+        between = {"below": ("middle bottom", "lower top"), "above": ("upper bottom", "middle top")}
+        problem = Problem(
+            mesh,
+            bodies=[Body(name, Elastic(1000.0, 0.3)) for name in boxes],
+            interactions=[Interaction(name, both, friction=0.3) for name, both in between.items()],
+            couplings=[
+                Coupling("top", "upper top", (away + 1.7, 3.2), "distributing"),
+                Coupling("side", "middle left", (away + 0.4, 1.5), "distributing"),
+            ],
+            supports=[
+                Support("lower bottom"),
+                Support("side", fixed="x"),
+                Support("top", fixed="x"),
+            ],
+            loads=[Load("push", on="top", direction="y", force=-10.0)],
+            steps=1,
+        )
+        system = System(problem)
+        system.solve([1.0])
+        return float(system.contact_force("above")[0])
+
+    assert shear(200.0) == pytest.approx(shear(0.0), rel=1e-6)
 
 
 @pytest.mark.mpi
