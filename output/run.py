@@ -45,6 +45,8 @@ from archord.solver.problem import Problem
 if TYPE_CHECKING:
     from archord.geometry.meshes.mesh_arrays import MeshArrays
 
+_SECONDS_BETWEEN_TABLES = 1.0  # of a run without checkpoints
+
 
 @dataclass
 class Outcome:
@@ -171,6 +173,7 @@ class _Output:
     A step counts once the checkpoint has it. Its arrays are on disk by then: what is evaluated from
     an accepted state once more differs from them, where laws and materials of own classes depend on
     the length of the step. The tables follow, and a run that goes on writes what they lack.
+    A run without checkpoints never goes on: its tables follow once a second, and when it ends.
     """
 
     def __init__(
@@ -192,6 +195,7 @@ class _Output:
         self._on_root = partial(agreed, comm)
         self._scene = scene_text(account.scene, folder)
         self._last = perf_counter()
+        self._tables_written = self._last
         self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
         asked = account.scene.output.fields
@@ -277,10 +281,18 @@ class _Output:
             self.steps.append(m)
 
             def write() -> None:
-                write_history(self.folder / "history.csv", account.columns, self.steps)
                 self._report.add(step, warnings)
+                waiting = perf_counter() - self._tables_written
+                if account.scene.output.checkpoint or waiting > _SECONDS_BETWEEN_TABLES:
+                    self._replace_tables()
 
             self._on_root(write)
+
+    def _replace_tables(self) -> None:
+        """Make history.csv and run.json have all steps so far."""
+        write_history(self.folder / "history.csv", self.account.columns, self.steps)
+        self._report.write()
+        self._tables_written = perf_counter()
 
     def _write_fields(self, load: float, fields: Any, before: int) -> None:
         """Add a step to the files of fields, which hold so many steps ``before`` it."""
@@ -302,7 +314,12 @@ class _Output:
         """Note how the run ended, with ``warnings`` beside the steps' own; returns all on rank
         0. Collective."""
         ending["peak_memory"] = self.system.comm.gather(peak_memory())
-        found = self._on_root(lambda: self._report.finish(warnings, **ending))
+
+        def finish() -> list[str]:
+            write_history(self.folder / "history.csv", self.account.columns, self.steps)
+            return self._report.finish(warnings, **ending)
+
+        found = self._on_root(finish)
         return found if self.system.comm.rank == 0 else []
 
 

@@ -1,4 +1,4 @@
-"""run.json: how a run was made and what it cost; rewritten after every step."""
+"""run.json: how a run was made and what it cost; rewritten while it goes on."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Report:
     the seconds count.
 
     ``steps`` are the steps of the run, also of the run that it goes on from, with the run.json
-    ``before``; whoever appends one to them calls `add`.
+    ``before``; whoever appends one to them calls `add`, and `write`.
     """
 
     def __init__(
@@ -98,8 +98,7 @@ class Report:
         }
 
     def add(self, step: Step, warnings: Sequence[str]) -> None:
-        """Note how the last of the steps was reached, and what to warn of at it. Raises
-        `OSError`."""
+        """Note how the last of the steps was reached, and what to warn of at it."""
         m = self.steps[-1]
         tell(self._told, m.step, warnings)
         cost = {
@@ -111,7 +110,6 @@ class Report:
             "residuals": [a.residuals for a in step.attempts],
         }
         self.content["steps"].append(_finite(m.plain() | cost))
-        self.write()
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
         """Note how the run ended, what else to warn of, and what its files are by then; returns all

@@ -153,7 +153,7 @@ class Output(Section):
     fields: Literal[False, "cells", "nodes", "points"] = key(
         "write the fields of every step to fields.h5 and fields.xdmf: stress and plastic strain "
         "as means of cells, or also at the nodes, or also at the integration points; false writes "
-        "none, true is the default",
+        "none, true is the default; sweeps: false",
         default="cells",
     )
     contact: bool = key(
