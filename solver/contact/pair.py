@@ -240,22 +240,27 @@ class Pair:
     @property
     def distance(self) -> Array:
         """Distance ``(n, q)`` of the points of this rank's facets from their partners, positive
-        when open."""
+        when open; of points without a partner from the closest point of the opposite surface."""
         closed = 0.0 if self.law.slides else self._undeformed_gap()
-        return self._by_facets(self.opening[:, 0] + closed)
+        to_partner = self.opening[:, 0] + closed
+        away = np.linalg.norm(self.separation, axis=1)
+        return self._by_facets(np.where(self.projection.found, to_partner, away))
 
     @property
     def slip(self) -> Array:
         """Displacement ``(n, q)`` of the points relative to the opposite surface, along the tangent
-        of the frame; its size in space."""
-        apart = self._moved_apart()
-        slips = [(tangent * apart).sum(axis=1) for tangent in self.frame.swapaxes(0, 1)[1:]]
-        return self._by_facets(_along_surface(slips))
+        of the frame; its size in space. Zero without a partner."""
+        return self._by_facets(_along_surface(list(self._slips().T)))
 
     @property
     def slips(self) -> Array:
         """The same ``(n, q, d)`` as vectors."""
-        return self._on_surface(self._in_frame(self._moved_apart()))
+        return self._on_surface(np.insert(self._slips(), 0, 0.0, axis=1))
+
+    def _slips(self) -> Array:
+        """Components ``(m, d - 1)`` along the tangents of the frame."""
+        slips = self._in_frame(self._moved_apart())[:, 1:]
+        return np.where(self.projection.found[:, None], slips, 0.0)
 
     @property
     def pressure(self) -> Array:

@@ -61,7 +61,7 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
         ends = np.array([_halved(ends, n_parts) for ends in breaks])
         n_points = own.degree + 3
     else:
-        n_parts = max(_PARTS * max(round(_n_faced(met)), 1), n_parts)
+        n_parts = max(_PARTS * max(round(_n_faced(met, own.n_facets)), 1), n_parts)
         ends = np.array([_divided(ends, n_parts) for ends in breaks])
         # exact for a linear pressure against the shape functions of a facet that is hardly curved
         n_points = own.degree + 1
@@ -72,14 +72,15 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     return xi.reshape(own.n_facets, -1), weight.reshape(own.n_facets, -1)
 
 
-def _n_faced(met: Projection) -> float:
-    """How many facets a facet faces, on average, by the vertices of the opposite curve that are
-    ``met``. Of vertices that lie at ends of facets round-off decides on which: each counts on the
-    one before."""
+def _n_faced(met: Projection, n_facets: int) -> float:
+    """How many facets each of ``n_facets`` faces, on average, by the vertices of the opposite curve
+    that are ``met``. Of vertices that lie at ends of facets round-off decides on which: all count
+    on the one before, or all on the one behind, whichever is on fewer facets."""
     place = (met.facet + met.xi)[met.found]
     before = np.floor(place - _SHORTEST).clip(0)
-    n_facing = len(np.unique(before))
-    return len(place) / max(n_facing, 1)
+    behind = np.floor(place + _SHORTEST).clip(max=n_facets - 1)
+    fewest = min(len(np.unique(before)), len(np.unique(behind)))
+    return len(place) / max(fewest, 1)
 
 
 def _halved(ends: Array, n_parts: int) -> Array:

@@ -6,9 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from archord.geometry import curve as curve_module
 from archord.geometry.curve import Curve, ProjectionError
+from archord.geometry.shapes.rectangles import rectangles
+from archord.materials.elasticity import Elastic
+from archord.measures.edge import surface_profiles
+from archord.solver.path.system import System
+from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import DR, contact_force, interact, joint_parts, n_nodes, nodes_of
 
@@ -99,6 +105,29 @@ def test_a_point_that_does_not_converge_is_an_error(monkeypatch):
     monkeypatch.setattr(curve_module, "_NEWTON_STEPS", 1)
     with pytest.raises(ProjectionError, match="found no closest point"):
         parts.contact.evaluate(parts.pressed(1.5 * DR, noise=1e-3))
+
+
+def test_points_that_face_nothing_are_open():
+    """Those of the longer block beside the shorter one, which was drawn into it, lay below the line
+    that continues its lower edge."""
+    boxes = {"lower": (0.0, 0.0, 4.0, 1.0), "upper": (1.0, 0.9, 2.0, 1.0)}
+    fit = Interaction("fit", ("upper bottom", "lower top"), overlap=0.1)
+    system = System(
+        Problem(
+            rectangles(boxes, 0.5, MPI.COMM_SELF),
+            bodies=[Body(name, Elastic(1000.0, 0.3)) for name in boxes],
+            interactions=[fit],
+            supports=[Support("lower bottom"), Support("upper top")],
+            steps=1,
+        )
+    )
+    system.solve([1.0])
+    profile = surface_profiles(system)["lower top"]
+    x = profile.X[..., 0]
+    beside = np.maximum(1.0 - x, x - 3.0)
+    is_beside = beside > 0.1
+    assert (profile.gap[is_beside] > beside[is_beside] - 0.06).all()
+    assert not profile.slip[is_beside].any()
 
 
 def test_sliding_out_of_the_pattern_extends_it():

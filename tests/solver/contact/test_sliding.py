@@ -70,6 +70,18 @@ def test_points_do_not_depend_on_round_off_where_parts_are_equally_long(end, rou
     assert in_shorter.sum() == 4 * (own.degree + 1)
 
 
+def test_a_mirrored_curve_has_as_many_points():
+    """Five vertices lie on the last three of six facets, the first one where the third facet
+    ends."""
+
+    def points(start: float, end: float, *, mirrored: bool) -> int:
+        x = np.linspace(start, end, 9)
+        opposite = Curve(np.column_stack([1 - x[::-1] if mirrored else x, np.zeros(9)]), 2)
+        return segment_rule(line(6), opposite)[0].size
+
+    assert points(1.0, 0.5, mirrored=False) == points(1.0, 0.5, mirrored=True)
+
+
 @pytest.mark.parametrize("n_own", [10, 12, 30])
 def test_nodes_get_their_share_of_a_uniform_pressure(n_own):
     """To round-off without slip, and within a hundredth wherever the facets have slid to."""
