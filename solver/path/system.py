@@ -22,8 +22,8 @@ from archord.solver.contact.interaction import Interaction, Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.expansion import expanded
-from archord.solver.mirrors import Mirror, mirrors_of
 from archord.solver.path.load_path import Companion, LoadPath, Position
+from archord.solver.path.mirrors import Mirror, mirrors_of
 from archord.solver.path.newton import NewtonSolver
 from archord.solver.path.recovery import Recovery
 from archord.solver.path.stepping import StepRules, march
