@@ -20,6 +20,7 @@ _PEAK_FRACTION = 0.4  # part of the contact angle over which the parabola of the
 _LEAST = 0.1  # rad, of the same angle
 _PIECE = 0.15  # rad: length of a piece of a strip
 _SLIVER = 0.5  # part of the widest piece below which a piece does not count
+_DIGITS = 9  # of angles that are not one
 _SHEAR_FACTOR = 0.9  # of a round beam (Cowper 1966)
 
 
@@ -57,10 +58,10 @@ class Bearing:
     def semi_angle(self, state: Accepted) -> float:
         """The angle from the load axis to which the hole bears, at its middle."""
         hole = state.met[self.contact][-1]
-        weight = np.where(_inside(hole.X, self.middle), hole.weight, 0.0)
-        is_pressed = hole.raw_pressure > 0
-        bearing = weight[is_pressed].sum()
-        return float(self.span * bearing / weight.sum())
+        inside = _inside(hole.X, _twice(self.middle))
+        angle = self.angle(hole.X)[inside]
+        is_pressed = hole.raw_pressure[inside] > 0
+        return borne(angle, is_pressed, hole.weight[inside], self.span)
 
     def peak(self, state: Accepted, strip: Strip) -> float:
         """The pressure on the load axis in a ``strip``, by an even parabola around it."""
@@ -95,6 +96,17 @@ class Bearing:
         return angle, pressure, weight
 
 
+def borne(angle: Array, bears: np.ndarray, weight: Array, span: float) -> float:
+    """The part of a ``span`` of angles from 0 on that bears. Each of the angles ``(k,)`` is as it
+    ``bears`` up to halfway to the next ones, as points of facets lie denser here than there.
+    Points at one angle count by their ``weight``."""
+    different, at = np.unique(np.round(angle, _DIGITS), return_inverse=True)
+    share = np.bincount(at, weight * bears) / np.bincount(at, weight)
+    between = (different[1:] + different[:-1]) / 2
+    widths = np.diff(np.concatenate([[0.0], between, [span]]))
+    return float(widths @ share)
+
+
 def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
     """The measures of the preset in space whose shape the ``scene`` has; none of other scenes."""
     shape: Any = scene.mesh.shape
@@ -121,6 +133,13 @@ def _inside(X: Array, strip: Strip) -> np.ndarray:
     low, high = strip
     z = X[..., 2]
     return (z >= low) & (z <= high)
+
+
+def _twice(strip: Strip) -> Strip:
+    """The ``strip`` with twice the width: wide enough for points at all angles."""
+    low, high = strip
+    beside = (high - low) / 2
+    return low - beside, high + beside
 
 
 def _in(value: Callable[[Accepted, Strip], float], strip: Strip, state: Accepted) -> float:

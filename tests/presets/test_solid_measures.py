@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from archord.output.run import solve_scene
+from archord.presets.solid_measures import borne
 from archord.scene.file import parse_any
 
 STEEL = {"E": 210000.0, "nu": 0.3}
@@ -46,6 +48,33 @@ def test_a_joint_in_space_lies_between_the_planes(tmp_path):
     assert 0.97 * stress["p0"] < solid["p0"] < 1.03 * strain["p0"]
     assert 0.8 * solid["p0"] < solid["rim pressure"] < 0.98 * solid["p0"]
     assert solid["eps"] == pytest.approx(stress["eps"], rel=0.04)
+
+
+def test_the_angle_that_bears_does_not_depend_on_the_mesh(tmp_path):
+    """Points of facets lie denser at some angles than at others."""
+    lug = {"radius": 9.9, "clearance": 0.1, "width": 40.0, "length": 50.0, "growth": 0.5}
+    found = []
+    for size in (4.0, 2.0):
+        scene = {
+            "lug": lug | {"element_size": size},
+            "space": {"thickness": 12.0, "pin_length": 16.0},
+            "plate": STEEL,
+            "pin": STEEL,
+            "load": {"displacement": 0.15, "steps": 1},
+            "output": {"fields": False},
+        }
+        found.append(last_of(scene, tmp_path / str(size))["pin in lug eps"])
+    assert found[0] == pytest.approx(found[1], rel=0.01)
+    assert found[1] == pytest.approx(0.985, abs=0.01)  # where points of the finest mesh still bear
+
+
+def test_angles_bear_up_to_halfway_to_the_next_ones():
+    """However dense they lie, and in any order."""
+    angle = np.array([2.0, 0.1, 0.2, 0.2, 0.3, 1.0, 3.0])
+    bears = np.array([False, True, True, False, True, True, False])
+    weight = np.array([1.0, 2.0, 3.0, 1.0, 1.0, 9.0, 1.0])
+    expected = 0.15 + 0.75 * 0.1 + (1.5 - 0.25)
+    assert borne(angle, bears, weight, math.pi) == pytest.approx(expected)
 
 
 def test_the_pin_of_a_clevis_bends_as_a_beam(tmp_path):
