@@ -19,8 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch
+from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch, hermite
 
+_PLACES = 1000  # of first loading that are compared
 _SAMPLES = 4000  # of phi, up to its largest argument
 _FIRST = 1e-3  # of them, over the last node
 _MARGIN = 1.01  # of h between two nodes, over the larger one there
@@ -63,6 +64,18 @@ def shift(curve: JointCurve) -> tuple[Array, Array]:
     z = curve.x - r * h
     dz = 1 - dr * h - r * dh
     return _losing(curve, z, dz, h)
+
+
+def fall(curve: JointCurve) -> float:
+    """By how much the element's force on first loading is below the law's where z was raised: the
+    largest difference, over the largest force."""
+    shifts, slopes = shift(curve)
+    x = np.linspace(0.0, curve.x[-1], _PLACES)
+    ratio, _ = hermite(curve.x, curve.ratio, curve.dratio, x)
+    opens, _ = hermite(curve.x, shifts, slopes, x)
+    force = ratio * curve._curve(curve.back, curve.dback, np.maximum((x - opens) / ratio, 0.0))[0]
+    wanted, _ = curve._curve(curve.y, curve.dy, x)
+    return float((wanted - force).max() / wanted.max())
 
 
 def _losing(curve: JointCurve, z: Array, dz: Array, h: Array) -> tuple[Array, Array]:

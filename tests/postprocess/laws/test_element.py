@@ -155,6 +155,26 @@ def test_a_straight_way_is_the_law(name: str) -> None:
         assert T == 0
 
 
+def test_a_table_says_where_the_element_is_below_its_force() -> None:
+    """Where first loading and the way back have other shapes, as in tables of runs of few steps."""
+    curve = yielding()
+    assert "below the force of the law" not in export_law(curve, Path("law.h"))
+    plain = elastic()
+    x = plain.x
+    steep = np.exp(0.05 * x)
+    ratio = np.exp(-0.6 * x)
+    stiff = {"y": plain.y * steep, "dy": (plain.dy + 0.05 * plain.y) * steep}
+    bent = replace(plain, **stiff, ratio=ratio, dratio=-0.6 * ratio)
+    law = python(bent)
+    worst = 0.0
+    for delta in np.linspace(0.01, 1.0, 200) * curve.limit:
+        force = -law.element(law.new_element(), (curve.length + delta, 0.0))[0][0]
+        worst = max(worst, float(bent.at(delta).load) - force)
+    told = worst / float(bent.at(bent.limit).load)
+    assert told > 0.02
+    assert f"below the force of the law by up to {told:.1%} of the" in " ".join(law.__doc__.split())
+
+
 @pytest.mark.parametrize("name", sorted({*LAWS} - {"elastic", "without touch"}))
 def test_memory_only_loses_energy(name: str) -> None:
     """The energy given back from any displacement falls, or stays, as the deepest one grows."""
