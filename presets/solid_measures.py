@@ -20,8 +20,8 @@ _PEAK_FRACTION = 0.4  # part of the contact angle over which the parabola of the
 _LEAST = 0.1  # rad, of the same angle
 _PIECE = 0.15  # rad: length of a piece of a strip
 _SLIVER = 0.5  # part of the widest piece below which a piece does not count
+_COSINES = 5  # that the motion around a pin is made of
 _DIGITS = 9  # of angles that are not one
-_SHEAR_FACTOR = 0.9  # of a round beam (Cowper 1966)
 
 
 Strip = tuple[float, float]
@@ -61,7 +61,27 @@ class Bearing:
         inside = _inside(hole.X, _twice(self.middle))
         angle = self.angle(hole.X)[inside]
         is_pressed = hole.raw_pressure[inside] > 0
-        return borne(angle, is_pressed, hole.weight[inside], self.span)
+        return self.span * mean_over(angle, is_pressed, hole.weight[inside], self.span)
+
+    def moved(self, state: Accepted) -> float:
+        """How far the pin's surface has moved along x at the middle of the hole, the mean around
+        it.
+
+        Its sides come nearer to each other, and points are not evenly around it: so cosines of the
+        angle, and a parabola along the pin, are fitted to the motion of points.
+        """
+        pin = state.met[self.contact][0]
+        inside = _inside(pin.X, _twice(self.middle))
+        angle = self.angle(pin.X)[inside]
+        low, high = self.middle
+        beside = (2 * pin.X[..., 2][inside] - low - high) / (high - low)
+        around = [np.cos(k * angle) for k in range(_COSINES + 1)]
+        along = [beside, beside**2, beside * np.cos(angle)]
+        moved = (pin.coordinates[..., 0] - pin.X[..., 0])[inside]
+        w = np.sqrt(pin.weight[inside])
+        functions = w[:, None] * np.stack(around + along, axis=1)
+        coefficients, *_ = np.linalg.lstsq(functions, w * moved, rcond=None)
+        return float(coefficients[0])
 
     def peak(self, state: Accepted, strip: Strip) -> float:
         """The pressure on the load axis in a ``strip``, by an even parabola around it."""
@@ -96,15 +116,15 @@ class Bearing:
         return angle, pressure, weight
 
 
-def borne(angle: Array, bears: np.ndarray, weight: Array, span: float) -> float:
-    """The part of a ``span`` of angles from 0 on that bears. Each of the angles ``(k,)`` is as it
-    ``bears`` up to halfway to the next ones, as points of facets lie denser here than there.
-    Points at one angle count by their ``weight``."""
+def mean_over(angle: Array, values: Array, weight: Array, span: float) -> float:
+    """The mean of ``values`` ``(k,)`` over a ``span`` of angles from 0 on. Each counts up to
+    halfway to the next ones of the angles ``(k,)``, as points of facets lie denser here than there.
+    Values at one angle count by their ``weight``."""
     different, at = np.unique(np.round(angle, _DIGITS), return_inverse=True)
-    share = np.bincount(at, weight * bears) / np.bincount(at, weight)
+    of_angles = np.bincount(at, weight * values) / np.bincount(at, weight)
     between = (different[1:] + different[:-1]) / 2
     widths = np.diff(np.concatenate([[0.0], between, [span]]))
-    return float(widths @ share)
+    return float(widths @ of_angles) / span
 
 
 def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
@@ -208,25 +228,20 @@ def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     """
     inside, bottom, top = _heights(shape)
     pin = next(body for body in scene.body if body.name == "pin")
-    inner, outer = (
-        bearing.contact for bearing in _bearings(shape, [p.name for p in scene.interaction])
-    )
-    middle_strip = _middle(shape)
-    outer_strip = _middle(shape, (bottom + top) / 2)
+    inner, outer = _bearings(shape, [part.name for part in scene.interaction])
     arm = inside / 2 + shape.space.gap + (top - bottom) / 2
     compliance = _beam_compliance(shape, pin, arm)
 
     def force(state: Accepted) -> float:
-        return abs(float(state.contact_force(inner)[0]))
+        return abs(float(state.contact_force(inner.contact)[0]))
 
     def moment(state: Accepted) -> float:
         """About y, at the mid-plane, of the contact forces on one half of the whole pin."""
-        of_both_halves = sum(state.contact_moments(contact)[1] for contact in (inner, outer))
+        of_both_halves = sum(state.contact_moments(b.contact)[1] for b in (inner, outer))
         return abs(float(of_both_halves)) / 2
 
     def deflection(state: Accepted) -> float:
-        at_middle = _moved(state, inner, middle_strip)
-        return abs(at_middle - _moved(state, outer, outer_strip))
+        return abs(inner.moved(state) - outer.moved(state))
 
     of_moment = scene.units.energy_of(1.0)
     length = scene.units.length
@@ -248,13 +263,12 @@ def _beam_compliance(shape: Any, pin: Any, arm: float) -> float:
     area = math.pi * (R**2 - bore**2)
     shear_modulus = pin.E / (2 * (1 + pin.nu))
     bent = (8 * span**3 - 4 * span * loaded**2 + loaded**3) / (384 * pin.E * inertia)
-    sheared = arm / (2 * _SHEAR_FACTOR * shear_modulus * area)
+    sheared = arm / (2 * shear_factor(bore / R, pin.nu) * shear_modulus * area)
     return bent + sheared
 
 
-def _moved(state: Accepted, contact: str, strip: Strip) -> float:
-    """How far the pin's surface in a ``strip`` has moved along x, on average."""
-    pin = state.met[contact][0]
-    weight = np.where(_inside(pin.X, strip), pin.weight, 0.0)
-    moved = pin.coordinates[..., 0] - pin.X[..., 0]
-    return float((weight * moved).sum() / weight.sum())
+def shear_factor(bore: float, nu: float) -> float:
+    """The shear factor of a round beam whose ``bore`` is over its radius (Cowper 1966)."""
+    square = bore**2
+    wall = (1 + square) ** 2
+    return 6 * (1 + nu) * wall / ((7 + 6 * nu) * wall + (20 + 12 * nu) * square)

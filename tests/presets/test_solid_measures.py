@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from archord.output.run import solve_scene
-from archord.presets.solid_measures import borne
+from archord.presets.solid_measures import Bearing, mean_over, shear_factor
 from archord.scene.file import parse_any
 
 STEEL = {"E": 210000.0, "nu": 0.3}
@@ -68,13 +69,33 @@ def test_the_angle_that_bears_does_not_depend_on_the_mesh(tmp_path):
     assert found[1] == pytest.approx(0.985, abs=0.01)  # where points of the finest mesh still bear
 
 
-def test_angles_bear_up_to_halfway_to_the_next_ones():
-    """However dense they lie, and in any order."""
+def test_values_count_up_to_halfway_to_the_next_angles():
+    """However dense these lie, and in any order."""
     angle = np.array([2.0, 0.1, 0.2, 0.2, 0.3, 1.0, 3.0])
-    bears = np.array([False, True, True, False, True, True, False])
+    values = np.array([0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0])
     weight = np.array([1.0, 2.0, 3.0, 1.0, 1.0, 9.0, 1.0])
     expected = 0.15 + 0.75 * 0.1 + (1.5 - 0.25)
-    assert borne(angle, bears, weight, math.pi) == pytest.approx(expected)
+    assert math.pi * mean_over(angle, values, weight, math.pi) == pytest.approx(expected)
+
+
+def test_hollow_beams_shear_more():
+    """Of a solid one the factor is 6 (1 + nu)/(7 + 6 nu), of a thin tube 2 (1 + nu)/(4 + 3 nu)."""
+    assert shear_factor(0.0, 0.3) == pytest.approx(7.8 / 8.8)
+    assert shear_factor(1.0, 0.3) == pytest.approx(2.6 / 4.9)
+
+
+def test_the_motion_of_a_pin_is_its_mean_around_wherever_points_lie():
+    """Its sides come nearer to each other by more than it moves."""
+    rng = np.random.default_rng(5)
+    angle = np.pi * rng.random(80) ** 2
+    z = rng.uniform(7.0, 9.0, 80)
+    X = np.stack([10 * np.cos(angle), 10 * np.sin(angle), z], axis=1)[:, None]
+    moved = 0.2 + 0.3 * np.cos(angle) + 0.1 * np.cos(3 * angle) + 0.05 * (z - 8.0)
+    pin = SimpleNamespace(X=X, weight=np.ones((80, 1)), coordinates=X.copy())
+    pin.coordinates[:, 0, 0] += moved
+    bearing = Bearing("joint", 10.0, (0.0, 0.0), (1.0, 0.0), np.pi, (7.0, 9.0), (0.0, 1.0))
+    state = SimpleNamespace(met={"joint": [pin]})
+    assert bearing.moved(state) == pytest.approx(0.2, rel=1e-9)
 
 
 def test_the_pin_of_a_clevis_bends_as_a_beam(tmp_path):
@@ -107,5 +128,5 @@ def beam(force):
     area = math.pi * 10.0**2
     shear_modulus = 210e3 / 2.6
     bent = (8 * 30.0**3 - 4 * 30.0 * 16.0**2 + 16.0**3) / (384 * 210e3 * inertia)
-    sheared = (16.0 / 4 + 2.0 + 10.0 / 2) / 2 / (0.9 * shear_modulus * area)
+    sheared = (16.0 / 4 + 2.0 + 10.0 / 2) / 2 / (7.8 / 8.8 * shear_modulus * area)
     return force * (bent + sheared)
