@@ -33,6 +33,7 @@ _FEWEST = 6  # steps of first loading with contact
 _FEWEST_BACK = 3  # steps of unloading with contact
 # error of ways back that were not solved, over the force they begin at (docs/calibration.md)
 _UNSEEN = 0.03
+_FELT = 1e-3  # of it, beyond which a way back along first loading is known less well than that
 # error at first touch over that at the first step: 5 to 8 % of P against the logarithm of line
 # contact
 _FIRST = 4.0
@@ -113,9 +114,10 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
     }
     if measured is not None:
         back_error = measured + mesh
-        if not len(back.steps):  # elastic: along first loading
-            back_error = np.maximum(back_error, error)
-        curve = replace(curve, back_error=back_error)
+        if len(back.steps):
+            curve = replace(curve, back_error=back_error)
+        elif (back_error > error + _FELT).any():  # elastic: it comes back along first loading
+            curve = replace(curve, back_error=np.maximum(back_error, error))
     return replace(curve, about=about)
 
 
