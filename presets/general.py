@@ -25,6 +25,7 @@ from archord.presets.problem import (
     mesh_name,
     placed,
     require_mirrored,
+    require_no_lever,
 )
 from archord.presets.solid_measures import solid_measures
 from archord.report.timer import Timer
@@ -63,6 +64,7 @@ def general_account(
                 warnings += check(problem)
         require_mirrored(problem)
         system = System(conditions, timer=timer)
+        require_no_lever(problem, system)
         warnings += system.warnings
         if scene.mesh.shape is None or any(part.interference for part in scene.interaction):
             from archord.presets.held import require_facing

@@ -25,8 +25,10 @@ from archord.scene.problem import ProblemScene
 from archord.scene.sections.keys import plain
 from archord.solver.contact.laws.named import LAWS
 from archord.solver.parts import Body, Coupling, Load, Support, freedoms
-from archord.solver.path.system import displacement_space
+from archord.solver.path.system import System, displacement_space
 from archord.solver.problem import Interaction, Problem
+
+_LEVER = 1e-6  # of a mean motion: round-off of its point
 
 
 def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
@@ -198,4 +200,28 @@ def require_mirrored(problem: Problem) -> None:
             raise ValueError(
                 f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, "
                 f"which is held in {axis}: hold its {' and '.join(free)}, too, in a [[support]]"
+            )
+
+
+def require_no_lever(problem: Problem, system: System) -> None:
+    """Raise ValueError where a force on a distributing coupling of a ``problem`` with mirror images
+    would turn its facets: its point is beside them, and not the point of the images, too.
+    Collective."""
+    points = {coupling.name: coupling.point for coupling in problem.couplings}
+    for mean in system.problem.means:
+        if mean.name not in points:
+            continue
+        point = points[mean.name]
+        beside = system.mirrors_beside(mean.facets, point)
+        if not beside:
+            continue
+        motion = system.mean_rates(mean.facets, point)[mean.axis]
+        amid = system.mean_rates(mean.facets, None)[mean.axis]
+        by_lever = system.comm.allreduce(float(np.abs(motion - amid).sum()))
+        if by_lever > _LEVER * system.comm.allreduce(float(np.abs(amid).sum())):
+            along = system.problem.kinematics.axes[beside[0].axis]
+            raise ValueError(
+                f"the distributing coupling {mean.name!r} of a part with mirror images has its "
+                f"point beside its facets, where {mean.drive!r} would turn them: move the point "
+                f"along {along} to the middle of the facets, or take the whole"
             )

@@ -25,11 +25,13 @@ class Mirror(NamedTuple):
 
     - ``axis``: number of the axis
     - ``at``: the coordinate of the plane along it
+    - ``near``: the distance within which points are in the plane
     - ``nodes``: block dofs ``(n,)`` on the plane, on this rank, ghosts included
     """
 
     axis: int
     at: float
+    near: float
     nodes: np.ndarray
 
 
@@ -55,7 +57,7 @@ def mirrors_of(problem: Problem, V: fem.FunctionSpace) -> list[Mirror]:
     if 2 ** len(found) > problem.symmetry:
         return []
     return [
-        Mirror(axis, at, np.unique(np.concatenate(nodes)))
+        Mirror(axis, at, near, np.unique(np.concatenate(nodes)))
         for (axis, at), nodes in sorted(found.items())
     ]
 

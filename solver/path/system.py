@@ -126,7 +126,7 @@ class System(Totals):
         self.mirrors = mirrors_of(problem, self.V)
         self._path: LoadPath | None = None
 
-    def _mean_rates(self, facets: str, point: tuple[float, ...]) -> Array:
+    def _mean_rates(self, facets: str, point: tuple[float, ...] | None) -> Array:
         """Derivatives ``(d + t, n_owned, d)`` of `mean_motion` by the displacements."""
         kinematics = self.problem.kinematics
         n = kinematics.dimension + len(kinematics.turns)
@@ -140,6 +140,13 @@ class System(Totals):
         """Whether any of these ``nodes`` ``(n,)`` lies in a ``mirror``."""
         here = bool(np.isin(nodes, mirror.nodes).any())
         return self.comm.allreduce(here, op=MPI.LOR)
+
+    def mirrors_beside(self, facets: str, point: Sequence[float]) -> list[Mirror]:
+        """The mirrors that a set of ``facets`` does not meet, and that a ``point`` is not in: it
+        and its image are two. Collective."""
+        nodes = self.problem.mesh.dofs_in(self.V, facets)
+        apart = [mirror for mirror in self.mirrors if not self._meets(mirror, nodes)]
+        return [mirror for mirror in apart if abs(point[mirror.axis] - mirror.at) > mirror.near]
 
     def _bulk(self) -> Bulk:
         problem = self.problem

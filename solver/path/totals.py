@@ -29,7 +29,7 @@ class Totals:
     contact: Contact
     equilibrium: Equilibrium
     drive_names: list[str]
-    mean_rates: Callable[[str, tuple[float, ...]], Array]
+    mean_rates: Callable[[str, tuple[float, ...] | None], Array]
 
     def reaction(self, name: str) -> Array:
         """Force ``(d,)`` of the supports and means ``name`` on the whole."""

@@ -70,3 +70,21 @@ def test_rollers_that_might_be_mirrors_are_none(comm):
     found = archord.System(pressed(True)).mirrors
     assert [mirror.axis for mirror in found] == [0, 2]
     assert [mirror.at for mirror in found] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("place", "turns"), [(2.0, False), (0.0, False), (5.0, True)])
+def test_a_point_beside_a_face_of_a_quarter_is_refused(place, turns, tmp_path):
+    """A force on it would turn the face, which took none of its moment; at the mirror it is the
+    point of both ends of the whole, where their moments cancel."""
+    problem = pressed(
+        True,
+        couplings=[Coupling("end", "upper front", (0.0, 0.5, place), "distributing")],
+        loads=[Load("push", on="end", direction="y", force=-1.0)],
+        supports=[Support("lower bottom"), *MIRRORS],
+    )
+    if not turns:
+        assert archord.solve(problem, tmp_path / "run").steps == 1
+        return
+    said = "has its point beside its facets, where 'push' would turn them: move the point along z"
+    with pytest.raises(archord.InputError, match=said):
+        archord.solve(problem, tmp_path / "run")
