@@ -211,7 +211,14 @@ def _export(
         law = dataclasses.replace(law, length_unit=units["length"], force_unit=units["force"])
     law = dataclasses.replace(law, force=law.force * thickness, pin_length=thickness, about=about)
     print(*write(exports_of(law, exports, contact), inputs, force), sep="\n")
-    warn(*(str(warning.message) for warning in caught))
+    said = [str(warning.message) for warning in caught]
+    has_element = any(export.suffix != ".json" for export in exports)
+    if joint.friction and has_element and not contact.mu_static:
+        said.append(
+            f"the friction of {joint.friction:g} is in the force P; the force element has no "
+            "friction of its own without --mu-static"
+        )
+    warn(*said)
     return 0
 
 

@@ -475,6 +475,19 @@ def test_options_set_the_contact_of_an_export(tmp_path: Path) -> None:
     assert run(["law", "--scene", scene, *options]) == 2
 
 
+@pytest.mark.parametrize(
+    ("suffix", "more", "told"),
+    [(".h", [], True), (".h", ["--mu-static", "0.2"], False), (".json", [], False)],
+)
+def test_friction_of_the_scene_is_in_the_force_alone(suffix, more, told, tmp_path, capsys) -> None:
+    """The element has none that is not asked for, which is said."""
+    scene = str(Path(__file__).parents[3] / "scenes" / "steel_pin.toml")
+    words = ["law", "--scene", scene, "--set", "analysis.friction=0.2", *more]
+    assert run([*words, "--export", str(tmp_path / f"pin{suffix}")]) == 0
+    said = capsys.readouterr().err
+    assert ("the friction of 0.2 is in the force P; the force element has no" in said) == told
+
+
 def test_contacts_that_cannot_be() -> None:
     """One sentence each."""
     for given, said in (
