@@ -98,7 +98,8 @@ def unrolled(profile: PatchProfile, axis: Axis) -> Unrolled:
     area = np.bincount(facet, profile.width).astype(float)
     moment = np.einsum("nq,nqi->ni", profile.weight, profile.X)
     middle = np.stack([np.bincount(facet, part) for part in moment.T], axis=1) / area[:, None]
-    radius, angle, along = axis.cylindrical(middle)
+    _, angle, along = axis.cylindrical(middle)
+    radius, _, _ = axis.cylindrical(profile.X)  # middles of curved facets lie beneath these
     _, of_corners, along_corners = axis.cylindrical(profile.corners[first])
     beside = (of_corners - angle[:, None] + 180) % 360 - 180
     return Unrolled(
@@ -106,7 +107,7 @@ def unrolled(profile: PatchProfile, axis: Axis) -> Unrolled:
         along=along,
         pressure=profile.facet_pressure[first],
         area=area,
-        radius=float(np.average(radius, weights=area)),
+        radius=float(np.average(radius, weights=profile.weight)),
         corners=np.stack([angle[:, None] + beside, along_corners], axis=-1),
     )
 
