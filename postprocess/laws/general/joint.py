@@ -134,10 +134,8 @@ class LawJoint:
         for body in ("pin", "block"):
             law = getattr(self, f"{body}_hardening")
             stress = getattr(self, f"{body}_yield")
-            if law is None:
+            if law is None or stress is None:
                 continue
-            if stress is None:
-                raise ValueError(f"{body}_hardening: says nothing without {body}_yield.")
             begins = float(law.stress(np.zeros(1))[0])
             if not math.isclose(begins, stress, rel_tol=1e-6):
                 said = f"{body}_hardening begins at {begins:g}, not at {body}_yield = {stress:g}"

@@ -172,8 +172,6 @@ def test_values_that_make_no_joint_are_refused(name):
 def test_a_curve_begins_at_the_yield_stress():
     with pytest.raises(ValueError, match="begins at 2, not at block_yield = 1"):
         LawJoint(1.0, 0.01, 1.0, block_yield=1.0, block_hardening=LinearHardening(2.0))
-    with pytest.raises(ValueError, match="pin_hardening: says nothing without pin_yield"):
-        LawJoint(1.0, 0.01, 1.0, block_yield=1.0, pin_hardening=LinearHardening(2.0))
 
 
 def test_joint_of_a_scene():
