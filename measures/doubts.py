@@ -20,6 +20,7 @@ LARGE_STRAIN = 0.05
 LARGE = 'analysis.strain = "large" is for that'
 _PLASTIC = 0.5  # PEEQ over the strain, from which on bodies strain by yielding
 _OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
+_INCOMPRESSIBLE = 100.0  # modulus of uniaxial strain over shear modulus: nu = 0.495
 _LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
 _FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
 _BALANCED = 1e-8  # force that is left, or residual, over the largest force
@@ -38,6 +39,24 @@ def contrast_doubts(bodies: Sequence[Body]) -> list[str]:
         f"{stiffest!r} is {ratio:.1e} times as stiff as {softest!r}: look whether their E have the "
         "same unit"
     ]
+
+
+def volume_doubts(system: System) -> list[str]:
+    """A warning of bodies in contact that hardly change their volume, whose stress scatters between
+    points."""
+    problem = system.problem
+    surfaces = [name for part in problem.interactions for name in part.surfaces]
+    touching = [problem.body_of(name) for name in surfaces if isinstance(name, str)]
+    for body in touching:
+        tangent = body.material.elastic_tangent
+        ratio = float(tangent[0, 0] / tangent[-1, -1])
+        if ratio > _INCOMPRESSIBLE:
+            return [
+                f"{body.name!r} hardly changes its volume: its pressure scatters between points, "
+                "so that contact lengths and areas, contact angles and largest pressures may be "
+                "far off on coarse meshes; forces and displacements are not; smaller elements help"
+            ]
+    return []
 
 
 def stiff_quadrilaterals(system: System) -> list[str]:

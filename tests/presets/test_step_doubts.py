@@ -71,6 +71,24 @@ def warnings_of(account):
     return said
 
 
+@pytest.mark.parametrize(
+    ("nu", "plane", "told"), [(0.49, "strain", 0), (0.499, "strain", 1), (0.499, "stress", 0)]
+)
+def test_bodies_in_contact_that_hardly_change_their_volume_are_told(nu, plane, told):
+    """Their pressure scatters between points: contact lengths are of a coarse mesh."""
+    outline = {name: value for name, value in SHAPE.items() if name != "kind"}
+    data = {
+        "lug": outline | {"element_size": 4.0, "growth": 0.5},
+        "pin": STEEL,
+        "plate": STEEL | {"nu": nu},
+        "load": {"displacement": 0.1},
+        "analysis": {"plane": plane},
+    }
+    account = account_of(parse_any(data), MPI.COMM_SELF)
+    found = [said for said in account.warnings if "'lug' hardly changes its volume" in said]
+    assert len(found) == told
+
+
 def test_elastic_strain_that_is_not_small_is_told_with_its_size():
     none, (first, *_) = warnings_of(lug([0.1, 10.0]))
     assert none == []
