@@ -29,13 +29,15 @@ def blocks_of(A: PETSc.Mat) -> tuple[Blocks, Blocks, npt.NDArray[np.int32]]:
     nothing = np.zeros(0, dtype=np.int32)
     if A.comm.size == 1:
         own = _arrays(matrix)
-        return own, Blocks(np.zeros_like(own.offsets), nothing, np.zeros(0)), nothing
+        of_others = Blocks(np.zeros_like(own.offsets), nothing, np.zeros(0))
+        return own, of_others, nothing
     here = ctypes.c_void_p()
     elsewhere = ctypes.c_void_p()
     number = _INT()
     _call("MatMPIBAIJGetSeqBAIJ", matrix, *map(ctypes.byref, (here, elsewhere, number)))
     others = _arrays(elsewhere)
-    return _arrays(here), others, _array(number, 1 + others.columns.max(initial=-1))
+    n_others = 1 + others.columns.max(initial=-1)
+    return _arrays(here), others, _array(number, n_others)
 
 
 def ghost_exchange(A: PETSc.Mat, ghosts: np.ndarray) -> tuple[PETSc.Scatter, PETSc.Vec]:
@@ -71,16 +73,18 @@ def without_zeros(A: PETSc.Mat) -> PETSc.Mat:
     first = A.getOwnershipRange()[0] // d
     own, others, ghosts = blocks_of(A)
     n = len(own.offsets) - 1
+    nodes = np.arange(first, first + n)
     found = PETSc.Mat().create(A.comm)
     found.setSizes(A.getSizes(), bsize=d)
     found.setType("aij")
     found.setUp()
-    for blocks, node in ((own, np.arange(first, first + n)), (others, ghosts)):
+    for blocks, node in ((own, nodes), (others, ghosts)):
         by_columns = blocks.values.reshape(-1, d, d)
         filled = by_columns.any(axis=(1, 2))
-        rows = first + np.repeat(np.arange(n), np.diff(blocks.offsets))
+        rows = np.repeat(nodes, np.diff(blocks.offsets))
+        columns = node[blocks.columns]
         values = by_columns[filled].transpose(0, 2, 1)
-        add_blocks(found, rows[filled], node[blocks.columns[filled]], values)
+        add_blocks(found, rows[filled], columns[filled], values)
     found.assemble()
     return found
 

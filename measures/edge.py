@@ -62,7 +62,8 @@ class ContactProfile:
     @property
     def in_contact(self) -> Array:
         """Share ``(n,)`` of each facet that carries pressure."""
-        return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.width
+        is_pressed = self.raw_pressure > 0
+        return (self.weight * is_pressed).sum(axis=1) / self.width
 
     @property
     def contact_length(self) -> float:
@@ -95,7 +96,9 @@ class _Displaced(ContactProfile):
     @property
     def largest_slip(self) -> float:
         """Largest slip, whichever way, where there is pressure."""
-        return float(_size(self.slip)[self.raw_pressure > 0].max(initial=0.0))
+        is_pressed = self.raw_pressure > 0
+        sizes = _size(self.slip)[is_pressed]
+        return float(sizes.max(initial=0.0))
 
     @property
     def largest_shear(self) -> float:
@@ -105,9 +108,8 @@ class _Displaced(ContactProfile):
     @property
     def largest(self) -> tuple[float, Array]:
         """Largest projected pressure, and the undeformed place ``(d,)`` where it is."""
-        at = np.unravel_index(
-            np.argmax(np.where(self.raw_pressure > 0, self.pressure, 0.0)), self.pressure.shape
-        )
+        where_pressed = np.where(self.raw_pressure > 0, self.pressure, 0.0)
+        at = np.unravel_index(np.argmax(where_pressed), self.pressure.shape)
         return max(float(self.pressure[at]), 0.0), self.X[at]
 
 
@@ -145,7 +147,8 @@ class PatchProfile(_Displaced):
         piece = int(np.argmax(self.facet_pressure))
         of_facet = self.facet == self.facet[piece]
         points = self.X[of_facet].reshape(-1, 3)
-        middle = np.average(points, axis=0, weights=self.weight[of_facet].ravel())
+        weights = self.weight[of_facet].ravel()
+        middle = np.average(points, axis=0, weights=weights)
         return max(float(self.facet_pressure[piece]), 0.0), middle
 
 

@@ -40,9 +40,9 @@ class ArcProfile(EdgeProfile):
     def facet_means(self) -> tuple[Array, Array]:
         """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter
         where it yields."""
-        angle = (self.weight * self.angle).sum(axis=1) / self.width
-        pressure = (self.weight * self.pressure).sum(axis=1) / self.width
-        return angle, pressure
+        angle = (self.weight * self.angle).sum(axis=1)
+        force = (self.weight * self.pressure).sum(axis=1)
+        return angle / self.width, force / self.width
 
 
 def arc_profiles(joint: JointGeometry, system: System) -> dict[str, ArcProfile]:
@@ -86,8 +86,9 @@ def semi_angle(profile: ArcProfile) -> float:
     if last < 0:
         return 0.0
     if last < 2:
-        return float((profile.in_contact * profile.width).sum() / profile.radius)
-    start = np.concatenate([[0.0], np.cumsum(profile.width)]) / profile.radius
+        return profile.contact_length / profile.radius
+    arc_length = np.concatenate([[0.0], np.cumsum(profile.width)])
+    start = arc_length / profile.radius
     at_edge = slice(max(0, last + 1 - _EDGE_FACETS), last + 1)
     force_beyond = np.cumsum(force[::-1])[::-1]
     beyond = force_beyond[at_edge] ** (2 / 3)

@@ -36,14 +36,13 @@ class Table:
     def __str__(self) -> str:
         """In columns two spaces apart; without a line of headings where all are empty."""
         lines = [list(self.headings), *self.rows] if any(self.headings) else self.rows
-        width = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        return "\n".join(
-            "  ".join(
-                cell.ljust(w) if k < self.left else cell.rjust(w)
-                for k, (cell, w) in enumerate(zip(line, width, strict=True))
-            ).rstrip()
-            for line in lines
-        )
+        columns = []
+        for k, cells in enumerate(zip(*lines, strict=True)):
+            width = max(map(len, cells))
+            aligned = str.ljust if k < self.left else str.rjust
+            columns.append([aligned(cell, width) for cell in cells])
+        aligned_lines = zip(*columns, strict=True)
+        return "\n".join("  ".join(line).rstrip() for line in aligned_lines)
 
     def within(self, width: int) -> str:
         """As `str`, but in blocks of columns that are no wider than ``width``, each beginning with
@@ -59,10 +58,10 @@ class Table:
         parts = []
         for block in blocks:
             columns = [0, *block]
+            headings = [self.headings[k] for k in columns]
             rows = ([row[k] for k in columns] for row in self.rows)
-            parts.append(
-                str(Table(*(self.headings[k] for k in columns), rows=rows, left=self.left))
-            )
+            part = Table(*headings, rows=rows, left=self.left)
+            parts.append(str(part))
         return "\n\n".join(parts)
 
     def markdown(self) -> str:

@@ -41,27 +41,28 @@ def bushing(
     outside", ..., "bore", "outer edge" and "axis" (y = 0).
     """
     rings = [(inner / radius, outer / radius) for inner, outer in rings]
-    size = min(element_size / radius, *(longest_edge(outer - inner) for inner, outer in rings))
+    longest = [longest_edge(outer - inner) for inner, outer in rings]
+    size = min(element_size / radius, *longest)
     within = [1.0, *(outer for _, outer in rings)]
     gaps = [touching * max(inner - r, 0.0) for (inner, _), r in zip(rings, within, strict=False)]
     shifts = [sum(gaps[i:]) for i in range(len(rings) + 1)]
     names = ["pin", *(f"sleeve {k}" for k in range(1, len(rings))), "housing"]
-    sets = [(f"{name} inside", f"{name} outside") for name in names[1:-1]] + [
-        ("bore", "outer edge")
-    ]
-    sketch = Sketch(names, ["pin", "flat", *(name for pair in sets for name in pair), "axis"])
-    sketch.pin(shifts[0], 1, pin)
-    sketch.bores.append(Bore(sets[0][0], size, growth))
-    sketch.sizes["pin"] = f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"
-    for body, pair, (inner, outer), x in zip(names[1:], sets, rings, shifts[1:], strict=True):
+    of_sleeves = [(f"{name} inside", f"{name} outside") for name in names[1:-1]]
+    sets = [*of_sleeves, ("bore", "outer edge")]
+    of_rings = [name for pair in sets for name in pair]
+    sketch = Sketch(names, ["pin", "flat", *of_rings, "axis"])
+    x_pin, *x_rings = shifts
+    sketch.pin(x_pin, 1, pin)
+    sketch.bores.append(Bore(of_rings[0], size, growth))
+    sketch.sizes["pin"] = f"{size!r} + {growth!r} * Abs({around(x_pin)} - 1)"
+    for body, pair, (inner, outer), x in zip(names[1:], sets, rings, x_rings, strict=True):
         draw_ring(sketch, body, pair, (inner, outer), x, 1, size)
         r = around(x)
         nearest = between(x, inner, outer)
         away = f"{r} - {inner!r}" if body == "housing" else nearest
         sketch.sizes[body] = f"{size!r} * {r} + {growth!r} * Abs({away})"
-    sketch.parts |= {
-        line: math.pi / 2 / size for name in sketch.circles for line in sketch.lines[name]
-    }
+    n_edges = math.pi / 2 / size
+    sketch.parts |= {line: n_edges for name in sketch.circles for line in sketch.lines[name]}
     return mesh_joint(comm, sketch, radius=radius, **options)
 
 

@@ -49,7 +49,8 @@ def solid_clevis(
     bottom = half + space["gap"] / radius
     top = bottom + outer["thickness"] / radius
     plates = plates_of({"inner": inner, "outer": outer}, radius, hole + wall)
-    size = min(element_size / radius, *(plate.ligament / ACROSS for plate in plates.values()))
+    longest = [plate.ligament / ACROSS for plate in plates.values()]
+    size = min(element_size / radius, *longest)
     if wall:
         size = min(size, longest_edge(wall))
     pinned = max(hole - 1, 0.0)
@@ -58,11 +59,10 @@ def solid_clevis(
     rims = {"inner": (half,), "outer": (bottom, top)}
     sleeves = {name: f"{name} bushing" for name in plates} if wall else {}
     walls = {name: (f"{body} inside", f"{body} outside") for name, body in sleeves.items()}
-    sets = ["pin", "pin inside", "flat", "axis", *(f"{n} {part}" for n in plates for part in _SETS)]
-    sketch = Sketch(
-        ["pin", *plates, *sleeves.values()],
-        [*sets, *(name for pair in walls.values() for name in pair)],
-    )
+    of_plates = [f"{name} {part}" for name in plates for part in _SETS]
+    of_sleeves = [name for pair in walls.values() for name in pair]
+    sets = ["pin", "pin inside", "flat", "axis", *of_plates, *of_sleeves]
+    sketch = Sketch(["pin", *plates, *sleeves.values()], sets)
     slabs = []
     for name, plate in plates.items():
         at = places[name]

@@ -41,7 +41,8 @@ class StepFile:
     """
 
     def __init__(self, path: Path, fixed: Arrays, after: int = 0, *, apart: bool = False) -> None:
-        self.path, self._apart = path, apart
+        self.path = path
+        self._apart = apart
         self.loads: list[float] = []
         self.names: list[set[str]] = []
         self._next = self._read_next(after) if path.exists() else None
@@ -61,20 +62,26 @@ class StepFile:
 
     def _kept(self, load: float, arrays: Arrays) -> Arrays:
         """The ``arrays``, those that the file has of this step as they are there."""
-        there, self._next = self._next, None
-        if there is None or there[0] != load:
+        there = self._next
+        self._next = None
+        if there is None:
             return arrays
-        kept = {name: there[1].get(name, array) for name, array in arrays.items()}
+        load_there, arrays_there = there
+        if load_there != load:
+            return arrays
+        kept = {name: arrays_there.get(name, array) for name, array in arrays.items()}
         same = all(kept[name].shape == np.shape(array) for name, array in arrays.items())
         return kept if same else arrays
 
     def _add_step(self, load: float, arrays: Arrays) -> None:
         self.loads.append(load)
         self.names.append(set(arrays))
-        self._add(len(self.loads), arrays)
-        self._file["accepted"][()] = len(self.loads)
-        self._file["load"].resize((len(self.loads),))
-        self._file["load"][-1:] = load
+        n_steps = len(self.loads)
+        self._add(n_steps, arrays)
+        self._file["accepted"][()] = n_steps
+        loads = self._file["load"]
+        loads.resize((n_steps,))
+        loads[-1:] = load
 
     def _add(self, step: int, arrays: Arrays) -> None:
         """The arrays of ``step``, 0 for the fixed ones."""
@@ -114,9 +121,8 @@ class StepFile:
         steps: dict[str, Arrays] = {}
         try:
             with h5py.File(self.path) as file:
-                fits = all(
-                    name not in file or file[name].shape == a.shape for name, a in fixed.items()
-                )
+                there = {name: a for name, a in fixed.items() if name in file}
+                fits = all(file[name].shape == a.shape for name, a in there.items())
                 if file["accepted"][()] < after or not fits:
                     raise ValueError(f"it does not hold the first {after} steps of this run")
                 loads = file["load"][:after].tolist()

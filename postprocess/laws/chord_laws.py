@@ -44,10 +44,12 @@ def plastic_winkler(joint: LawJoint, delta: Array) -> LawState:
     # 2/3 - s + s^3/3, the elastic flank's share, as a product that does not cancel where s nears
     # one
     flank = (below / (1 + s)) ** 2 * (2 + s) / 3
-    P = 4 * joint.radius * root * (uncut * flank + p0 * s)
-    slope = flank + (flank + below * s) * dR / (2 * (dR + delta))
-    stiffness = 4 * joint.k * joint.E_star * root * slope
-    return LawState(delta, P, stiffness, p0, 2 * np.arcsin(root))
+    mean_pressure = uncut * flank + p0 * s
+    P = 4 * joint.radius * root * mean_pressure
+    widening = (flank + below * s) * dR / (2 * (dR + delta))
+    stiffness = 4 * joint.k * joint.E_star * root * (flank + widening)
+    semi_angle = 2 * np.arcsin(root)
+    return LawState(delta, P, stiffness, p0, semi_angle)
 
 
 def parabola(joint: LawJoint, delta: Array) -> LawState:

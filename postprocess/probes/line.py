@@ -39,7 +39,8 @@ def along_line(run: Probed, line: Sequence[float], quantity: str, step: int) -> 
     inside = ~np.isnan(found)
     if not inside.any():
         raise InputError(f"{run.folder}: no body lies on the line.")
-    return Along(x[inside], share[inside] * np.linalg.norm(end - start), found[inside])
+    length = np.linalg.norm(end - start)
+    return Along(x[inside], share[inside] * length, found[inside])
 
 
 def _values(run: Probed, fields: Fields, x: Array, quantity: str) -> Array:
@@ -82,7 +83,8 @@ def _between_nodes(fields: Fields, x: Array, values: Array) -> Array:
     for body in fields.bodies.values():
         nodes = fields.triangles[fields.body == body].reshape(-1, 3)
         triangle, weights = _in_triangles(fields.coordinates[nodes], x)
-        here = (weights * values[nodes[triangle]]).sum(axis=1)
+        at_corners = values[nodes[triangle]]
+        here = (weights * at_corners).sum(axis=1)
         found = np.where(np.isnan(found) & (triangle >= 0), here, found)
     return found
 
@@ -95,7 +97,8 @@ def _of_cells(fields: Fields, x: Array, values: Array) -> Array:
         triangles = fields.triangles[cells]
         corners = fields.coordinates[triangles.reshape(-1, 3)]
         triangle, _ = _in_triangles(corners, x)
-        here = values[cells[triangle // triangles.shape[1]]]
+        cell = cells[triangle // triangles.shape[1]]
+        here = values[cell]
         found = np.where(np.isnan(found) & (triangle >= 0), here, found)
     return found
 

@@ -18,21 +18,24 @@ def meeting(fields: Fields, edge: str) -> np.ndarray:
             f'edge {edge!r}: in space an edge is "A & B", where two of the surfaces meet: {known}.'
         )
     one, other = (_edges_of(fields.edges[name]) for name in sides)
-    shared = one[np.isin(one[:, 1], other[:, 1])]  # edges have their middles alone
+    is_shared = np.isin(one[:, 1], other[:, 1])  # edges have their middles alone
+    shared = one[is_shared]
     _, once = np.unique(shared[:, 1], return_index=True)
     return _chained(shared[once], edge)
 
 
 def _edges_of(faces: np.ndarray) -> np.ndarray:
     """The edges ``(k, 3)`` of ``faces`` ``(m, 6)`` or ``(m, 9)``."""
-    return faces[:, EDGES[faces.shape[1]]].reshape(-1, 3)
+    of_face = EDGES[faces.shape[1]]
+    return faces[:, of_face].reshape(-1, 3)
 
 
 def _chained(edges: np.ndarray, name: str) -> np.ndarray:
     """The ``edges`` ``(k, 3)`` in the order of one curve, each turned along it. Raises
     `InputError`."""
     vertices, count = np.unique(edges[:, [0, 2]], return_counts=True)
-    starts = [*vertices[count == 1], *vertices]  # a closed curve has no end
+    ends = vertices[count == 1]
+    starts = [*ends, *vertices]  # a closed curve has no end
     at = int(starts[0]) if starts else 0
     left = [(int(start), middle, int(end)) for start, middle, end in edges]
     chain = []

@@ -93,7 +93,8 @@ class Condensed(Strategy):
 
     def _dofs(self, nodes: np.ndarray) -> np.ndarray:
         """All dofs of each of ``nodes``."""
-        return (self.dimension * nodes[:, None] + np.arange(self.dimension)).ravel()
+        dofs = self.dimension * nodes[:, None] + np.arange(self.dimension)
+        return dofs.ravel()
 
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, d m)`` under unit forces at ``dofs`` ``(d m,)``, one
@@ -141,7 +142,8 @@ class Condensed(Strategy):
     def at_nodes(self, own: Array) -> Array:
         """What this rank has for its block dofs, ``own`` ``(n, d)``, for the nodes ``(m, d)`` on
         every rank."""
-        return self._on_all(self._dofs(self._nodes), own.ravel()).reshape(-1, self.dimension)
+        values = self._on_all(self._dofs(self._nodes), own.ravel())
+        return values.reshape(-1, self.dimension)
 
     def _sum(self, values: Array) -> Array:
         if self.comm.size > 1:
@@ -152,7 +154,8 @@ class Condensed(Strategy):
         """Let this rank's blocks of `update` be at block dofs ``rows``, among the nodes, and
         ``columns`` ``(b,)``, each place once; all are zero."""
         d = self.dimension
-        self.near = np.unique(np.concatenate(self.comm.allgather(np.unique(columns))))
+        of_ranks = self.comm.allgather(np.unique(columns))
+        self.near = np.unique(np.concatenate(of_ranks))
         self._columns = self._dofs(self.near)
         self._row = np.searchsorted(self._nodes, rows)
         column = np.searchsorted(self.near, columns)

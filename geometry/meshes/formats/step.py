@@ -42,11 +42,13 @@ def mesh_step(gmsh: Any, path: Path, order: int, sizes: Sizes) -> None:
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
     if not solids:
         raise ValueError("has no solid, only faces or curves")
-    labels = {tag: gmsh.model.getEntityName(3, tag).split("/")[-1] for tag in solids}
+    paths = {tag: gmsh.model.getEntityName(3, tag) for tag in solids}
+    labels = {tag: path.split("/")[-1] for tag, path in paths.items()}
     labels = {tag: name for tag, name in labels.items() if not name.startswith(_NAMELESS)}
     bodies = _sets("solid", solids, labels)
     surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
-    faces = _sets("face", surfaces, _face_names(gmsh, path, solids))
+    face_names = _face_names(gmsh, path, solids)
+    faces = _sets("face", surfaces, face_names)
     for dim, sets in ((3, bodies), (2, faces)):
         for name, tags in sets.items():
             gmsh.model.addPhysicalGroup(dim, tags, name=name)
@@ -65,8 +67,8 @@ def _sets(what: str, tags: list[int], names: Mapping[int, str]) -> dict[str, lis
 
 
 def _set_sizes(gmsh: Any, faces: Mapping[str, list[int]], sizes: Sizes) -> None:
-    box = np.array(gmsh.model.getBoundingBox(-1, -1))
-    largest = sizes.size or np.max(box[3:] - box[:3]) / _ACROSS
+    lowest, highest = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+    largest = sizes.size or np.max(highest - lowest) / _ACROSS
     gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _AROUND)
     field = gmsh.model.mesh.field
@@ -76,8 +78,9 @@ def _set_sizes(gmsh: Any, faces: Mapping[str, list[int]], sizes: Sizes) -> None:
             raise ValueError(f"there is no face {name!r} for a size; there are {', '.join(faces)}")
         away = field.add("Distance")
         field.setNumbers(away, "SurfacesList", faces[name])
-        grown.append(field.add("MathEval"))
-        field.setString(grown[-1], "F", f"{on_face} + {_GROWTH} * F{away}")
+        growing = field.add("MathEval")
+        field.setString(growing, "F", f"{on_face} + {_GROWTH} * F{away}")
+        grown.append(growing)
     if grown:
         smallest = field.add("Min")
         field.setNumbers(smallest, "FieldsList", grown)
