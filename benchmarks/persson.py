@@ -28,12 +28,10 @@ def persson_joint(
 def unlike(pin: tuple[float, float], block: tuple[float, float]) -> tuple[dict[str, dict], float]:
     """Sections and Dundurs' alpha (positive: the pin is stiffer) of bodies given by shear modulus
     and nu."""
-    bodies = {
-        name: {"E": 2 * mu * (1 + nu), "nu": nu}
-        for name, (mu, nu) in (("pin", pin), ("block", block))
-    }
-    modulus = [2 * mu / (1 - nu) for mu, nu in (pin, block)]
-    return bodies, (modulus[0] - modulus[1]) / sum(modulus)
+    given = {"pin": pin, "block": block}
+    bodies = {name: {"E": 2 * mu * (1 + nu), "nu": nu} for name, (mu, nu) in given.items()}
+    of_pin, of_block = (2 * mu / (1 - nu) for mu, nu in given.values())
+    return bodies, (of_pin - of_block) / (of_pin + of_block)
 
 
 def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
@@ -45,5 +43,6 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
         return (2 - closing) / (2 * np.pi * b2 * (1 + b2)) - load
 
     eps = 2 * np.arctan(brentq(excess, 1e-6, 1e3))
-    peak = persson_pressure(LawJoint(1.0, DR, 1.0), np.array(1.0), np.array(eps), np.array(0.0))
+    joint = LawJoint(1.0, DR, 1.0)
+    peak = persson_pressure(joint, np.array(1.0), np.array(eps), np.array(0.0))
     return float(eps), float(peak)

@@ -13,7 +13,10 @@ from archord import (
     solve,
 )
 
-E, nu, yield_stress, depth = 1.0, 0.3, 0.002, 0.02
+E = 1.0
+nu = 0.3
+yield_stress = 0.002
+depth = 0.02
 
 mesh = rectangles({"lower": (0, 0, 1, 1), "middle": (0, 1, 1, 1), "upper": (0, 2, 1, 1)}, size=0.3)
 steel = Elastic(E, nu)

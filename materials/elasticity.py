@@ -92,7 +92,8 @@ class Elastic(Material):
     @property
     def lame(self) -> tuple[float, float]:
         """Lame's constants ``(lambda, mu)``."""
-        E, nu = self.E, self.nu
+        E = self.E
+        nu = self.nu
         return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
     @property

@@ -143,7 +143,8 @@ class Points:
     """
 
     def __init__(self, material: Any, n: int) -> None:
-        self.material, self.n = material, n
+        self.material = material
+        self.n = n
         self.acting = material
         self.state = self.trial = material.state(n)
         self.yields = bool(getattr(material, "yields", False))

@@ -42,7 +42,8 @@ def metal(name: str, unit: str) -> dict[str, Any]:
         raise ValueError(f"is not a known material; {hint}Materials are {', '.join(metals())}")
     if unit not in _PER_MPA:
         raise ValueError(f"needs a units.stress that is one of {', '.join(_PER_MPA)}, not {unit}")
-    found, scale = metals()[name], _PER_MPA[unit]
+    found = metals()[name]
+    scale = _PER_MPA[unit]
     scaled = {key: scale * found[key] for key in ("E", "yield", "tensile")}
     points = [[peeq, scale * stress] for peeq, stress in found["hardening"]]
     return scaled | {"nu": found["nu"], "hardening": points}

@@ -191,7 +191,8 @@ def per_step(system: System) -> tuple[str, ...]:
 
 def surface_profiles(system: System) -> dict[str, Any]:
     """Contact state along the integrated surfaces, by name, at the last evaluation. Collective."""
-    u, found = system.equilibrium.displacement(), {}
+    u = system.equilibrium.displacement()
+    found = {}
     for name, side in system.sides.items():
         pair = system.contact.pair_of(side)
         if pair is None:  # it is not integrated

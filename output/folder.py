@@ -66,12 +66,11 @@ def claim_folder(folder: Path, force: bool) -> None:
     without ``force``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        empty, fault = (
-            not any(folder.iterdir()),
-            "" if os.access(folder, os.W_OK) else "Permission denied",
-        )
+        empty = not any(folder.iterdir())
+        fault = "" if os.access(folder, os.W_OK) else "Permission denied"
     except OSError as error:
-        empty, fault = True, error.strerror or str(error)
+        empty = True
+        fault = error.strerror or str(error)
     if fault:
         raise InputError(f"{folder}: cannot be used for results: {fault}.")
     if not (empty or force):

@@ -24,9 +24,10 @@ def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Record]
     text = io.StringIO(newline="")
     table = csv.writer(text)
     table.writerow([heading for heading, _ in columns])
-    for m in steps:
-        values = (value(m) for _, value in columns)
-        table.writerow([str(v) if isinstance(v, int) else f"{v:.12g}" for v in values])
+    for step in steps:
+        values = [value(step) for _, value in columns]
+        row = [str(v) if isinstance(v, int) else f"{v:.12g}" for v in values]
+        table.writerow(row)
     replace_file(path, text.getvalue())
 
 
@@ -60,8 +61,9 @@ def read_history(path: str | Path) -> dict[str, list[float]]:
     [120.5, 260.0]
     """
     text = Path(path).read_bytes().decode()
-    heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
-    names = [h.split(" [")[0] for h in heading]
+    whole = text[: text.rfind("\n") + 1]
+    headings, *rows = csv.reader(io.StringIO(whole, newline=""))
+    names = [heading.split(" [")[0] for heading in headings]
     if any(len(row) != len(names) for row in rows):
         raise ValueError("rows are not as long as the headings")
     return {name: [float(row[i]) for row in rows] for i, name in enumerate(names)}
@@ -84,7 +86,8 @@ def fault_of_history(columns: Mapping[str, Sequence[float]], report: Mapping[str
         if lost:
             return f"has no column {lost[0]!r}, which run.json has"
         for name in values.keys() & columns.keys():
-            told, here = values[name], columns[name][k]
+            told = values[name]
+            here = columns[name][k]
             if isinstance(told, int | float) and not math.isclose(
                 told, here, rel_tol=_SAME, abs_tol=_NOTHING
             ):

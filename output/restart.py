@@ -65,7 +65,8 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
             return Plan(scene, None, said)
         return _plan_without_checkpoint(folder, scene)
     start = _start(folder, scene)
-    step, total = start.checkpoint.step, len(scene.targets)
+    step = start.checkpoint.step
+    total = len(scene.targets)
     if extend and step == total:
         raise InputError(
             f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further."

@@ -135,7 +135,8 @@ def line_load(
         plane = axis.meets(number, at)
         if plane is None:
             continue
-        begin, end = np.concatenate(low), np.concatenate(high)
+        begin = np.concatenate(low)
+        end = np.concatenate(high)
         low += [2 * plane - end]
         high += [2 * plane - begin]
         halves = np.concatenate(force) / 2

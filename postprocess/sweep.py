@@ -141,7 +141,8 @@ class Sweep:
     @cached_property
     def _found(self) -> tuple[dict[int, Run], dict[int, str]]:
         """Runs that can be read, and why runs of other cases that are done cannot."""
-        found, faults = {}, {}
+        found = {}
+        faults = {}
         first = self.cases.drop_duplicates("run")
         for case, status in zip(first["case"], first["status"], strict=True):
             try:

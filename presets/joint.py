@@ -41,8 +41,11 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     Raises `InputError` if the scene leaves the mesh open.
     """
     scene.require_mesh()
-    g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
-    ring, rigid = g.is_ring, scene.pin.rigid
+    g = scene.joint
+    analysis = scene.analysis
+    by_force = scene.force_controlled
+    ring = g.is_ring
+    rigid = scene.pin.rigid
     stiffness = (
         scene.E_star * scene.thickness if by_force else 1.0
     )  # by which a load is about a displacement

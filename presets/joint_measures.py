@@ -104,7 +104,8 @@ class JointMeasures:
         }
         energy = scene.units.energy_of(scene.analysis.thickness)
         units = {measure.name: measure.unit for measure in self.measures()}
-        first, rest = list(units)[:_N_OF_CONTACT], list(units)[_N_OF_CONTACT:]
+        first = list(units)[:_N_OF_CONTACT]
+        rest = list(units)[_N_OF_CONTACT:]
         units |= dict.fromkeys((*ENERGIES, "work"), energy)
         units |= {"contact_area": scene.units.length, "seconds": "s"}
         friction = ENERGIES[2:] if self.system.contact.has_friction else ()

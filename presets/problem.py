@@ -52,9 +52,11 @@ def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
     if "plane" in scene.analysis.model_fields_set:
         if in_space == (plane == "space"):
             return scene
-        drawn, allowed = "a plane mesh", '"strain", "stress" or "axisymmetric"'
+        drawn = "a plane mesh"
+        allowed = '"strain", "stress" or "axisymmetric"'
         if in_space:
-            drawn, allowed = "a mesh of solids", '"space"'
+            drawn = "a mesh of solids"
+            allowed = '"space"'
         said = f"must be {allowed} for {drawn}"
         raise InputError(f'{mesh_name(scene)}: analysis.plane = "{plane}" {said}.')
     if not in_space and not scene.in_space:

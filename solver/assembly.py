@@ -33,13 +33,15 @@ def matrix(
         slot_owned.append(columns[: offsets[n]] < n)
     row = np.concatenate(slot_rows)
     owned = np.concatenate(slot_owned)
+    n_others = index_map.size_global - n
     in_owned = np.minimum(np.bincount(row[owned], minlength=n), n)
-    in_ghosts = np.minimum(np.bincount(row[~owned], minlength=n), index_map.size_global - n)
+    in_ghosts = np.minimum(np.bincount(row[~owned], minlength=n), n_others)
     nnz = [in_owned.astype(PETSc.IntType), in_ghosts.astype(PETSc.IntType)]
     sizes = [[block * n, None]] * 2
     A = PETSc.Mat().createBAIJ(sizes, bsize=block, nnz=nnz, comm=V.mesh.comm)
-    nodes = index_map.local_to_global(np.arange(n + index_map.num_ghosts, dtype=np.int32))
-    lgmap = PETSc.LGMap().create(nodes.astype(PETSc.IntType), bsize=block, comm=V.mesh.comm)
+    local = np.arange(n + index_map.num_ghosts, dtype=np.int32)
+    nodes = index_map.local_to_global(local).astype(PETSc.IntType)
+    lgmap = PETSc.LGMap().create(nodes, bsize=block, comm=V.mesh.comm)
     A.setLGMap(lgmap, lgmap)
     A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
     return A

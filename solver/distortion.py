@@ -37,7 +37,9 @@ class DistortionMeter:
     def __init__(
         self, V: fem.FunctionSpace, cells: Mapping[int, np.ndarray], kinematics: Kinematics
     ) -> None:
-        self.V, self.cells, self.kinematics = V, cells, kinematics
+        self.V = V
+        self.cells = cells
+        self.kinematics = kinematics
         self._gradients: dict[int, PointStrain] = {}
 
     def __call__(self, u: Array) -> Distortion:
@@ -45,7 +47,8 @@ class DistortionMeter:
         worst = Distortion()
         distortion = _in_space if self.kinematics.dimension == 3 else _in_plane
         for tag in self.cells:
-            worst = worst.joined(distortion(tag, self._gradient(tag)(u)))
+            gradient = self._gradient(tag)(u)
+            worst = worst.joined(distortion(tag, gradient))
         return worst
 
     def _gradient(self, tag: int) -> PointStrain:
@@ -54,7 +57,8 @@ class DistortionMeter:
             cells = self.cells[tag]
             corners = basix.geometry(self.V.mesh.basix_cell())
             X = np.vstack([corners.mean(axis=0), corners])
-            basis = cell_basis(self.V.mesh, self.V.element.basix_element.degree, cells, X)
+            degree = self.V.element.basix_element.degree
+            basis = cell_basis(self.V.mesh, degree, cells, X)
             dofs = self.V.dofmap.list[cells]
             self._gradients[tag] = PointStrain(self.kinematics, basis, dofs, large=True)
         return self._gradients[tag]

@@ -25,7 +25,9 @@ _CORNER = 450.0, 250.0
 def iron_mesh(finer: int) -> TaggedMesh:
     """An iron with a round face that touches a slab in (0.8, 4)."""
     sketch = Sketch(["iron", "slab"], ["face", "round", "grip", "top", "base"])
-    left, tip, right = (0.2, 4.3), (0.8, 4.0), (1.4, 4.3)
+    left = (0.2, 4.3)
+    tip = (0.8, 4.0)
+    right = (1.4, 4.3)
     round_face = sketch.path("iron", left, tip, right, on=Circle("round", (0.8, 4.75), 0.75))
     high = [(1.4, 5.2), (0.2, 5.2)]
     up, grip, down = sketch.path("iron", right, *high, left)
@@ -101,7 +103,9 @@ def press_fit_mesh(finer: int) -> TaggedMesh:
     x, y = _CORNER
     aside = ROUND * (1 - np.sqrt(0.5))
     sketch = Sketch(["block", "wall"], ["under", "top", "left", "floor", "sides", "base"])
-    begin, middle, end = (x - ROUND, y), (x - aside, y + aside), (x, y + ROUND)
+    begin = (x - ROUND, y)
+    middle = (x - aside, y + aside)
+    end = (x, y + ROUND)
     nose = sketch.path(
         "block", begin, middle, end, on=Circle("nose", (x - ROUND, y + ROUND), ROUND)
     )

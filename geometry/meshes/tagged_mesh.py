@@ -86,11 +86,11 @@ class TaggedMesh:
         x = V.tabulate_dof_coordinates()[:, : points.shape[1]]
         here = cKDTree(x).query_ball_point(points, near)
         n_owned = V.dofmap.index_map.size_local
-        found = comm.allreduce(np.array([sum(dof < n_owned for dof in dofs) for dofs in here]))
-        for at in points[found != alike]:
+        owned = [sum(dof < n_owned for dof in dofs) for dofs in here]
+        found = comm.allreduce(np.array(owned))
+        for x, y, *_ in points[found != alike]:
             raise ValueError(
-                f"the point set {name!r} does not tell which node at ({at[0]:g}, {at[1]:g}) it "
-                "means"
+                f"the point set {name!r} does not tell which node at ({x:g}, {y:g}) it means"
             )
         return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
 
@@ -102,8 +102,8 @@ class TaggedMesh:
 
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
-        behind = self.cells_behind(name)
-        here = np.unique(self.cells.values[np.isin(self.cells.indices, behind)]).tolist()
+        behind = np.isin(self.cells.indices, self.cells_behind(name))
+        here = np.unique(self.cells.values[behind]).tolist()
         parts: list[list[int]] = self.mesh.comm.allgather(here)
         return set().union(*parts)
 

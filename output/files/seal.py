@@ -48,7 +48,8 @@ def fault_of(folder: Path, name: str, seals: Seals, *, by_size: bool = False) ->
     it is what the run left, or no seal tells. ``by_size`` looks at the number of bytes alone."""
     if name not in seals:
         return ""
-    seal, path = seals[name], folder / name
+    seal = seals[name]
+    path = folder / name
     try:
         size = path.stat().st_size
         if size != seal["bytes"]:

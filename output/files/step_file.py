@@ -140,7 +140,8 @@ class StepFile:
 def put(file: h5py.File, name: str, values: np.ndarray) -> None:
     """``file[name] = values``, in a third of its time."""
     array = np.ascontiguousarray(values)
-    kind, space = h5py.h5t.py_create(array.dtype), h5py.h5s.create_simple(array.shape)
+    kind = h5py.h5t.py_create(array.dtype)
+    space = h5py.h5s.create_simple(array.shape)
     dataset = h5py.h5d.create(file.id, name.encode(), kind, space, lcpl=_GROUPS)
     dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, array)
 

@@ -34,16 +34,19 @@ def step_grid(
     topology, _ = CELLS[per_cell]
     connectivity = _data(f"{n_cells} {per_cell}", 0, "mesh/cells", "Int")
     points = _data(in_space, 0, "mesh/coordinates")
+    displacement = _data(in_space, step, "displacement")
     attributes = f'TopologyType="{topology}" NumberOfElements="{n_cells}"'
     lines = [
         f"<Topology {attributes}>{connectivity}</Topology>",
         f'<Geometry GeometryType="XYZ">{points}</Geometry>',
-        _attribute("displacement", "Vector", "Node", _data(in_space, step, "displacement")),
+        _attribute("displacement", "Vector", "Node", displacement),
     ]
     for name in of_nodes:
-        lines.append(_attribute(name, "Scalar", "Node", _data(f"{n_nodes}", step, name)))
+        values = _data(f"{n_nodes}", step, name)
+        lines.append(_attribute(name, "Scalar", "Node", values))
     for name in of_cells:
-        lines.append(_attribute(name, "Scalar", "Cell", _data(at_cells, step, name)))
+        values = _data(at_cells, step, name)
+        lines.append(_attribute(name, "Scalar", "Cell", values))
     body = _data(at_cells, 0, "mesh/body", "Int", 4)
     lines.append(_attribute("body", "Scalar", "Cell", body))
     return "\n".join(lines)

@@ -86,13 +86,13 @@ class ClevisPin:
         Each plate bears by its force, or over all its length. The arm is the smallest of the four
         cases, so the force is the largest.
         """
+        inner_force, outer_force = plates
         lengths = (self.inner / 2, self.outer)
-        per_length = (plates[0] / self.inner, plates[1] / (2 * self.outer))
+        per_length = (inner_force / self.inner, outer_force / (2 * self.outer))
         found = []
-        for inner_by_force, outer_by_force in product((False, True), repeat=2):
+        for by_force in product((False, True), repeat=2):
             arm = self.gap
             per_force = 0.0
-            by_force = (inner_by_force, outer_by_force)
             for length, w, is_free in zip(lengths, per_length, by_force, strict=True):
                 if is_free:
                     per_force += 1 / (4 * w)

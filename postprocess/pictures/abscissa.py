@@ -20,8 +20,9 @@ def abscissa(probes: Sequence[Probe]) -> tuple[list[Array], str]:
     that touch have the body on their left and so run against each other. Other edges have their
     arc length.
     """
-    if all(probe.angle is not None for probe in probes):
-        return _turned([probe.angle for probe in probes if probe.angle is not None]), "angle [°]"
+    angles = [probe.angle for probe in probes if probe.angle is not None]
+    if len(angles) == len(probes):
+        return _turned(angles), "angle [°]"
     first = probes[0]
     if len({probe.place for probe in probes}) > 1:
         x = np.concatenate([probe.x for probe in probes])
@@ -49,4 +50,6 @@ def _turned(angles: list[Array]) -> list[Array]:
 def _is_whole(angle: Array) -> bool:
     """Whether points at these angles leave no gap in a circle that is wider than between them."""
     placed = np.sort(angle)
-    return bool(360 - np.ptp(placed) <= 2 * np.diff(placed).max(initial=0.0))
+    left = 360 - np.ptp(placed)
+    widest = np.diff(placed).max(initial=0.0)
+    return bool(left <= 2 * widest)

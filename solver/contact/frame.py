@@ -18,10 +18,12 @@ def plane_frames(normal: Array) -> Array:
 def frames_at_rest(normal: Array) -> Array:
     """Frames ``(m, 3, 3)`` of points in space with the unit ``normal`` ``(m, 3)``: the first
     tangent leads along the coordinate axis that is least along the normal, as far as it may."""
-    axis = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    least = np.abs(normal).argmin(axis=1)
+    axis = np.eye(3)[least]
     along_normal = np.einsum("mi,mi->m", axis, normal)
-    tangent = unit(axis - along_normal[:, None] * normal)
-    return np.stack([normal, tangent, np.cross(normal, tangent)], axis=1)
+    first = unit(axis - along_normal[:, None] * normal)
+    second = np.cross(normal, first)
+    return np.stack([normal, first, second], axis=1)
 
 
 class TurningFrames:
@@ -38,8 +40,9 @@ class TurningFrames:
     def __init__(self, at_rest: Array, normal: Array) -> None:
         along_normal = np.einsum("mij,mj->mi", at_rest, normal)
         start, first, second = along_normal.T
-        tilt = along_normal[:, 1:] / (1 + start)[:, None]
+        divisor = (1 + start)[:, None]
+        tilt = along_normal[:, 1:] / divisor
         halfway = at_rest[:, 0] + normal
         tangents = at_rest[:, 1:] - tilt[:, :, None] * halfway[:, None]
         self.frame = np.concatenate([normal[:, None], tangents], axis=1)
-        self.spin = np.stack([second, -first], axis=1) / (1 + start)[:, None]
+        self.spin = np.stack([second, -first], axis=1) / divisor

@@ -27,14 +27,16 @@ class Diagnostics:
     def residual_on(self, nodes: np.ndarray) -> Array:
         """Sum ``(d,)`` of the residual over the owned ones of these ``nodes`` of all ranks."""
         owned = nodes[nodes < self.unknowns.n_owned]
-        return self.unknowns.comm.allreduce(self.evaluation.free_forces()[owned].sum(axis=0))
+        here = self.evaluation.free_forces()[owned].sum(axis=0)
+        return self.unknowns.comm.allreduce(here)
 
     def worst_place(self) -> tuple[float, ...] | None:
         """Where the residual is largest, over all ranks."""
         sizes = np.linalg.norm(self.evaluation.free_forces(), axis=1)
         sizes = np.nan_to_num(sizes, nan=-1.0, posinf=-1.0)
-        places = self.unknowns.V.tabulate_dof_coordinates()[:, : self.unknowns.dimension]
-        here: tuple[float, tuple[float, ...]] = -1.0, (0.0,) * self.unknowns.dimension
+        d = self.unknowns.dimension
+        places = self.unknowns.V.tabulate_dof_coordinates()[:, :d]
+        here: tuple[float, tuple[float, ...]] = -1.0, (0.0,) * d
         if len(sizes):
             at = int(sizes.argmax())
             here = sizes[at], tuple(places[at])

@@ -179,7 +179,8 @@ class Condensed(Strategy):
         touched[self._row[changed]] = 1.0
         row = self._dofs(np.flatnonzero(self._sum(touched)))
         D = self._sum(self._own_D[row])
-        self._D[row], used = D, np.flatnonzero(D.any(axis=0))
+        self._D[row] = D
+        used = np.flatnonzero(D.any(axis=0))
         self._DZ[row] = D[:, used] @ self._near_Z[used]
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:

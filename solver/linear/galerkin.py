@@ -69,7 +69,8 @@ class Galerkin:
         row = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
         fine, axis = np.divmod(row, d)
         n_coarse = self._P.getSize()[1] // d
-        pairs, pair = np.unique(fine * n_coarse + column // d, return_inverse=True)
+        coarse = column // d
+        pairs, pair = np.unique(fine * n_coarse + coarse, return_inverse=True)
         weight = np.zeros((len(pairs), d))
         weight[pair, axis] = value
         fine, coarse = np.divmod(pairs, n_coarse)
