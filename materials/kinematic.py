@@ -254,11 +254,11 @@ class KinematicMaterial(J2Material):
             length = _norm(eta)
             after = peeq + d_peeq
             strength = hardening.stress(after)
-            given_way = (3 * mu + theta @ C) * d_peeq
-            value = given_way + strength - np.sqrt(1.5) * length
+            relaxed = (3 * mu + theta @ C) * d_peeq
+            value = relaxed + strength - np.sqrt(1.5) * length
             hardened = 3 * mu + theta**2 @ C + hardening.slope(after)
-            longer = np.sqrt(1.5) * _dot(rate, eta) / length
-            fall = hardened - longer
+            lengthening = np.sqrt(1.5) * _dot(rate, eta) / length
+            fall = hardened - lengthening
             return value, fall, close, theta, eta, rate
 
         start = np.zeros(len(trial))

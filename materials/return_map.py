@@ -35,10 +35,10 @@ STEEP = 1e3
 _NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
 _STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
 # eigenvectors and eigenvalues of P on normal stresses, in plane stress and else
-_TWO = np.array([[1, 1], [-1, 1]]) / np.sqrt([[2], [2]])
-_IN_PLANE = _TWO, [1 / 3, 1.0]
-_THREE = np.array([[1, 1, 1], [-1, 1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]])
-_NORMAL = _THREE, [0.0, 1.0, 1.0]
+_VECTORS_IN_PLANE = np.array([[1, 1], [-1, 1]]) / np.sqrt([[2], [2]])
+_IN_PLANE = _VECTORS_IN_PLANE, [1 / 3, 1.0]
+_VECTORS = np.array([[1, 1, 1], [-1, 1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]])
+_NORMAL = _VECTORS, [0.0, 1.0, 1.0]
 
 
 @dataclass(frozen=True)

@@ -186,8 +186,8 @@ def on_circles(mesh: MeshArrays, circles: Sequence[Circle]) -> MeshArrays:
         nodes = np.unique(mesh.facets_of(circle.facets))
         foot = circle.foot(x[nodes])
         ray = x[nodes] - foot
-        longer = circle.radius / np.linalg.norm(ray, axis=1)
-        x[nodes] = foot + ray * longer[:, None]
+        stretch = circle.radius / np.linalg.norm(ray, axis=1)
+        x[nodes] = foot + ray * stretch[:, None]
     return replace(mesh, x=x)
 
 

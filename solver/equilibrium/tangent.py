@@ -224,8 +224,8 @@ class TangentMatrix:
         row_rate = self._slots.row_rate[at]
         on_rows = np.einsum("nij,njm->nim", blocks, self._slots.column_rate[at])
         on_columns = np.einsum("nim,nij->njm", row_rate, blocks)
-        between = np.tensordot(row_rate, on_rows, ((0, 1), (0, 1)))
-        D = between - rate @ load.T + load @ rate.T
+        by_contact = np.tensordot(row_rate, on_rows, ((0, 1), (0, 1)))
+        D = by_contact - rate @ load.T + load @ rate.T
         B = -load.T
         C = load.T.copy()
         for level in range(m):

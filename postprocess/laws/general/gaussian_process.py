@@ -94,8 +94,8 @@ class Process:
         for i, inverse in enumerate(self.inverses):
             start = i * _BLOCK
             rows = slice(start, start + _BLOCK)
-            left = right[rows] - self.factor[rows, :start] @ found[:start]
-            found[rows] = inverse @ left
+            remaining = right[rows] - self.factor[rows, :start] @ found[:start]
+            found[rows] = inverse @ remaining
         return found
 
     @cached_property

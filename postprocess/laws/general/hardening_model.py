@@ -186,9 +186,9 @@ def representative(
         return np.tensordot(model[f"{plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
 
     clearance = numbers[4]
-    none = np.zeros(len(x))
+    zeros = np.zeros(len(x))
     for i in hardens:
-        straight = Curve(s[i, 0], none, none)
+        straight = Curve(s[i, 0], zeros, zeros)
         at = At(x, straight, s[1 - i, 0], begins)
         strain[i] = clearance * np.exp(predicted(i, at))
     # of a body that does not harden nothing is missed: its row of the Jacobian is the identity's
