@@ -153,7 +153,7 @@ def _facts(scene: ProblemScene, system: System, file: str | None) -> dict[str, A
         for interface in system.contact.interfaces
     }
     model: dict[str, Any] = {"contact_shares": shares}
-    if system.mirrors:
+    if scene.in_space and system.mirrors:
         model["mirrors"] = [(mirror.axis, mirror.at) for mirror in system.mirrors]
     return {
         "mesh": sizes(system) | source,

@@ -119,8 +119,8 @@ class Mean:
     (moment) on the point. The facets get the force spread as the motion's derivative says, which is
     statically equivalent. Without a point the centroid is the point. A symmetric half that shows
     half of an edge gives no point: the mirrored facets take up the moment. Means of one ``name``
-    have one reaction. A drive has one mean at most. In space the mean is of the facets with their
-    images in the planes ``mirrors``, each an axis and a place on it.
+    have one reaction. A drive has one mean at most. The mean is of the facets with their images
+    in the ``mirrors``, each an axis and a place on it.
     """
 
     name: str

@@ -19,6 +19,7 @@ from archord.solver.conditions import DeadLoad, Mean
 from archord.solver.problem import Problem
 
 LOAD_DEGREE = 6  # of the quadrature of distributed forces
+_OUT_OF_PLANE = 2  # the axis about which a plane turns
 
 
 class Loads:
@@ -122,13 +123,14 @@ class Loads:
         lever = np.zeros(d) if mean.point is None else np.array(mean.point) - centre
         inertia = self._inertia(arm, ds)
         along = np.eye(d + len(turns))[mean.axis, :d]
+        about = np.arange(len(turns)) if len(turns) > 1 else np.array([_OUT_OF_PLANE])
         for axis, _ in mean.mirrors:
             along[axis] = 0.0
-            inertia[axis, np.arange(d) != axis] = 0.0
-            inertia[np.arange(d) != axis, axis] = 0.0
+            inertia[np.ix_(about == axis, about != axis)] = 0.0
+            inertia[np.ix_(about != axis, about == axis)] = 0.0
         by_rotations = self._by_rotations(mean.axis, lever, inertia)
         for axis, _ in mean.mirrors:
-            by_rotations[np.arange(d) != axis] = 0.0
+            by_rotations[about != axis] = 0.0
         density = ufl.inner(fem.Constant(mesh, along / length), v)
         for rotation, (i, j) in zip(by_rotations, turns, strict=True):
             moment = arm[i] * v[j] - arm[j] * v[i]

@@ -1,4 +1,4 @@
-"""The planes in space in which a part of a problem is mirrored.
+"""The lines and planes in which a part of a problem is mirrored.
 
 A part tells how often it makes up the whole, not where its mirrors are. They are the flat sets of
 facets at an end of the mesh that are held across themselves alone.
@@ -17,16 +17,15 @@ from archord.geometry.basis import Array
 from archord.solver.problem import Problem
 
 _FLAT = 1e-6  # of the size of the mesh: coordinates of files have so many digits
-_IN_SPACE = 3
 
 
 class Mirror(NamedTuple):
-    """A plane across an axis.
+    """A plane across an axis, in a plane a line.
 
     - ``axis``: number of the axis
-    - ``at``: the coordinate of the plane along it
-    - ``near``: the distance within which points are in the plane
-    - ``nodes``: block dofs ``(n,)`` on the plane, on this rank, ghosts included
+    - ``at``: the coordinate of the mirror along it
+    - ``near``: the distance within which points are in the mirror
+    - ``nodes``: block dofs ``(n,)`` in the mirror, on this rank, ghosts included
     """
 
     axis: int
@@ -36,12 +35,11 @@ class Mirror(NamedTuple):
 
 
 def mirrors_of(problem: Problem, V: fem.FunctionSpace) -> list[Mirror]:
-    """The mirrors of a ``problem`` in space, whose displacements are in ``V``; none where more sets
-    are held so than the part has mirrors, as nothing tells which of them are rollers.
-    Collective."""
-    d = problem.kinematics.dimension
-    if problem.symmetry == 1 or d < _IN_SPACE:
+    """The mirrors of a ``problem`` whose displacements are in ``V``; none where more sets are held
+    so than the part has mirrors, as nothing tells which of them are rollers. Collective."""
+    if problem.symmetry == 1:
         return []
+    d = problem.kinematics.dimension
     x = V.tabulate_dof_coordinates()[:, :d]
     lowest, highest = _ends(V.mesh.comm, x)
     near = _FLAT * float((highest - lowest).max())

@@ -4,7 +4,7 @@ path of its loads."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 
 import basix.ufl
 import numpy as np
@@ -74,8 +74,6 @@ class System(Totals):
         Cells of the mesh, on all ranks.
     drive_names : list of str
         Names of the drives, as of `driven`.
-    mirrors : list of Mirror
-        The planes in space in which the part on the mesh is mirrored.
 
     Raises
     ------
@@ -123,8 +121,12 @@ class System(Totals):
         self.cell_kind = f"{shape} {mesh.basix_cell().name}s"
         self.drive_names = self.equilibrium.drives.names
         self.mean_rates = cache(self._mean_rates)
-        self.mirrors = mirrors_of(problem, self.V)
         self._path: LoadPath | None = None
+
+    @cached_property
+    def mirrors(self) -> list[Mirror]:
+        """The lines or planes in which the part on the mesh is mirrored. Collective at first."""
+        return mirrors_of(self.problem, self.V)
 
     def _mean_rates(self, facets: str, point: tuple[float, ...] | None) -> Array:
         """Derivatives ``(d + t, n_owned, d)`` of `mean_motion` by the displacements."""

@@ -1,4 +1,4 @@
-"""A quarter in space tells the numbers of the whole, whose images it lacks."""
+"""A quarter tells the numbers of the whole, whose images it lacks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 import archord
-from archord import Body, Coupling, Elastic, Interaction, Load, Problem, Support, boxes
+from archord import (
+    Body,
+    Coupling,
+    Elastic,
+    Interaction,
+    Load,
+    Problem,
+    Support,
+    boxes,
+    rectangles,
+)
 
 SOFT = Elastic(1000.0, 0.3)
 HARD = Elastic(3000.0, 0.3)
@@ -87,4 +97,23 @@ def test_a_point_beside_a_face_of_a_quarter_is_refused(place, turns, tmp_path):
         return
     said = "has its point beside its facets, where 'push' would turn them: move the point along z"
     with pytest.raises(archord.InputError, match=said):
+        archord.solve(problem, tmp_path / "run")
+
+
+@pytest.mark.parametrize(("height", "turns"), [(1.0, False), (0.0, False), (3.0, True)])
+def test_a_point_beside_an_edge_of_a_half_is_refused(height, turns, tmp_path):
+    """In a plane, too."""
+    problem = Problem(
+        rectangles({"block": (0, 0, 2, 1)}, size=0.5),
+        bodies=[Body("block", SOFT)],
+        supports=[Support("block left"), Support("axis", on="block bottom", fixed="y")],
+        loads=[Load("push", on="end", direction="x", force=1.0)],
+        couplings=[Coupling("end", "block top", (1.0, height), "distributing")],
+        symmetry=2,
+        steps=1,
+    )
+    if not turns:
+        assert archord.solve(problem, tmp_path / "run").steps == 1
+        return
+    with pytest.raises(archord.InputError, match="move the point along y to the middle"):
         archord.solve(problem, tmp_path / "run")
