@@ -361,6 +361,11 @@ class RigidCircle:
         self.X = self.centre[None]
         self.connectivity = np.zeros((1, 1), dtype=np.int32)
 
+    @property
+    def farthest(self) -> float:
+        """The largest number of which distances from the disc are differences."""
+        return float(max(np.abs(self.centre).max(), self.radius))
+
     def closest_point(
         self, x: Array, outward: Array, displacement: Array, start: Index | None = None
     ) -> Projection:

@@ -137,6 +137,8 @@ class Contact:
         for pair in self.pairs:
             stiffness = (pair.share * pair.gamma[:, 0] * pair.surface.weight.ravel())[pair.active]
             farthest = np.abs(pair.surface.point).max(initial=0.0)
+            if isinstance(pair.opposite, RigidSurface):
+                farthest = max(farthest, pair.opposite.curve.farthest)
             squares += (stiffness**2).sum() * farthest**2
         return float(2 * np.finfo(float).eps * np.sqrt(squares))
 
