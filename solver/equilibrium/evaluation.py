@@ -127,8 +127,7 @@ class Evaluation:
 
     def yields(self) -> bool:
         """Whether any point has left its elastic tangent, on any rank."""
-        here = any(points.flows.any() for points in self.plastic_points())
-        return self.unknowns.comm.allreduce(here, op=MPI.LOR)
+        return self.unknowns.comm.allreduce(self.bulk.flows(), op=MPI.LOR)
 
     def lacking(self, load: float) -> Array:
         """What the conjugates of the unknown levels lack of their values at the ``load``."""
