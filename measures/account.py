@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from archord.geometry.meshes.quality import worst_cells
 from archord.materials.material import Array
 from archord.measures.doubts import Check
 from archord.measures.energies import energy_balance, work_doubts
@@ -133,7 +132,7 @@ class Account:
 
 
 def sizes(system: System) -> dict[str, Any]:
-    """Sizes of the mesh, and the worst of its cells, for run.json. Collective."""
+    """Sizes of the mesh for run.json."""
     lengths = {name: side.facet_lengths() for name, side in system.sides.items()}
     extremes = {name: [float(s.min()), float(s.max())] for name, s in lengths.items()}
     return {
@@ -142,5 +141,4 @@ def sizes(system: System) -> dict[str, Any]:
         "dofs": system.n_dofs,
         "contact_facets": {name: len(length) for name, length in lengths.items()},
         "element_size_on_arc": extremes,
-        "worst_cells": worst_cells(system.problem.mesh.mesh),
     }

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.quality import worst_cells
 from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.kernels.stale_jit import without_stale_forms
 from archord.measures.account import Account
@@ -208,10 +209,10 @@ class _Output:
 
                 self._of_fields = fields
                 self._mesh = fields.collect_mesh(self._order, self._at_points)
-        facts = account.facts()
+        worst = worst_cells(self.system.problem.mesh.mesh)
         if comm.rank == 0:
             before = start.report if start else {}
-            self._report = Report(folder / "run.json", account, facts, begun, self.steps, before)
+            self._report = Report(folder / "run.json", account, worst, begun, self.steps, before)
 
     def begin(self) -> tuple[Position | None, Work]:
         """Make the files, or write the step that the run goes on from, and give its state to the

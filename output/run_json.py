@@ -6,7 +6,7 @@ import json
 import platform
 import resource
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -38,8 +38,8 @@ _INSIDE_SOLVE = (
 
 
 class Report:
-    """run.json of an ``account``, with its ``facts``; ``begun`` is the ``perf_counter`` from which
-    the seconds count.
+    """run.json of an ``account``, on a mesh with these ``worst_cells``; ``begun`` is the
+    ``perf_counter`` from which the seconds count.
 
     ``steps`` are the steps of the run, also of the run that it goes on from, with the run.json
     ``before``; whoever appends one to them calls `add`, and `write`.
@@ -49,7 +49,7 @@ class Report:
         self,
         path: Path,
         account: Account,
-        facts: Mapping[str, Any],
+        worst_cells: dict[str, float],
         begun: float,
         steps: list[Record],
         before: dict[str, Any],
@@ -74,6 +74,8 @@ class Report:
         self._others = [
             w for w in warnings if not w.startswith((f"step {n + 1}:", APART, WORK_OFF))
         ]
+        facts = account.facts()
+        facts["mesh"]["worst_cells"] = worst_cells
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",

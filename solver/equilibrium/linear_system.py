@@ -33,8 +33,7 @@ class LinearSystem:
         self.facts = self._facts()
         self.choice = choose(self.facts)
         while_elastic = choose(replace(self.facts, yields=False))
-        self._awaits_yield = self.facts.yields and while_elastic.uses("condensed")
-        if self._awaits_yield:
+        if while_elastic.uses("condensed"):
             self.choice = while_elastic
         self.tangent = self._tangent()
         self.border: Bordered | None = None
@@ -88,8 +87,8 @@ class LinearSystem:
     def follow(self) -> bool:
         """Replace the matrix where the pairs of the last evaluation slid out of its pattern, or
         where the first point yields; returns whether."""
-        if self._awaits_yield and self.evaluation.yields():
-            self._awaits_yield = False
+        awaits_yield = self.facts.yields and self.choice.uses("condensed")
+        if awaits_yield and self.evaluation.yields():
             self._solve_as_yielding()
             return True
         if not self.evaluation.pattern_grew:
