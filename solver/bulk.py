@@ -149,10 +149,6 @@ class Bulk:
         for forms in self._forms:
             forms.assemble_correction(A, bcs)
 
-    def flows(self) -> bool:
-        """Whether any point of this rank that can yield has left its elastic tangent."""
-        return any(body.flows.any() for body in self._bodies() if body.points.yields)
-
     def _bodies(self) -> Iterator[BodyPoints]:
         """The points of the bodies that are not linear, rule by rule."""
         for forms in self._forms:

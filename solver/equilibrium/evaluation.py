@@ -127,7 +127,13 @@ class Evaluation:
 
     def yields(self) -> bool:
         """Whether any point has left its elastic tangent, on any rank."""
-        return self.unknowns.comm.allreduce(self.bulk.flows(), op=MPI.LOR)
+        here = any(points.flows.any() for points in self.plastic_points())
+        return self.unknowns.comm.allreduce(here, op=MPI.LOR)
+
+    def has_yielded(self) -> bool:
+        """Whether any point yields, or has yielded, on any rank."""
+        here = any(points.flows.any() or points.peeq.any() for points in self.plastic_points())
+        return self.unknowns.comm.allreduce(bool(here), op=MPI.LOR)
 
     def lacking(self, load: float) -> Array:
         """What the conjugates of the unknown levels lack of their values at the ``load``."""

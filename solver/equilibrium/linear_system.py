@@ -88,7 +88,7 @@ class LinearSystem:
         """Replace the matrix where the pairs of the last evaluation slid out of its pattern, or
         where the first point yields; returns whether."""
         awaits_yield = self.facts.yields and self.choice.uses("condensed")
-        if awaits_yield and self.evaluation.yields():
+        if awaits_yield and self.evaluation.has_yielded():
             self._solve_as_yielding()
             return True
         if not self.evaluation.pattern_grew:

@@ -141,6 +141,22 @@ def test_joints_that_yield_are_condensed_until_then(comm, monkeypatch):
         assert (a["P"], a["p0"], a["eps"]) == pytest.approx((b["P"], b["p0"], b["eps"]), rel=1e-9)
 
 
+def test_a_joint_that_goes_on_after_it_has_yielded_is_not_condensed():
+    """So that its last digits are the digits of a run without a halt, also where it unloads."""
+    scene = paper_joint(0.1, 1, 0.002)
+    yielded = solve(scene, MPI.COMM_SELF).joint
+    for points in yielded.equilibrium.evaluation.plastic_points():
+        points.commit()
+    system = joint_system(scene, MPI.COMM_SELF)
+    at = system.equilibrium
+    assert at.linear.tangent.condensed is not None
+    old = yielded.equilibrium.evaluation.plastic_points()
+    for points, before in zip(at.evaluation.plastic_points(), old, strict=True):
+        points.state = before.state
+    at.resume(yielded.equilibrium.load, yielded.equilibrium.state(), 1.0)
+    assert at.linear.tangent.condensed is None
+
+
 def test_a_joint_that_never_yields_takes_one_factorisation():
     strong = solve(paper_joint(0.1, 3, 1.0), MPI.COMM_SELF)
     linear = strong.joint.equilibrium.linear
