@@ -143,7 +143,7 @@ def test_joints_that_yield_are_condensed_until_then(comm, monkeypatch):
 
 def test_a_joint_that_goes_on_after_it_has_yielded_is_not_condensed():
     """So that its last digits are the digits of a run without a halt, also where it unloads."""
-    scene = paper_joint(0.1, 1, 0.002)
+    scene = paper_joint(0.1, 1, 0.002, load={"displacement": [1.0, 0.8]})
     yielded = solve(scene, MPI.COMM_SELF).joint
     for points in yielded.equilibrium.evaluation.plastic_points():
         points.commit()
