@@ -151,12 +151,13 @@ def _table(design) -> Table:
     table = Table(
         "case",
         "run",
-        *map(design.cases[0].scene.heading, design.keys),
+        *design.headings,
         "steps",
         "seconds",
     )
     for case in design.cases:
-        values = [shown(case.value(key)) or "-" for key in design.keys]
+        own = case.values(design.keys)
+        values = [shown(own.get(heading)) or "-" for heading in design.headings]
         table.add(
             case.number,
             case.run,

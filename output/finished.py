@@ -6,9 +6,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from archord.output.files.seal import faults_of
+from archord.output.files.seal import faults_of, sha256_of
 from archord.output.history import fault_of_history, read_history
 from archord.scene.file import AnyScene, load_scene, resolved
+from archord.scene.problem import ProblemScene
 
 
 def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
@@ -16,11 +17,30 @@ def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
     words; nothing where its files agree. Of large files only the size is read."""
     if not _is_of(folder, scene):
         return "scene.toml is of another scene"
+    fault = fault_of_mesh(scene, report)
+    if fault:
+        return fault
     faults = faults_of(folder, report.get("files", {}))
     if faults:
         return "; ".join(f"{name} {fault}" for name, fault in faults.items())
     fault = history_fault(folder, report)
     return f"history.csv {fault}" if fault else ""
+
+
+def fault_of_mesh(scene: AnyScene, report: dict[str, Any]) -> str:
+    """What happened to the mesh file of ``scene`` since the run with this ``report`` read it, in
+    words; nothing where it is the same or gone, or nothing tells."""
+    file = scene.mesh.file if isinstance(scene, ProblemScene) else None
+    read = report.get("mesh", {}).get("sha256")
+    if not file or not read:
+        return ""
+    try:
+        is_same = sha256_of(Path(file)) == read
+    except OSError:
+        return ""
+    if is_same:
+        return ""
+    return f"mesh {file} was changed after the run: its sha256 is not the one in run.json"
 
 
 def history_fault(folder: Path, report: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from archord.measures.record import Record
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
 from archord.output.files.seal import TABLES, fault_of, read_report, require_intact
-from archord.output.finished import fault_of_run, history_fault
+from archord.output.finished import fault_of_mesh, fault_of_run, history_fault
 from archord.output.folder import CHECKPOINT, report_of
 from archord.report.errors import InputError
 from archord.report.readable import require_file
@@ -145,6 +145,8 @@ def _start(folder: Path, scene: AnyScene) -> Start:
             f"is missing, was changed, or lacks some of the {n - 1} steps before the checkpoint's"
         )
         raise InputError(f"{path}: {said}.") from None
+    if fault := fault_of_mesh(scene, report):
+        raise InputError(f"{folder}: {fault}, so that the run cannot be continued.")
     seals = report.get("files", {})
     require_intact(folder, [name for name in seals if name not in TABLES])
     return Start(checkpoint, report, done)

@@ -231,6 +231,10 @@ class Case:
         found = self.scene.value(key, self.overrides.get(key))
         return found.model_dump(exclude_none=True) if isinstance(found, BaseModel) else found
 
+    def values(self, keys: Sequence[str]) -> Overrides:
+        """The values of the dotted ``keys`` by their headings in this case's units."""
+        return {self.scene.heading(key): self.value(key) for key in keys}
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -240,6 +244,13 @@ class Sweep:
     file: SweepFile
     keys: list[str]
     cases: list[Case]
+
+    @property
+    def headings(self) -> list[str]:
+        """What heads the columns of the keys: a force that is of a thickness in some cases and per
+        unit thickness in others has two."""
+        found = (case.scene.heading(key) for key in self.keys for case in self.cases)
+        return list(dict.fromkeys(found))
 
     @property
     def distinct(self) -> list[Case]:

@@ -157,8 +157,8 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
         dict.fromkeys(name for names in headings for name in names)
     )  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
-    first_scene = sweep.cases[0].scene
-    head = ["case", "run", "status", *map(first_scene.heading, sweep.keys)]
+    varied = sweep.headings
+    head = ["case", "run", "status", *varied]
     steps = [[*head, *history]]
     cases = [[*head, *_COST, *(history[i] for i in last)]]
     for case in sweep.cases:
@@ -166,12 +166,9 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
         (own, *rows) = histories[case.run] or [[]]
         named = (dict(zip(own, row, strict=False)) for row in rows)
         rows = [[values.get(name, "") for name in history] for values in named]
-        first = [
-            str(case.number),
-            case.run,
-            result.status,
-            *(shown(case.value(key)) for key in sweep.keys),
-        ]
+        own_values = case.values(sweep.keys)
+        values_of_keys = [shown(own_values.get(heading)) for heading in varied]
+        first = [str(case.number), case.run, result.status, *values_of_keys]
         steps += [[*first, *row] for row in rows]
         report = report_of(of_case(case, folder))
         totals, mesh, seconds = (report.get(name, {}) for name in ("totals", "mesh", "seconds"))

@@ -119,13 +119,16 @@ def _read_seals(path: Path, changed: int, size: int) -> Seals:
     return files if isinstance(files, dict) else {}
 
 
+def sha256_of(path: Path) -> str:
+    """The SHA-256 of the file ``path``, which is read again only if it was changed. Raises
+    `OSError`."""
+    known = path.stat()
+    return _digest(path, known.st_mtime_ns, known.st_size, known.st_ino)
+
+
 def _seal(path: Path) -> dict[str, Any]:
     with naming(path):
-        known = path.stat()
-        return {
-            "bytes": known.st_size,
-            "sha256": _digest(path, known.st_mtime_ns, known.st_size, known.st_ino),
-        }
+        return {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
 
 
 @lru_cache(maxsize=4096)

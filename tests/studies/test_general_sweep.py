@@ -3,9 +3,13 @@
 from pathlib import Path
 
 import pytest
+from mpi4py import MPI
 
 import archord
 from archord.cli import run
+from archord.geometry.meshes.formats.source import Mesh
+from archord.geometry.meshes.stored import store_mesh
+from archord.output.restart import plan_restart
 from archord.studies.cases import read_sweep
 from tests.studies.parts import sweep, table
 
@@ -24,6 +28,25 @@ lug.length = 60.0
 lug.width = 40.0
 lug.element_size = 3.0
 """
+
+BLOCK = """
+[base]
+format = 2
+mesh = {{ file = "{mesh}" }}
+body = [{{ name = "block", E = 210000.0, nu = 0.3 }}]
+support = [{{ name = "base", on = "block bottom", fixed = ["x", "y"] }}]
+load = [{{ name = "press", on = "block top", direction = "y", displacement = 0.01 }}]
+path = {{ steps = 1 }}
+[grid]
+body.block.E = [210000.0]
+"""
+
+
+def store_block(file, width: float) -> None:
+    """Write the mesh of a block of this width."""
+    mesh = archord.rectangles({"block": (0, 0, width, 1)}, size=0.5, comm=MPI.COMM_SELF)
+    with file.open("wb") as target:
+        store_mesh(Mesh.of(mesh).plain(MPI.COMM_SELF), target)
 
 
 @pytest.fixture(scope="module")
@@ -145,3 +168,27 @@ load = { displacement = 1.0, steps = 1 }
     alone = archord.solve(archord.Scene(**words), tmp_path / "alone")
     assert alone.kinematics.dimension == 3
     assert abs(alone.columns["press force"][-1]) == pytest.approx(thin, rel=1e-6)
+
+
+def test_a_case_of_a_changed_mesh_file_is_solved_again(tmp_path, capsys):
+    """Whether or not it could be continued; the cases of the mesh that is there stay."""
+    mesh = tmp_path / "block.npz"
+    text = BLOCK.format(mesh=mesh)
+    for checkpoint in ("false", "true"):
+        given = f"{text}[base.output]\ncheckpoint = {checkpoint}\n"
+        file = tmp_path / f"{checkpoint}.sweep.toml"
+        file.write_text(given)
+        forces = []
+        for width in (1.0, 2.0):
+            store_block(mesh, width)
+            assert sweep(file, "-o", tmp_path / checkpoint, "-q") == 0
+            (row,) = table(tmp_path / checkpoint / "cases.csv")
+            forces.append(float(row["press force [N/mm]"]))
+        assert forces[1] > 1.5 * forces[0]
+        assert "was changed after the run" in capsys.readouterr().err
+        assert sweep(file, "-o", tmp_path / checkpoint) == 0
+        assert "1 of 1 cases are there already" in capsys.readouterr().out
+    case = next((tmp_path / "true" / "cases").iterdir())
+    store_block(mesh, 1.0)
+    with pytest.raises(archord.InputError, match="was changed after the run"):
+        plan_restart(case)

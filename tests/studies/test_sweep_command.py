@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import archord
 from archord.cli import run
 from archord.output.history import read_history
 from archord.studies.cases import read_sweep
@@ -89,6 +90,25 @@ def test_cases_with_other_columns_share_a_table(tmp_path):
             k > 0,
         ]
         assert end["contact peeq_max"] == row["contact peeq_max"]
+
+
+def test_a_varied_force_stands_under_its_own_unit(tmp_path, capsys):
+    """It is per unit thickness where the case has no thickness."""
+    text = """
+list = [{ load.force = 0.002 }, { load.force = 0.004, analysis.thickness = 2.0 }]
+"""
+    file = written(tmp_path, text)
+    assert sweep(file, "--dry-run") == 0
+    assert "load.force [E* R]  load.force [E* R2]" in capsys.readouterr().out
+    assert sweep(file, "-o", tmp_path / "out", "-q") == 0
+    for row in table(tmp_path / "out" / "cases.csv"):
+        for unit in ("E* R", "E* R2"):
+            given = row[f"load.force [{unit}]"]
+            found = row[f"P [{unit}]"]
+            assert bool(given) == bool(found)
+            if given:
+                assert float(found) == pytest.approx(float(given), rel=1e-6)
+    assert archord.load(tmp_path / "out").label(1).startswith("force [E* R] = 0.002")
 
 
 def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
