@@ -1,8 +1,8 @@
-"""FGMRES preconditioned by a factorisation of an earlier matrix, for large elastic problems.
+"""FGMRES preconditioned by the factorisation of an earlier matrix of the same step.
 
 With a good guess few contact points change from one iteration to the next: one to three products
-and solves replace a factorisation. From step to step too many of them change, and plastic bodies
-change all over.
+and solves replace a factorisation. From step to step too many of them change. Where bodies yield
+the matrix changes all over, until Newton's method is near its solution.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from petsc4py import PETSc
 from archord.solver.linear.strategy import Facts
 
 _MANY_DOFS = 20_000  # for which a factorisation takes longer than some solves with an old one
-_TOLERANCE = 1e-3  # residual of a linear system over its right-hand side
-_MANY_SOLVES = 12  # that cost what a factorisation does
-_MANY_CHANGES = 100  # of the active set, which make so many solves
+_MANY_DOFS_YIELDING = 2_000  # the same where an elastic joint would be condensed
+_MANY_SOLVES = 8  # that cost what a factorisation does
+_NEAR = 2e-3  # residual over reaction below which the matrix of bodies that yield hardly changes
 
 
 def why_not(facts: Facts) -> str | None:
     """Why factorisations are not kept."""
-    if facts.yields:
-        return "bodies can yield, the matrix changes all over"
-    if facts.dofs < _MANY_DOFS:
-        return f"fewer than {_MANY_DOFS} dofs"
+    many = _MANY_DOFS_YIELDING if facts.yields else _MANY_DOFS
+    if facts.dofs < many:
+        return f"fewer than {many} dofs"
     return None
 
 
 class Lagged:
-    """When to factorise, and how long to iterate with an old factorisation."""
+    """When to factorise, and how long to iterate with an old factorisation, of bodies of which one
+    ``yields`` or none."""
 
-    def __init__(self) -> None:
-        self._changes = 0  # of the active set since the last factorisation
+    def __init__(self, *, yields: bool) -> None:
+        self._yields = yields
         self._right_side = 0.0
 
     def attach(self, ksp: PETSc.KSP) -> None:
@@ -43,15 +43,12 @@ class Lagged:
         """Done when the residual is small, or when a new factorisation would have been quicker."""
         if iteration == 0:
             self._right_side = norm
-        if norm <= _TOLERANCE * self._right_side or iteration >= 2 * _MANY_SOLVES:
+        if norm <= ksp.getTolerances()[0] * self._right_side or iteration >= 2 * _MANY_SOLVES:
             return PETSc.KSP.ConvergedReason.CONVERGED_ITS
         return PETSc.KSP.ConvergedReason.ITERATING
 
-    def factorises(self, iterations: int, changes: int, *, renewed: bool) -> bool:
-        """Whether to factorise the next matrix: the last system took so many ``iterations``, there
-        were ``changes`` of the active set since the last matrix, or it is ``renewed``."""
-        self._changes += changes
-        factorise = renewed or iterations > _MANY_SOLVES or self._changes > _MANY_CHANGES
-        if factorise:
-            self._changes = 0
-        return factorise
+    def factorises(self, iterations: int, residual: float, *, renewed: bool) -> bool:
+        """Whether to factorise the next matrix: the last system took so many ``iterations``,
+        Newton's method is as far away as this ``residual``, or the matrix is ``renewed``."""
+        is_far = self._yields and residual > _NEAR
+        return renewed or is_far or iterations > _MANY_SOLVES

@@ -13,7 +13,7 @@ but for the linear displacement at the same node. So the product has unit rows t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import basix.ufl
@@ -26,6 +26,7 @@ from archord.kernels.blocks import Blocks, blocks_of, without_zeros
 from archord.materials.kinematics import kinematics
 from archord.solver.linear.block_product import quick_product
 from archord.solver.linear.block_smoother import BlockSmoother, Sweeps
+from archord.solver.linear.forcing import LOOSEST
 from archord.solver.linear.galerkin import Galerkin
 from archord.solver.linear.strategy import Facts, Strategy
 
@@ -33,10 +34,7 @@ FEWEST_DOFS = 5_000  # below, a factorisation is quicker
 LEAST_DIMENSION = 3  # factors of plane problems hardly fill up
 _RESTART = 50  # vectors that GMRES keeps
 _MOST_ITERATIONS = 200  # after which Newton's method tries what has been found
-_LOOSEST = 2e-3  # residual of a linear system over its right-hand side
-_SUPERLINEAR = 2.0  # power of the last reduction of the residual of Newton's method
-ACCURATE = 1e-10  # the same, where a solve stands for a factorisation
-_MARGIN = 0.01  # of the goal: what the last linear system may leave, as reactions fall meanwhile
+ACCURATE = 1e-10  # residual over right-hand side where a solve stands for a factorisation
 _SMOOTHING = 3  # degree of the polynomials
 _SWEEPS = 3  # there and back, of the linear displacements
 _GROWN = 2.0  # entry of the diagonal over what it was, above which levels below may mislead
@@ -57,24 +55,6 @@ def why_not(facts: Facts) -> str | None:
     return None
 
 
-def forcing_term(residuals: Sequence[float], goal: float, *, is_linear: bool) -> float:
-    """Residual over right-hand side to which the next linear system is solved, after these
-    ``residuals`` of Newton's method, which is to reach the ``goal``.
-
-    It falls with the residuals, so that Newton's method stays superlinear (Eisenstat and Walker
-    1996, 2.6), and no further than the goal needs. A system that ``is_linear`` goes there at once.
-    """
-    now = residuals[-1]
-    if not now > 0:
-        return _LOOSEST
-    needed = _MARGIN * goal / now
-    wanted = 0.0
-    if not is_linear:
-        reduction = now / residuals[-2] if len(residuals) > 1 else 1.0
-        wanted = reduction**_SUPERLINEAR
-    return min(_LOOSEST, max(needed, wanted))
-
-
 class Multigrid(Strategy):
     """Python context of the preconditioner of ``A``, a matrix of the displacements ``V``, of which
     those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix; it solves to the
@@ -87,7 +67,7 @@ class Multigrid(Strategy):
     """
 
     def __init__(
-        self, A: PETSc.Mat, V: fem.FunctionSpace, fixed: np.ndarray, tolerance: float = _LOOSEST
+        self, A: PETSc.Mat, V: fem.FunctionSpace, fixed: np.ndarray, tolerance: float = LOOSEST
     ) -> None:
         self.matrix = A
         self._tolerance = tolerance

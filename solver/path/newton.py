@@ -16,9 +16,9 @@ from archord.geometry.curve import ProjectionError
 from archord.kernels.compat import RESIDUAL_NOT_FINITE
 from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium.equilibrium import Equilibrium
+from archord.solver.linear.forcing import forcing_term
 from archord.solver.linear.lagged import Lagged
 from archord.solver.linear.look_ahead import LookAhead, rests_while_bodies_yield
-from archord.solver.linear.multigrid import forcing_term
 from archord.solver.linear.strategy import krylov_iterations
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
@@ -111,7 +111,9 @@ class NewtonSolver:
         """Make what the chosen strategies need."""
         self._choice = choice = self._system.choice
         self._iterates = choice.uses("multigrid") and self._system.border is None
-        self._lagged = Lagged() if choice.uses("lagged") else None
+        self._lagged: Lagged | None = None
+        if choice.uses("lagged"):
+            self._lagged = Lagged(yields=self.equilibrium.bulk.plastic)
         self._ahead: LookAhead | None = None
         if choice.uses("look_ahead"):
             self._ahead = LookAhead(
@@ -159,7 +161,7 @@ class NewtonSolver:
 
     def _before_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         ksp.getPC().setReusePreconditioner(self._reuse)
-        if self._iterates:
+        if self._iterates or self._lagged is not None:
             ksp.setTolerances(rtol=self._forcing_term())
 
     def _forcing_term(self) -> float:
@@ -292,7 +294,7 @@ class NewtonSolver:
         if self._is_close():
             return
         factorise = self._lagged is None or self._lagged.factorises(
-            self._ksp.getIterationNumber(), result.active_set_changes[-1], renewed=self._renewed
+            self._ksp.getIterationNumber(), result.residuals[-1], renewed=self._renewed
         )
         self._reuse = not factorise
         is_afar = self._from_afar and len(result.residuals) == 1

@@ -15,7 +15,8 @@ from petsc4py import PETSc
 from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose
 from archord.solver.linear import multigrid as module
-from archord.solver.linear.multigrid import Multigrid, forcing_term
+from archord.solver.linear.forcing import LOOSEST, forcing_term
+from archord.solver.linear.multigrid import Multigrid
 from archord.solver.path.stepping import march
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Dirichlet, Problem
@@ -153,9 +154,9 @@ def test_the_forcing_term_falls_with_the_residual_and_no_further_than_the_goal()
     terms = [forcing_term([1.0, now], 1e-14, is_linear=False) for now in residuals]
     assert terms == sorted(terms, reverse=True)
     assert terms[-1] == pytest.approx(1e-8)  # of quadratic convergence
-    assert forcing_term([1.0, 1e-10], 1e-10, is_linear=False) == module._LOOSEST
+    assert forcing_term([1.0, 1e-10], 1e-10, is_linear=False) == LOOSEST
     assert forcing_term([1.0], 1e-10, is_linear=True) == pytest.approx(1e-12)
-    assert forcing_term([0.0], 1e-10, is_linear=True) == module._LOOSEST
+    assert forcing_term([0.0], 1e-10, is_linear=True) == LOOSEST
 
 
 @pytest.mark.parametrize(
