@@ -90,7 +90,10 @@ class _Model:
         self._names: dict[str, str] = {}
         self._owners: dict[tuple[str, str], int] = {}
         readers = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
-        for scope, (keyword, options, rows) in scoped_blocks(path):
+        blocks = list(scoped_blocks(path))
+        # a set may stand above nodes and elements that it has
+        blocks.sort(key=lambda scoped: scoped[1].keyword not in ("NODE", "ELEMENT"))
+        for scope, (keyword, options, rows) in blocks:
             if keyword in _UNREAD or options.get("SYSTEM", "R").upper() != "R":
                 raise ValueError(
                     f"*{keyword} is not read as it stands; write all nodes and elements out, in "
@@ -170,6 +173,8 @@ class _Model:
             return
         surface = scope.qualified(name)
         for item, *words in rows:
+            if not item:
+                raise ValueError(f"the surface {name!r} has a row that names no elements")
             elements = self._chosen(scope, "ELSET", [item])
             face = "".join(words).upper()
             self.surfaces[surface].append((elements, face))

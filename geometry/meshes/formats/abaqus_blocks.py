@@ -169,7 +169,8 @@ def _blocks(path: Path) -> list[Block]:
     """The blocks of the file ``path`` as they stand there."""
     blocks = [Block("", {}, [])]
     for line in _lines(path, path):
-        first, *others = (part.strip(' "') for part in line.strip(", ").split(","))
+        # a blank first place stands for a number, too
+        first, *others = (part.strip(' "') for part in line.rstrip(", ").split(","))
         if line.startswith("*"):
             pairs = (option.partition("=") for option in others)
             options = {key.strip().upper(): value.strip(' "') for key, _, value in pairs}

@@ -99,6 +99,21 @@ def test_a_part_without_an_instance_is_in_its_place(tmp_path):
     assert list(both.cell_sets) == ["Bar.all", "Rod.all"]
 
 
+def test_a_blank_number_of_an_instance_is_zero(tmp_path):
+    text = PART + ASSEMBLY.replace("10., 0., 0.\n", ", 10., 0.\n")
+    mesh = read(
+        tmp_path, text.replace("10., 0., 0., 10., 0., 1., 90.", ", 10., , 0., 10., 1., 90.")
+    )
+    assert ends(mesh, "Bar-2.left") == [(-1, 10), (0, 10)]
+
+
+def test_a_generated_set_has_the_nodes_below_it_too(tmp_path):
+    rest = "3, 2., 1.\n4, 0., 1.\n"
+    between = "*Nset, nset=whole, generate\n1, 4\n*Node\n"
+    mesh = read(tmp_path, PART.replace(rest, between + rest))
+    assert ends(mesh, "whole") == [(0, 0), (0, 1), (2, 0), (2, 1)]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -118,6 +133,7 @@ def test_a_part_without_an_instance_is_in_its_place(tmp_path):
             "nset=Bar-1.left, instance=bar-2",
             "'Bar-1.left' is there twice",
         ),
+        ("_right_S2, S2", ", S2", "the surface 'right' has a row that names no elements"),
         ("1, 5., 5., 0.", "-1, 5., 5., 0.", "'-1' is no number of a node"),
     ],
 )
