@@ -10,6 +10,7 @@ their ends.
 from __future__ import annotations
 
 import itertools
+import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,8 +42,14 @@ _EXACT = 1e-6  # of the least loss, and of z
 _STEP = 1e-4  # of finite differences
 _ITERATIONS = 12  # of Newton's method for the joint's share of a displacement
 _CLOSE = 1e-6  # over the clearance: one more iteration is exact
-_FACTORS = (1.0, 0.6, 1.7)  # on the scene's values, among which a fit begins
-_TRIED = 4  # unknowns that are tried so
+# factors on the scene's values, and compliances of the machine in their unit, with which fits begin
+_FACTORS = (1.0, 0.6, 1.7, 0.35, 2.8)
+_COMPLIANCES = (0.0, 0.1, 0.4, 1.5)
+_TRIED = 4  # unknowns of the scene that are tried so
+_ALL_FACTORS = 2  # unknowns up to which all factors are tried, of more the first three
+_FITS = 6  # begun, of which the best goes on: others may end at the curve of another joint
+_FIRST_ITERATIONS = 8
+_BETTER = 0.9  # of the loss: the fit of a worse beginning is no better by noise alone
 _ROBUST = 2.5  # standard deviations beyond which a residual counts less
 _LEAST = 1e-6  # standard deviation over the largest force
 _BOUND = 1e-3  # in z: nearer is at the bound
@@ -224,21 +231,33 @@ def identify(
         said = f"{len(curve.load)} points are too few for {len(unknowns)} unknowns"
         raise InputError(f"{said}; measure more, or fix some.")
     model = Model(scene, curve, unknowns, fixed)
-    found = model.fit(_begin(model))
+    found = model.fit(_begun(model))
     scale = _ROBUST * _deviation(model.residuals(found.x))
     found = model.fit(found.x, scale)
     return _judged(model, found, scale)
 
 
-def _begin(model: Model) -> Array:
-    """The best of some points around the values of the scene."""
-    tried = [
-        _FACTORS if unknown.keys and unknown.unit is None and k < _TRIED else (1.0,)
-        for k, unknown in enumerate(model.unknowns)
-    ]
+def _begun(model: Model) -> Array:
+    """Where the best of some fits is after a few iterations; they begin with the best of some
+    points around the values of the scene."""
+    of_scene = [unknown for unknown in model.unknowns if unknown.keys and unknown.unit is None]
+    factors = _FACTORS if len(of_scene) <= _ALL_FACTORS else _FACTORS[:3]
+    tried: list[Sequence[float]] = []
+    for unknown in model.unknowns:
+        values: Sequence[float] = (0.0,)
+        if unknown in of_scene[:_TRIED]:
+            values = [math.log(factor) for factor in factors]
+        elif unknown.name == COMPLIANCE:
+            values = _COMPLIANCES
+        tried.append(values)
     low, high = model.bounds
-    points = [np.clip(np.log(factors), low, high) for factors in itertools.product(*tried)]
-    return min(points, key=lambda z: float(np.square(model.residuals(z)).sum()))
+    points = [np.clip(z, low, high) for z in itertools.product(*tried)]
+    points.sort(key=lambda z: float(np.square(model.residuals(z)).sum()))
+    best, *others = (model.fit(z, most=_FIRST_ITERATIONS) for z in points[:_FITS])
+    for other in others:
+        if other.cost < _BETTER * best.cost:
+            best = other
+    return best.x
 
 
 def _deviation(residuals: Array) -> float:
