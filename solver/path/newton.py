@@ -16,7 +16,7 @@ from archord.geometry.curve import ProjectionError
 from archord.kernels.compat import RESIDUAL_NOT_FINITE
 from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium.equilibrium import Equilibrium
-from archord.solver.linear.forcing import forcing_term
+from archord.solver.linear.forcing import AS_NEWTON, BELOW_NEWTON, forcing_term
 from archord.solver.linear.lagged import Lagged
 from archord.solver.linear.look_ahead import LookAhead, rests_while_bodies_yield
 from archord.solver.linear.strategy import krylov_iterations
@@ -167,7 +167,8 @@ class NewtonSolver:
     def _forcing_term(self) -> float:
         result = self._result
         is_linear = self._has_linear_bulk and not result.active_set_changes[-1]
-        return forcing_term(result.residuals, self._goal, is_linear=is_linear)
+        power = AS_NEWTON if self._lagged is None else BELOW_NEWTON
+        return forcing_term(result.residuals, self._goal, is_linear=is_linear, power=power)
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         self._result.krylov_iterations += krylov_iterations(ksp)
