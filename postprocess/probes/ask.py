@@ -30,9 +30,9 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
     stress along the edge is "along";
     at the integration points of a surface "pressure", "gap" or, with friction, "contact_shear", or
     "facet_pressure", the mean of each facet, which scatters less where bodies yield. On a line a
-    nodal field (von Mises stress), linear between nodes, or else a field of the cells. In space an
-    edge is "A & B", where two surfaces meet; it has "hoop" and nodal fields, and nodal fields are
-    quadratic between nodes.
+    nodal field (von Mises stress), linear between nodes, or else a field of the cells; where bodies
+    meet, it is of the first one. In space an edge is "A & B", where two surfaces meet; it has
+    "hoop" and nodal fields, and nodal fields are quadratic between nodes.
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")

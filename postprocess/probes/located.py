@@ -15,7 +15,7 @@ _BESIDE = 1e-6  # beyond the reference cell, where a point still lies on its sid
 
 def located(fields: Fields, x: Array) -> tuple[np.ndarray, np.ndarray, Array]:
     """For each point ``x`` ``(k, 3)`` its cell ``(k,)``, -1 outside the bodies, the cell's nodes
-    and their weights ``(k, a)`` at the point."""
+    and their weights ``(k, a)`` at the point. Where bodies meet, the cell is of the first one."""
     per_cell = fields.cells.shape[1]
     cells = fields.cells[:, np.argsort(CELLS[per_cell][1])]  # in basix' order
     nodes = fields.coordinates[cells]  # (cells, a, 3)
@@ -24,6 +24,8 @@ def located(fields: Fields, x: Array) -> tuple[np.ndarray, np.ndarray, Array]:
     bulge = _BULGE * (high - low)
     low -= bulge
     high += bulge
+    marks = list(fields.bodies.values())
+    place = np.argmax(fields.body[:, None] == marks, axis=1)  # of a cell's body among all
     found = np.full(len(x), -1)
     weights = np.zeros((len(x), per_cell))
     for k in range(len(x)):
@@ -32,10 +34,12 @@ def located(fields: Fields, x: Array) -> tuple[np.ndarray, np.ndarray, Array]:
         if not len(near):
             continue
         shapes, beyond = _reached(nodes[near], x[k])
-        best = int(beyond.argmin())
-        if beyond[best] < _BESIDE:
-            found[k] = near[best]
-            weights[k] = shapes[best]
+        holding = np.flatnonzero(beyond < _BESIDE)
+        if not len(holding):
+            continue
+        best = holding[np.lexsort((beyond[holding], place[near[holding]]))[0]]
+        found[k] = near[best]
+        weights[k] = shapes[best]
     return found, cells[found], weights
 
 

@@ -90,7 +90,7 @@ class Equilibrium:
         self.unknowns.restore(state)
         if self.springs:
             own = self.unknowns.u.x.array[: self.unknowns.n_dofs].copy()
-            self.springs.last = own, self.unknowns.levels.copy()
+            self.springs.rest = own, self.unknowns.levels.copy()
 
     def resume(self, load: float, state: Array, largest_reaction: float) -> None:
         """Take up an accepted state of an earlier process, whose history the points have already,

@@ -21,6 +21,7 @@ from archord.solver.problem import Interaction, Rigid
 
 _MOST = 100  # iterations
 _AT_REST = 1e-3  # part of the forces that may be left
+_STOPPED = 0.1  # the same where contact carries bodies, whose place hardly changes from there
 _FAST = 0.1  # ratio of what is left by which iterations go on from there
 _ROUND_OFF = 1e-9  # the same, of the largest forces on the way
 _DAMPING = 10.0  # ratio of one damping to the next
@@ -106,22 +107,23 @@ class RigidMotions:
         own = motions[:, : self.drives.n_owned]
         return self.comm.allreduce(np.tensordot(own, forces, ((1, 2), (1, 2))))
 
-    def at_rest(self, load: float, state: Array) -> Array:
+    def at_rest(self, load: float, state: Array) -> tuple[Array, bool]:
         """A ``state`` at ``load``, with bodies moved as their supports are, and loose ones to where
         contact and forces push them; as it was where contact points find no partners on the way.
+        And whether forces push them there that contact carries.
 
         The contact law alone resists. Newton's method finds the least energy, damped while forces
         are large (Levenberg 1944), in steps of a facet at most. Slip counts from there: where
         forces push it goes on as long as it converges fast.
         """
         if not self.contact.pairs:
-            return state
+            return state, False
         u, levels = self._with_supports(load, state)
         try:
-            u, levels = self._settled(load, u, levels)
+            u, levels, is_stopped = self._settled(load, u, levels)
         except ProjectionError:
-            return state
-        return np.append(u, levels)
+            return state, False
+        return np.append(u, levels), is_stopped
 
     def _with_supports(self, load: float, state: Array) -> tuple[Array, Array]:
         """Displacements and levels with bodies moved rigidly as their supports are."""
@@ -138,8 +140,9 @@ class RigidMotions:
         u += np.tensordot(followed[: len(self._modes)], self._modes, 1)
         return u, levels
 
-    def _settled(self, load: float, u: Array, levels: Array) -> tuple[Array, Array]:
-        """Displacements and levels where contact and forces balance. Raises `ProjectionError`."""
+    def _settled(self, load: float, u: Array, levels: Array) -> tuple[Array, Array, bool]:
+        """Displacements and levels where contact and forces balance, and whether contact carries
+        forces there. Raises `ProjectionError`."""
         applied = self._applied(load, levels)
         is_pushed = bool(np.linalg.norm(applied))
         step: Array = np.zeros(len(self.free))
@@ -173,7 +176,7 @@ class RigidMotions:
             step = self._shortened(whole_step, best.openings)
             u = u + np.tensordot(step, self.free, 1)
             levels = levels + step @ self.levels
-        return u, levels
+        return u, levels, is_pushed and least < _STOPPED * float(np.linalg.norm(applied))
 
     def _applied(self, load: float, levels: Array) -> Array:
         """Forces ``(r,)`` of drives and loads on the free motions."""

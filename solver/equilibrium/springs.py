@@ -1,8 +1,9 @@
 """Weak springs that hold bodies where nothing touches them.
 
 Springs between bodies and their last accepted state hold what does not touch even where it has come
-to rest as if rigid. Each point of a body of area ``A`` is pulled back with `WEAK` times ``M / A``
-per displacement and area, ``M`` being the modulus of uniaxial strain, so that a force moves the
+to rest as if rigid. Where contact stops what forces push, they begin there, so that they carry
+nothing of a tiny force. Each point of a body of area ``A`` is pulled back with `WEAK` times ``M /
+A`` per displacement and area, ``M`` being the modulus of uniaxial strain, so that a force moves the
 body by about ``1 / WEAK`` times as much as it deforms it; rigid discs under forces, with `WEAK`
 ``M``. In space, where ``A`` is a volume, ``M`` is times the edge of a cube of this volume: so the
 springs do not depend on the unit of length. Beside a far softer body ``M`` is `_STIFFER` times its
@@ -43,7 +44,7 @@ class Springs:
 
     of_free : their matrix, without prescribed displacements
     of_levels : (l,) stiffness of the springs of discs
-    last : displacements (n_owned dofs,) and levels (l,) of the last accepted state
+    rest : displacements (n_owned dofs,) and levels (l,) at which they have no force
     forces : (n_owned dofs,) on bodies, at the last evaluation
     on_levels : (l,) on discs
     work : what the springs took up in the step, of the modelled part
@@ -74,7 +75,7 @@ class Springs:
         for disc in rigid.contact.rigid:
             self.of_levels += of_disc * (disc.rate**2).sum(axis=1)
         n_dofs = drives.dimension * drives.n_owned
-        self.last: tuple[Array, Array] = np.zeros(n_dofs), np.zeros(len(drives.rate))
+        self.rest: tuple[Array, Array] = np.zeros(n_dofs), np.zeros(len(drives.rate))
         self.energy = 0.0
         self.works: dict[str, float] = {}
         self.idle = False
@@ -88,18 +89,24 @@ class Springs:
     def evaluate(self, u: Array, levels: Array) -> None:
         """Forces and work at the displacements ``u`` ``(n_owned dofs,)`` and drives' ``levels``
         ``(l,)``."""
-        u_before, levels_before = self.last
+        u_at_rest, levels_at_rest = self.rest
         self._now = u.copy(), levels.copy()
-        self._moved = u - u_before
-        self._turned = levels - levels_before
+        self._moved = u - u_at_rest
+        self._turned = levels - levels_at_rest
         self.forces = self.pull(self._moved)
         self.on_levels = self.of_levels * self._turned
         on_bodies = self.comm.allreduce(float(self.forces @ self._moved))
         self.work = (on_bodies + float(self.on_levels @ self._turned)) / 2
 
+    def rest_at(self, state: Array) -> None:
+        """Let them have no force in a ``state``, an array of displacements and levels."""
+        n_levels = len(self.of_levels)
+        n_dofs = self.rigid.drives.dimension * self.rigid.drives.n_owned
+        self.rest = state[:n_dofs].copy(), state[len(state) - n_levels :].copy()
+
     def commit(self) -> None:
         """Accept the last evaluation: the springs rest there."""
-        self.last = self._now
+        self.rest = self._now
         self.energy += self.work
         self.works = self._works()
         self.look()

@@ -52,18 +52,21 @@ class Recovery:
             rigid = RigidMotions(at.drives, at.contact)
             before = self._solves
             self._solves = []
-            found = self._solve_in_stages(rigid.at_rest(load, guess), afar=True)
+            rested, _ = rigid.at_rest(load, guess)
+            found = self._solve_in_stages(rested, afar=True)
             # the last one tells why there is none
             self._solves = before + self._solves if found else self._solves + before
         return Newton.together(self._solves)
 
     def _at_rest(self, load: float, guess: Array) -> Array:
         """The ``guess`` with loose bodies where they come to rest as if rigid. What brought them
-        there was no slip."""
+        there was no slip, and where contact stops them springs do not pull them back."""
         at = self.equilibrium
         assert at.springs is not None
         with at.timer("contact"):
-            guess = at.springs.rigid.at_rest(load, guess)
+            guess, is_stopped = at.springs.rigid.at_rest(load, guess)
+            if is_stopped:
+                at.springs.rest_at(guess)
             if not at.springs.idle:
                 at.contact.touch_down(*at.unknowns.split(guess))
         return guess

@@ -334,6 +334,9 @@ def test_fields_are_probed_along_lines_and_edges(folders, kind):
     assert cell[-1] == -1
     found = np.einsum("ka,ka->k", weights[:-1], quadratic(fields.coordinates)[nodes[:-1]])
     np.testing.assert_allclose(found, quadratic(x), atol=1e-8)
+    border = np.random.default_rng(3).uniform([0, 0, 0], [1, 1, 0], (60, 3))
+    cell, _, _ = located(fields, border)
+    assert set(fields.body[cell]) == {fields.bodies["lower"]}  # the first body
     down = run.probe(quantity="uz", line=(0.3, 0.4, 1.0, 0.3, 0.4, -1.0))
     assert down.values[0] == pytest.approx(-0.01)
     assert down.values[-1] == pytest.approx(0.0, abs=1e-9)
