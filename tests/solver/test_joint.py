@@ -43,7 +43,7 @@ def test_elastic_contact_angle_and_peak_pressure():
     assert last["p0"] == pytest.approx(profile["p0_over_Estar"], rel=5e-3)
 
 
-@pytest.mark.parametrize(("size", "steps"), [(0.02, 20), (0.01, 8)])
+@pytest.mark.parametrize(("size", "steps"), [(0.02, 20), (0.01, 5)])
 def test_plastic_force_agrees_with_independent_solvers(size, steps):
     """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, without cutback, on 2 %R in at most
     7 iterations a step; on a finer mesh, with its shear bands, as well."""
@@ -71,7 +71,7 @@ VARIANTS = {
 def test_forces_balance(variant):
     """Pin reaction, block reaction and the integral of the contact pressure agree to 1e-8 of P in
     each step."""
-    solution = solve(scene(0.12, 3, **VARIANTS[variant]))
+    solution = solve(scene(0.2, 2, **VARIANTS[variant]))
     for m, profiles in zip(solution.steps, solution.profiles, strict=True):
         assert m["P"] > 0
         assert m.force_balance < 1e-8
@@ -135,7 +135,7 @@ def test_energy_is_kept_within_the_step_error():
     """Work = stored + dissipated; what is missing falls at least with the step, to below 0.1 %."""
     missing = []
     for steps in (5, 10, 20):
-        m = solve(scene(0.12, steps, yield_stress=0.002)).steps[-1]
+        m = solve(scene(0.2, steps, yield_stress=0.002)).steps[-1]
         missing.append(abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work)
     assert missing[1] < 0.6 * missing[0]
     assert missing[2] < 0.6 * missing[1]

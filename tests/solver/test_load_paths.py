@@ -11,7 +11,7 @@ from archord.scene.file import load_scene
 from archord.solver.path.stepping import StepFailure
 from tests.solver.solving import scene, solve
 
-H = 0.1
+H = 0.16
 RIGID = {"rigid": True}
 YIELDING = {"E": 1.82, "nu": 0.3, "yield_stress": 0.002}
 
