@@ -63,7 +63,7 @@ def law_joint(joint: Drawn) -> LawJoint:
 def forms(joint: LawJoint) -> list[LawJoint]:
     """A ``joint`` that hardens as each of `BODIES`."""
     perfect = replace(joint, pin_hardening=None, block_hardening=None)
-    return [replace(perfect, pin_yield=None, block_yield=None), perfect, joint]
+    return [joint.elastic, perfect, joint]
 
 
 def milliseconds(joint: LawJoint) -> float:

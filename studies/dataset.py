@@ -8,6 +8,7 @@ writes the same bytes; other libraries may change a last digit.
 
 from __future__ import annotations
 
+import csv
 import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -73,8 +74,11 @@ def write_sweep(number: int, file: Path) -> None:
 
 def write_tables(sweep: Path, folder: Path) -> list[Path]:
     """Write joints.csv, curves.csv and SHA256SUMS into ``folder``, from the solved joints of the
-    folder ``sweep``; returns the files. Raises `ValueError` if none is solved."""
-    solved = sorted(solved_in(sweep).items())
+    folder ``sweep``, of which it may hold more than the sweep has; returns the files. Raises
+    `OSError`, and `ValueError` if none is solved."""
+    with (sweep / "cases.csv").open(encoding="utf-8", newline="") as text:
+        names = {row["run"] for row in csv.DictReader(text)}
+    solved = sorted(solved_in(sweep, names).items())
     if not solved:
         raise ValueError(f"{sweep}: no joint is solved.")
     table = []

@@ -54,7 +54,7 @@ def plastic_winkler(joint: LawJoint, delta: Array) -> LawState:
 
 def parabola(joint: LawJoint, delta: Array) -> LawState:
     """Elastic NFD (eqs 8, 9): `plastic_winkler` without a yield stress."""
-    return plastic_winkler(replace(joint, pin_yield=None, block_yield=None), delta)
+    return plastic_winkler(joint.elastic, delta)
 
 
 def liu(joint: LawJoint, delta: Array) -> LawState:

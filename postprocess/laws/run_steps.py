@@ -194,7 +194,8 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
     delta, P, *told, lost = values
     unknown = np.full(len(delta), np.nan)
     peak, angle = [*told, unknown, unknown][:2]
-    sign = next((np.sign(d) for d in delta if d), 1.0)
+    # a joint's load presses where it is positive, whatever comes first
+    sign = 1.0 if _is_of_joint(run) else next((np.sign(d) for d in delta if d), 1.0)
     return RunSteps(
         run=run,
         names=(names[0], names[1]),

@@ -32,7 +32,10 @@ def test_tables_have_error_bars_and_checksums(tmp_path, monkeypatch):
     coarse = np.column_stack([[*x, 2.5], [1.0, 2.0, 3.0, 2.0], np.ones(4), np.ones(4)])
     fine = np.column_stack([x, [1.1, 2.2, 3.0], np.ones(3), np.ones(3)])
     solved = {(1.0, 0.5, 0.4, 0.4, 0.005, 0.3, 0.3): [NodeRun(coarse, 1), NodeRun(fine, 2)]}
-    monkeypatch.setattr(dataset, "solved_in", lambda folder: solved)
+    monkeypatch.setattr(
+        dataset, "solved_in", lambda folder, names: solved if names == {"a"} else {}
+    )
+    (tmp_path / "cases.csv").write_text("case,run\n1,a\n")
     files = write_tables(tmp_path, tmp_path)
     with files[1].open() as file:
         rows = list(csv.DictReader(file))
@@ -44,7 +47,7 @@ def test_tables_have_error_bars_and_checksums(tmp_path, monkeypatch):
     for line in files[2].read_text().splitlines():
         digest, name = line.split()
         assert hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() == digest
-    monkeypatch.setattr(dataset, "solved_in", lambda folder: {})
+    monkeypatch.setattr(dataset, "solved_in", lambda folder, names: {})
     with pytest.raises(ValueError, match="no joint is solved"):
         write_tables(tmp_path, tmp_path)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -134,8 +134,13 @@ class LawJoint:
         for body in ("pin", "block"):
             law = getattr(self, f"{body}_hardening")
             stress = getattr(self, f"{body}_yield")
-            if law is None or stress is None:
+            if law is None:
                 continue
+            if not hasattr(law, "stress"):
+                said = f"must be a Hardening, like LinearHardening, not {law!r}"
+                raise ValueError(f"{body}_hardening {said}.")
+            if stress is None:
+                raise ValueError(f"{body}_hardening needs {body}_yield, where it begins.")
             begins = float(law.stress(np.zeros(1))[0])
             if not math.isclose(begins, stress, rel_tol=1e-6):
                 said = f"{body}_hardening begins at {begins:g}, not at {body}_yield = {stress:g}"
@@ -199,9 +204,14 @@ class LawJoint:
     @property
     def hardens(self) -> bool:
         """Whether a body that yields hardens."""
-        pairs = (self.pin_yield, self.pin_hardening), (self.block_yield, self.block_hardening)
-        isotropic = any(stress is not None and law is not None for stress, law in pairs)
-        return self.kinematic or isotropic
+        laws = self.pin_hardening, self.block_hardening
+        return self.kinematic or any(law is not None for law in laws)
+
+    @property
+    def elastic(self) -> LawJoint:
+        """The joint whose bodies do not yield."""
+        perfectly_plastic = replace(self, pin_hardening=None, block_hardening=None)
+        return replace(perfectly_plastic, pin_yield=None, block_yield=None)
 
     @property
     def dundurs_alpha(self) -> float:

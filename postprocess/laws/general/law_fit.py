@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -153,11 +153,15 @@ class NodeRun:
         return rest[: int(rises[0]) + 1] if len(rises) else rest
 
 
-def solved_joints(folder: Path) -> dict[LawJoint, list[NodeRun]]:
-    """The complete runs of the sweep in ``folder``, by their joints."""
+def solved_joints(
+    folder: Path, names: Container[str] | None = None
+) -> dict[LawJoint, list[NodeRun]]:
+    """The complete runs of the sweep in ``folder``, by their joints; those of these ``names``, if
+    any."""
     found = defaultdict(list)
     for run in sorted((folder / "cases").iterdir()):
-        if not (run / "run.json").exists():
+        is_left_out = names is not None and run.name not in names
+        if is_left_out or not (run / "run.json").exists():
             continue
         curve = Run(run).curve
         if len(curve.delta) < sum(curve.scene.load.stage_steps):
@@ -166,20 +170,20 @@ def solved_joints(folder: Path) -> dict[LawJoint, list[NodeRun]]:
     return dict(found)
 
 
-def by_joint(folder: Path) -> dict[LawJoint, list[NodeRun]]:
-    """The joints that are solved as far as the law needs them, of the sweep in ``folder``."""
+def by_joint(folder: Path, names: Container[str] | None = None) -> dict[LawJoint, list[NodeRun]]:
+    """The joints that are solved as far as the law needs them, of `solved_joints`."""
     found = {}
-    for joint, nodes in solved_joints(folder).items():
+    for joint, nodes in solved_joints(folder, names).items():
         if complete(joint_numbers(joint), nodes):
             found[joint] = nodes
     return found
 
 
-def solved_in(folder: Path) -> dict[Numbers, list[NodeRun]]:
+def solved_in(folder: Path, names: Container[str] | None = None) -> dict[Numbers, list[NodeRun]]:
     """`by_joint` of joints at small strain that do not harden and have no friction, by their
     numbers, as `joint_numbers` has them."""
     found: dict[Numbers, list[NodeRun]] = defaultdict(list)
-    for joint, runs in by_joint(folder).items():
+    for joint, runs in by_joint(folder, names).items():
         if joint.hardens or joint.friction or joint.large_strain:
             continue
         rounded = (float(f"{value:.6g}") for value in joint_numbers(joint))

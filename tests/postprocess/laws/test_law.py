@@ -174,6 +174,16 @@ def test_a_curve_begins_at_the_yield_stress():
         LawJoint(1.0, 0.01, 1.0, block_yield=1.0, block_hardening=LinearHardening(2.0))
 
 
+def test_a_curve_without_its_yield_stress_is_no_elastic_joint():
+    """Its force was the elastic one."""
+    curve = LinearHardening(2.0, 10.0)
+    with pytest.raises(ValueError, match="block_hardening needs block_yield"):
+        LawJoint(1.0, 0.01, 1.0, block_hardening=curve)
+    with pytest.raises(ValueError, match=r"must be a Hardening, like LinearHardening, not 10\.0"):
+        LawJoint(1.0, 0.01, 1.0, block_yield=1.0, block_hardening=10.0)
+    assert not LawJoint(1.0, 0.01, 1.0, block_yield=2.0, block_hardening=curve).elastic.hardens
+
+
 def test_joint_of_a_scene():
     """Like bodies have neither alpha nor beta; a rigid pin has alpha = 1, and beta from the block
     alone."""

@@ -101,6 +101,13 @@ def test_it_passes_through_the_steps_of_the_run() -> None:
     )
 
 
+def test_a_pin_that_is_lifted_first_has_the_table_of_one_that_is_not() -> None:
+    lifted = run_table(synthetic(path(-0.3, END, 0.0)))
+    pressed = run_table(synthetic(path(0.0, END, 0.0)))
+    delta = np.linspace(0.2, 0.9, 5) * END * pressed.length
+    np.testing.assert_allclose(lifted.at(delta).load, pressed.at(delta).load, rtol=1e-2)
+
+
 def test_it_finds_every_way_back_from_one() -> None:
     """Unloading that shifts by dD/P: from any displacement it opens where it does, and loses what
     it dissipates."""
