@@ -91,6 +91,7 @@ class _Expansion:
         if self.given_loads:
             travel = self._travel()
             slide = travel if np.isfinite(travel) else 0.0
+            travel = min(travel, self._farthest())
             changes |= {"fit": stated.fits, "stabilise": True, "travel": travel}
             changes["guess"] = self._guess()
         interactions = [self._interaction(part, slide) for part in stated.interactions]
@@ -155,11 +156,15 @@ class _Expansion:
         fits = [i.interference + i.overlap for i in self.stated.interactions]
         return sum(lengths) + max(fits, default=0.0)
 
+    def _farthest(self) -> float:
+        """A displacement that no body reaches, under a force neither. Collective."""
+        return _STRETCHED * _largest_side(*self._box())
+
     def _require_near(self) -> None:
         """Raise ValueError for a displacement beyond the size of the mesh, as if in other units.
         Large strain is stretched some times as far. Collective."""
         lowest, highest = self._box()
-        size = float((highest - lowest).max())
+        size = _largest_side(lowest, highest)
         most = _STRETCHED * size if self._is_large() else size
         for load in self.given_loads:
             if load.kind != "displacement" or _turns(load.direction):
@@ -361,6 +366,11 @@ class _Expansion:
 def _place(load: Load) -> tuple[str, str]:
     """What a load acts on, and in which direction."""
     return load.on, str(load.direction)
+
+
+def _largest_side(lowest: Array, highest: Array) -> float:
+    """The largest side of the box from ``lowest`` to ``highest`` ``(d,)``."""
+    return float((highest - lowest).max())
 
 
 def _turns(freedom: str | None) -> bool:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.report.errors import InputError
 from archord.scene.file import load_scene
+from archord.solver.expansion import expanded
 from archord.solver.path.stepping import StepFailure
+from archord.solver.path.system import System
 from tests.solver.solving import scene, solve
 
 H = 0.16
@@ -149,6 +152,22 @@ def test_a_force_beyond_the_limit_load_ends_at_it():
         solve(by_force(0.04, 4, yield_stress=0.002, joint=coarse, stepping={"minimum": 0.01}))
     numbers = [float(n) for n in re.findall(r"P = ([0-9.e-]+[0-9])", str(failure.value))]
     assert 0.0067 < numbers[1] < numbers[0] < 1.02 * numbers[1] < 0.03
+
+
+def test_a_pressure_beyond_the_limit_load_ends_at_it():
+    """What Newton's method throws far away is no equilibrium, however large its round-off is."""
+    metal = archord.J2Material(200e3, 0.3, hardening=archord.LinearHardening(200.0))
+    mesh = archord.rectangles({"bar": (0.0, 0.0, 2.0, 1.0)}, size=0.5)
+    bar = archord.Problem(
+        mesh,
+        [archord.Body("bar", metal)],
+        supports=[archord.Support("bar left", fixed="x"), archord.Support("bar bottom", fixed="y")],
+        loads=[archord.Load("pull", on="bar right", pressure=-300.0)],
+        kinematics="plane stress",
+        steps=6,
+    )
+    with pytest.raises(StepFailure, match=r"the last load that held is load factor = 0\.666"):
+        System(expanded(bar.on(MPI.COMM_SELF))).solve(bar.targets)
 
 
 def test_zero_load_is_no_load():
