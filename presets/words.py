@@ -184,11 +184,14 @@ def _plane(problem: Problem) -> str:
 
 
 def _analysis(problem: Problem) -> dict[str, Any]:
-    is_large = any(isinstance(body.material, LargeStrain) for body in problem.bodies)
+    are_large = {getattr(body.material, "finite", False) for body in problem.bodies}
+    if len(are_large) > 1:
+        said = 'bodies are at small and at large strain; strain = "large" takes all to large strain'
+        raise InputError(f"archord.Problem: {said}.")
     symmetry = int(problem.symmetry) if problem.symmetry % 1 == 0 else problem.symmetry
     words = {
         "plane": _plane(problem),
-        "strain": "large" if is_large else problem.strain,
+        "strain": "large" if True in are_large else problem.strain,
         "degree": problem.degree,
         "thickness": problem.thickness,
         "tolerance": problem.tolerance,

@@ -119,6 +119,15 @@ TIE = archord.Interaction("tie", ("lower top", "upper bottom"), law="tied")
 CONTACT = archord.Interaction("contact", ("lower top", "upper bottom"))
 
 
+def test_a_run_folder_has_one_strain_for_all_bodies():
+    """Of a body at large strain beside one at small strain the scene said large for both, and gave
+    other numbers when it was solved again."""
+    one, other = BODIES
+    mixed = [replace(one, material=archord.LargeStrain(one.material)), other]
+    with pytest.raises(archord.InputError, match="bodies are at small and at large strain"):
+        words_of(problem([CONTACT], bodies=mixed), "mesh.npz")
+
+
 def test_a_facet_belongs_to_one_interaction():
     """Two on the same facets counted contact twice: forces rose by 2 %, without a word."""
     twice = [CONTACT, archord.Interaction("second", ("again", "other"))]
