@@ -298,7 +298,7 @@ class Run:
             raise InputError(f"{self.folder}: holds no accepted step.")
         if step is None:
             return self.steps
-        if not 1 <= step <= self.steps:
+        if not (1 <= step <= self.steps and step == int(step)):
             raise InputError(
                 f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}."
             )

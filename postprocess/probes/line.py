@@ -15,6 +15,7 @@ from archord.postprocess.probes.probed import Along, Probed, nodal
 from archord.report.errors import InputError
 
 _ANGLE = "principal_angle"
+_IN_PLANE = (0, 1, 3)  # the places of the components of a stress that turn it in its plane
 _SAMPLES = 201  # on a line
 _BESIDE = 1e-6  # of a triangle's height, by which a point beside it still lies on it
 
@@ -32,7 +33,8 @@ def along_line(run: Probed, line: Sequence[float], quantity: str, step: int) -> 
     fields = run.fields(step)
     if quantity == _ANGLE and fields.stress is not None:
         # an angle itself jumps by half a turn between nodes
-        xx, yy, xy = (_values(run, fields, x, f"stress_{name}") for name in ("xx", "yy", "xy"))
+        names = [run.kinematics.names[k] for k in _IN_PLANE]
+        xx, yy, xy = (_values(run, fields, x, f"stress_{name}") for name in names)
         found = np.arctan2(2 * xy, xx - yy) / 2
     else:
         found = np.maximum(_values(run, fields, x, quantity), _least(quantity))

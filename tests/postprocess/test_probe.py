@@ -223,6 +223,13 @@ def test_the_arc_of_a_ball_is_a_quarter_of_a_circle(tmp_path):
         assert probe.values.argmax() < len(probe.values) / 3
     with pytest.raises(archord.InputError, match="no factor over a length"):
         probe.over(4.0)
+    angle = run.probe(line=(1.0, -1.0, 2.0, -1.0), quantity="principal_angle").values
+    stress = {
+        name: run.probe(line=(1.0, -1.0, 2.0, -1.0), quantity=f"stress_{name}").values
+        for name in ("rr", "zz", "rz")
+    }
+    twice = np.arctan2(2 * stress["rz"], stress["rr"] - stress["zz"])
+    assert angle == pytest.approx(twice / 2, rel=1e-12)
     points = run.pressure()
     assert points.attrs["units"]["weight"] == run.units["contact contact area"] == "mm2"
     touching = points[points["raw_pressure"] > 0]
@@ -255,6 +262,7 @@ def test_a_force_in_space_makes_no_stress_over_a_length(tmp_path):
         ({"edge": "end", "quantity": "pressure"}, "has no side 'end'; its sides are"),
         ({"edge": "hole", "quantity": "contact_shear"}, "its contacts have no friction"),
         ({}, "give an edge or a line"),
+        ({"edge": "hole", "step": 1.5}, "has no step 1.5; its accepted steps are"),
     ],
 )
 def test_what_cannot_be_probed_is_said(lug, asked, said):
