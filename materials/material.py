@@ -10,6 +10,7 @@ checkpoints store it.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import is_dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -152,8 +153,12 @@ class Points:
     def update(self, *strain: Array) -> tuple[Array, Array]:
         """Stress ``(n, n_stress)`` and consistent tangent ``(n, k, k)`` at ``strain`` ``(n, k)``,
         from the committed state."""
-        stress, tangent, self.trial = self.acting.update(*strain, self.state)
+        stress, tangent, self.trial = self.acting.update(*strain, self.given())
         return stress, tangent
+
+    def given(self) -> State:
+        """The committed state for a trial: a copy, as own classes may write into what they get."""
+        return deepcopy(self.state)
 
     @property
     def flows(self) -> npt.NDArray[np.bool_]:

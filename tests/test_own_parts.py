@@ -14,6 +14,7 @@ import archord
 from archord import cli
 from archord.commands.progress import Progress
 from archord.materials.kinematics import Kinematics
+from archord.materials.material import Points
 from archord.output import run as run_module
 from archord.postprocess.laws.run_steps import read_steps
 
@@ -54,13 +55,36 @@ class Wear(archord.ContactLaw):
         return {"worn volume": archord.Quantity(state.depth, "mm2")}
 
 
-def sliding(comm, k=1e-3, **changes):
+class WrittenInPlace(Wear):
+    """The same, whose history is written into what it gets."""
+
+    def respond(self, opening, trial, gamma, state, dt):
+        answer = super().respond(opening, trial, gamma, state, dt)
+        state.depth[:] = answer.state.depth
+        return answer._replace(state=state)
+
+
+class Worsening(Soft):
+    """A material whose history is exchanged in what it gets."""
+
+    yields = True
+
+    def state(self, n):
+        return Worn(np.zeros(n))
+
+    def update(self, strain, state):
+        state.depth = state.depth + np.abs(strain).max(axis=1)
+        stress, tangent, _ = self.hooke.update(strain, None)
+        return stress, tangent, state
+
+
+def sliding(comm, k=1e-3, law=Wear, **changes):
     """A block of `Soft` that is pressed on another one and slides on it."""
     mesh = archord.rectangles({"lower": (0, 0, 4, 1), "upper": (1, 1, 2, 1)}, 0.4, comm)
     return archord.Problem(
         mesh,
         bodies=[archord.Body("lower", Soft()), archord.Body("upper", archord.Elastic(500.0, 0.3))],
-        interactions=[archord.Interaction("rub", ("upper bottom", "lower top"), law=Wear(k))],
+        interactions=[archord.Interaction("rub", ("upper bottom", "lower top"), law=law(k))],
         supports=[archord.Support("lower bottom")],
         loads=[
             archord.Load("press", on="upper top", direction="y", displacement=[-0.01, -0.01]),
@@ -94,6 +118,19 @@ def test_a_run_goes_on_with_its_objects_on_any_number_of_ranks(comm, tmp_path, m
     for name in ("press force", "slide force", "rub worn volume", "elastic_energy"):
         scale = np.abs(alone.columns[name]).max()
         np.testing.assert_allclose(run.columns[name], alone.columns[name], atol=1e-9 * scale)
+
+
+def test_own_classes_may_write_into_the_history_that_they_get(run, tmp_path):
+    """It counts once a step, not once an iteration."""
+    same = archord.solve(sliding(MPI.COMM_SELF, law=WrittenInPlace), tmp_path / "run")
+    for name in ("press force", "rub worn volume"):
+        np.testing.assert_allclose(same.columns[name], run.columns[name], rtol=1e-9)
+    points = Points(Worsening(), 2)
+    strain = np.array([[0.1, 0.0, 0.0], [0.0, 0.2, 0.0]])
+    for _ in range(2):  # iterations
+        points.update(strain)
+    assert points.trial.depth.tolist() == [0.1, 0.2]
+    assert not points.state.depth.any()
 
 
 def test_a_quantity_of_a_law_is_of_the_whole(run, tmp_path):

@@ -210,7 +210,7 @@ class Pair:
     def _answer(self, opening: Array, trial: Array) -> None:
         """Let the law answer; points without a partner carry nothing."""
         points = self.points
-        response = points.acting.respond(opening, trial, self.gamma, points.state, self.dt)
+        response = points.acting.respond(opening, trial, self.gamma, points.given(), self.dt)
         points.trial = response.state
         with_partner = self.projection.found
         self.traction = _where(with_partner, response.traction)
