@@ -26,7 +26,7 @@ from archord.solver.problem import Problem
 _FAR = 0.1  # of the size of a surface: drawn farther behind another one, it does not face that
 _APART = 0.01  # of the same: a gap between tied surfaces that is told of
 _ALIKE = 2.0  # ratio of a drawn overlap and an interference, up to which they mean the same fit
-_ADDS = 0.1  # of an interference: a drawn gap or overlap that changes the fit
+_ADDS = 0.1  # of a fit: a drawn gap or overlap by which it is another one
 _BENT = 0.01  # of the length of an edge: how far it may depart from a line and be straight
 
 
@@ -352,7 +352,7 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
     how = "apart" if gap >= 0 else "deep in each other"
     said = f"the surfaces of {part.name!r} are drawn {abs(gap):.3g} {how}"
     wanted = part.interference
-    if part.overlap and deep < part.overlap / 2:
+    if part.overlap and deep < (1 - _ADDS) * part.overlap:
         yield f"{said}, but its overlap is {part.overlap:g}"
     is_alike = deep > wanted / _ALIKE and (deep < wanted * _ALIKE or not part.overlap)
     if wanted and is_alike:

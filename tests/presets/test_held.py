@@ -195,6 +195,7 @@ def test_a_fit_is_not_counted_twice(drawn, gap, fits, said):
         (-0.1, {"overlap": 0.1}, []),
         (0.0, {"interference": 0.1}, []),
         (-0.1, {"overlap": 0.1, "interference": 0.02}, []),
+        (-0.06, {"overlap": 0.1}, ["drawn 0.06 deep in each other, but its overlap is 0.1"]),
         (
             -0.02,
             {"interference": 0.1},
