@@ -59,6 +59,7 @@ def sweep(
         claim,
         open_cases,
         part_of,
+        warnings_of,
         write_tables,
     )
 
@@ -128,6 +129,8 @@ def sweep(
         say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
         for result in (result for result in known.values() if result.damaged):
             print(f"archord: warning: {result.message}.", file=sys.stderr)
+        for warning in warnings_of(design, folder):
+            print(f"archord: warning: {warning}.", file=sys.stderr)
         failed = [
             (case, known[case.run])
             for case in mine

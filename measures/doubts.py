@@ -136,7 +136,8 @@ def round_off_doubts(state: Accepted, tolerance: float) -> list[str]:
     return [Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual)]
 
 
-def balance_doubts(m: Record, sentence: str) -> list[str]:
-    """A warning, the ``sentence`` with the number, where forces do not balance."""
+def balance_doubts(m: Record, sentence: str, tolerance: float) -> list[str]:
+    """A warning, the ``sentence`` with the number, where forces do not balance, to the
+    ``tolerance`` of the solver."""
     left = m.force_balance
-    return [Doubt(sentence.format(left), left)] if left > _BALANCED else []
+    return [Doubt(sentence.format(left), left)] if left > max(_BALANCED, tolerance) else []

@@ -77,7 +77,7 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
     def balances(state: Accepted, m: Record) -> Iterator[str]:
         if m.force_balance:
             yield from round_off_doubts(state, scene.analysis.tolerance)
-        yield from balance_doubts(m, _UNBALANCED)
+        yield from balance_doubts(m, _UNBALANCED, scene.analysis.tolerance)
 
     return [surfaces, strains, angles, balances, _spring_doubts]
 

@@ -109,7 +109,7 @@ def step_checks(scene: Scene, system: System) -> list[Check]:
     def balances(state: Accepted, m: Record) -> Iterator[str]:
         if m.contact_area:
             yield from round_off_doubts(state, scene.analysis.tolerance)
-        yield from balance_doubts(m, _UNBALANCED)
+        yield from balance_doubts(m, _UNBALANCED, scene.analysis.tolerance)
 
     return [contact, core, strains, balances]
 

@@ -111,6 +111,19 @@ list = [{ load.force = 0.002 }, { load.force = 0.004, analysis.thickness = 2.0 }
     assert archord.load(tmp_path / "out").label(1).startswith("force [E* R] = 0.002")
 
 
+def test_a_sweep_tells_each_kind_of_warning_once(tmp_path, capsys):
+    """As a solve tells its own; a tolerance that a sweep chooses is none."""
+    text = "[grid]\njoint.relative_element_size = [0.5, 0.4]\npin.E = [0.5, 1.82]\n"
+    assert sweep(written(tmp_path, text), "-o", tmp_path / "out", "-q") == 0
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == len(set(told))
+    assert any("facets in contact; a smaller element_size would resolve it" in t for t in told)
+    assert all(line.startswith("archord: warning: case 1 and ") for line in told)
+    loose = "[grid]\npin.E = [0.5, 1.82]\nanalysis.tolerance = [1e-4]\nload.steps = [2]\n"
+    assert sweep(written(tmp_path, loose), "-o", tmp_path / "loose", "-q") == 0
+    assert "forces at pin" not in capsys.readouterr().err
+
+
 def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
     """By the same file, by one with another design, and by the folder itself."""
     before = times(solved / "out")
@@ -135,8 +148,9 @@ def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
     assert times(solved / "out") == after
 
 
-def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused):
+def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused, capsys):
     out = _again(solved)
+    capsys.readouterr()  # warnings of the sweep
     before = {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
     other = written(tmp_path, SOFT.replace("[2, 3]", "[4]"), "other")
     said = (
