@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 
 import pytest
 from hypothesis import settings
@@ -13,6 +14,8 @@ from archord.geometry.meshes import mesh_cache
 
 settings.register_profile("same", derandomize=True)  # the same examples in each run
 settings.load_profile("same")
+
+_PASSED = pytest.StashKey[bool]()
 
 
 def pytest_addoption(parser):
@@ -38,6 +41,19 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """Leave no folder of a test that passed: all of them together would fill a small /tmp."""
+    report = yield
+    if call.when == "call":
+        item.stash[_PASSED] = report.passed
+    elif call.when == "teardown" and item.stash.get(_PASSED, False):
+        folder = (getattr(item, "funcargs", None) or {}).get("tmp_path")
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+    return report
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,7 +20,7 @@ from tests import forked
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
 COARSE = [
     "--set",
-    "joint.relative_element_size=0.1",
+    "joint.relative_element_size=0.15",
     "--set",
     "joint.growth=1.0",
     "--set",
