@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _FREE = "free"
 _RIGID = "rigid"
+_SCENE = "identified.toml"
+_NUMBERS = "identified.json"
 
 
 @click.command()
@@ -80,8 +82,9 @@ def identify(
     if at and measured.turned:
         at = -at  # it is a reading of the file
     stiff = None if stiffness == _FREE else _stiffness(stiffness)
-    found = fit(begun, measured, frees, at, stiff)
     folder = output or Path("runs") / f"{curve.stem}_identified"
+    _refuse(folder, [curve, scene], force)
+    found = fit(begun, measured, frees, at, stiff)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -90,16 +93,29 @@ def identify(
     print("", identify_report.correlation_table(found), sep="\n")
     print("", *identify_report.notes(found), sep="\n")
     warn(*identify_report.doubts(found))
-    target = folder / "identified.toml"
+    target = folder / _SCENE
     texts: list[Text] = [
         (target, lambda: _identified(found, begun)),
-        (folder / "identified.json", lambda: identify_report.as_json(found)),
+        (folder / _NUMBERS, lambda: identify_report.as_json(found)),
     ]
     files = write(texts, [curve, scene], force)
     solved = _confirmed(found, target, folder, force) if confirm else None
     picture = identify_report.draw(found, folder / "identified.png", solved)
     print("", *files, picture, sep="\n")
     return 0
+
+
+def _refuse(folder: Path, inputs: list[Path], force: bool) -> None:
+    """Raise `InputError` if the ``folder`` cannot hold results or, without ``force``, has some:
+    before the fit, which takes seconds."""
+    from archord.output.user_file import check_target
+
+    nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not nearest.is_dir():
+        raise InputError(f"{folder}: cannot hold results: Not a directory.")
+    if nearest == folder:
+        for name in (_SCENE, _NUMBERS):
+            check_target(folder / name, inputs, force=force)
 
 
 def _number(option: str, text: str) -> float | None:

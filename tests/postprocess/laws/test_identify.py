@@ -12,6 +12,7 @@ import archord
 from archord.cli import run
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.identification import identification
 from archord.postprocess.laws.identification.identification import identify
 from archord.postprocess.laws.identification.identify_report import (
     as_json,
@@ -280,7 +281,7 @@ def test_an_offset_that_is_found_is_a_reading_of_the_file():
     assert told["delta"] == plain["delta"]
 
 
-def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
+def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys, monkeypatch):
     curve = measured(ELASTIC, {"joint.clearance": 0.006}, 5, turns=(-0.1, 1.5), n=100, soft=0.0)
     path = tmp_path / "curve.csv"
     table = np.column_stack([curve.displacement, curve.load])
@@ -297,6 +298,7 @@ def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
     assert data["estimates"][1]["name"] == OFFSET
     assert data["fixed"] == {COMPLIANCE: 0.0}
     assert (tmp_path / "out" / "identified.png").read_bytes()[1:4] == b"PNG"
+    monkeypatch.setattr(identification, "identify", lambda *given: pytest.fail("it was fitted"))
     assert run(words) == 2
     assert "is there already" in capsys.readouterr().err
     assert run([*words, "--force", "--offset", "deep"]) == 2
@@ -312,7 +314,9 @@ def test_the_command_writes_scene_numbers_and_picture(tmp_path, capsys):
         (["-o", "/dev/null/x"], "/dev/null/x: cannot hold results"),
     ],
 )
-def test_odd_options_are_refused(tmp_path, refused, option, words):
+def test_odd_options_are_refused(tmp_path, refused, option, words, monkeypatch):
+    """Before the fit, which takes seconds."""
+    monkeypatch.setattr(identification, "identify", lambda *given: pytest.fail("it was fitted"))
     path = tmp_path / "curve.csv"
     path.write_text("u,F\n" + "".join(f"{k / 200},{50 * k}\n" for k in range(20)))
     given = ["identify", str(path), "--scene", str(STEEL), "--free", "joint.clearance"]
