@@ -160,12 +160,13 @@ def _without_mesh(scene: Scene) -> tuple:
     sizes = [g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1]]
     shown = [f"{size:.9g}" for size in (*sizes, analysis.friction)]
     stages = (*scene.load.stage_steps, "to", *scene.load.stages)
+    substeps = scene.stepping.model_dump_json()  # bodies that yield go other ways in others
     bodies = (scene.pin.model_dump_json(), scene.block.model_dump_json())
     if scene.force_controlled:
         shown.append(f"{scene.thickness:.9g}")
     how = (analysis.plane, analysis.strain, analysis.kinematics, analysis.integration)
     method = (analysis.degree, analysis.gamma_factor, g.edge_angle, g.edge_ratio)
-    return (*shown, *stages, *bodies, *how, *method)
+    return (*shown, *stages, substeps, *bodies, *how, *method)
 
 
 def difference(one: Curve, other: Curve, largest: float) -> float:

@@ -209,6 +209,17 @@ def test_one_force_on_another_thickness_is_no_finer_mesh(other, scenes):
     assert len(group(runs)) == scenes
 
 
+def test_shorter_steps_are_no_finer_mesh():
+    """Of bodies that yield they change the force, as a mesh does."""
+    short = {"stepping": {"initial": 0.25, "maximum": 0.25}}
+    coarse, fine, same = (
+        replace(curve(0.83), scene=scene(h, **given))
+        for h, given in ((0.1, {}), (0.05, short), (0.1, short))
+    )
+    assert [len(refined.runs) for refined in group([coarse, fine])] == [1, 1]
+    assert [len(refined.runs) for refined in group([coarse, fine, same])] == [1, 2]
+
+
 def test_three_meshes_tell_the_order():
     """Data off by A h^1.5, with ratios of mesh size that are no two alike: the error of k is
     exactly A h^1.5."""
