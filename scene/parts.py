@@ -29,7 +29,7 @@ IN_SPACE = ("x", "y", "z", "rotation x", "rotation y", "rotation z")
 Freedom = Literal["x", "y", "rotation", "z", "rotation x", "rotation y", "rotation z"]
 ContactLawName: Any = Literal[tuple(CONTACT_LAWS)]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
-_RIGHT_ANGLE = 1.5708
+_FULL_TURN = 6.2832
 _OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no surface's
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
@@ -290,10 +290,16 @@ class LoadSection(Loading):
             else "is not for a pressure, which acts along the normal"
         )
         require(directed, "direction", said)
-        rotated = turns(self.direction) and self.displacement is not None
-        said = "must be at most 1.5708, a right angle in radians: a coupling turns linearly"
-        require(not rotated or max(map(abs, self.stages)) <= _RIGHT_ANGLE, "displacement", said)
+        said = "must be at most 6.2832, a full turn in radians"
+        require(self.largest_turn <= _FULL_TURN, "displacement", said)
         return self
+
+    @property
+    def largest_turn(self) -> float:
+        """The largest angle by which it turns a coupling, 0 if it does not."""
+        if not turns(self.direction) or self.displacement is None:
+            return 0.0
+        return max(map(abs, self.stages))
 
 
 class PathSection(Section):

@@ -31,6 +31,11 @@ from archord.scene.sections.units import Units
 
 FORMAT = 2
 _SECONDS = 0.5  # of an output step: a guess, as the mesh is not known yet
+_RIGHT_ANGLE = 1.5708
+_TURNS_LINEARLY = (
+    "must be at most 1.5708, a right angle in radians: a coupling turns linearly, but at large "
+    "strain a rigid one in space with three prescribed rotations, which may turn by 6.2832"
+)
 # parts whose names must differ, as results, reactions and drives are found by them
 _APART = {
     "body": (),
@@ -121,6 +126,16 @@ class ProblemScene(Checked):
     )
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
+    def _turns_finitely(self, coupling: str) -> bool:
+        """Whether the rotations of a ``coupling`` are finite: at large strain, if all of them are
+        prescribed."""
+        rigid = [part.name for part in self.coupling if part.kind == "rigid"]
+        moved = [load for load in self.load if load.displacement is not None]
+        prescribed = {load.direction for load in moved if load.on == coupling}
+        prescribed.update(*(part.fixed for part in self.support if part.on == coupling))
+        is_large = self.in_space and self.analysis.strain == "large"
+        return is_large and coupling in rigid and prescribed.issuperset(filter(turns, IN_SPACE))
+
     @model_validator(mode="after")
     def _consistent(self) -> ProblemScene:
         for section, others in _APART.items():
@@ -144,6 +159,9 @@ class ProblemScene(Checked):
         require(drawn, "analysis.plane", said)
         if self.in_space:
             object.__setattr__(self.analysis, "plane", "space")
+        for load in self.load:
+            near = load.largest_turn <= _RIGHT_ANGLE or self._turns_finitely(load.on)
+            require(near, ("load", load.name, "displacement"), _TURNS_LINEARLY)
         self._require_dimension()
         self._directions()
         require_different(self)

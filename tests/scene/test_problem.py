@@ -351,6 +351,9 @@ def test_a_coupling_turns_by_a_right_angle_at_most():
     data["load"].append(
         {"name": "turn", "on": "point", "direction": "rotation", "displacement": 90.0}
     )
+    with pytest.raises(InputError, match=r"must be at most 6.2832, a full turn in radians"):
+        parse_any(data)
+    data["load"][-1]["displacement"] = 2.0
     with pytest.raises(InputError, match=r"must be at most 1.5708, a right angle in radians"):
         parse_any(data)
 

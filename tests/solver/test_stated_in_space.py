@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import archord
-from archord import Body, Coupling, Interaction, Load, Problem, Support
+from archord import Body, Coupling, Interaction, Load, Problem, Support, boxes
 from archord.materials.elasticity import Elastic
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
@@ -280,3 +281,23 @@ def test_the_moment_of_a_finite_rotation_does_its_work(comm):
     weights = np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) * 0.5 / 24
     assert system.energies()[0] == pytest.approx(weights @ moments, rel=1e-4)
     assert system.drive_displacement("twist") == 0.5
+
+
+def test_a_rigid_coupling_turns_beyond_a_right_angle_at_large_strain(tmp_path):
+    """Where all its rotations are prescribed: a block that turns with it is not strained."""
+    angle = 4.0
+    mesh = boxes({"block": (1, 0, 0, 1, 1, 1)}, size=1.0)
+    problem = Problem(
+        mesh,
+        [Body("block", Elastic(210e3, 0.3))],
+        supports=[Support("hinge", on="pin", fixed=["x", "y", "z", "rotation x", "rotation y"])],
+        couplings=[Coupling("pin", "block left", (0, 0, 0))],
+        loads=[Load("turn", on="pin", direction="rotation z", displacement=angle)],
+        strain="large",
+        steps=3,
+    )
+    run = archord.solve(problem, tmp_path, fields="cells")
+    turned = Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix()
+    x = run.fields().coordinates
+    np.testing.assert_allclose(run.fields().displacement, x @ (turned.T - np.eye(3)), atol=1e-9)
+    assert run.history["elastic_energy"].max() < 1e-12
