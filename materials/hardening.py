@@ -146,6 +146,8 @@ class TabularHardening(Hardening):
             raise ValueError("PEEQ must begin at 0 and increase from point to point")
         if not (stress[0] > 0 and np.isfinite(stress).all() and (np.diff(stress) >= 0).all()):
             raise ValueError("yield stresses must be positive and must not decrease with PEEQ")
+        own = tuple(zip(map(float, peeq), map(float, stress), strict=True))
+        object.__setattr__(self, "points", own)  # an array may be changed later
 
     @classmethod
     def from_engineering(cls, points: Sequence[Sequence[float]], E: float) -> TabularHardening:

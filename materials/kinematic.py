@@ -113,6 +113,8 @@ class KinematicMaterial(J2Material):
             raise ValueError(
                 "moduli of back stresses must be positive, rates of recovery must not be negative"
             )
+        own = tuple((float(C), float(gamma)) for C, gamma in self.back_stresses)
+        object.__setattr__(self, "back_stresses", own)  # an array may be changed later
 
     @property
     def _moduli(self) -> Array:

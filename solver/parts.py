@@ -201,6 +201,9 @@ class Load:
         values = np.atleast_1d(getattr(self, self.kind))
         numbers = values.ndim == 1 and len(values) > 0 and all(map(_is_number, values))
         require_of(self, numbers, self.kind, "must be a number, or a list of numbers")
+        if np.ndim(getattr(self, self.kind)) == 1:
+            own = list(map(float, values))
+            object.__setattr__(self, self.kind, own)  # an array may be changed later
         wanted = (None,) if self.kind == "pressure" else FREEDOMS
         said = f"must be {_IN_WORDS}, and None for a pressure, which acts along the normal"
         require_of(self, self.direction in wanted, "direction", said)

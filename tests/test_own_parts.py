@@ -133,6 +133,21 @@ def test_own_classes_may_write_into_the_history_that_they_get(run, tmp_path):
     assert not points.state.depth.any()
 
 
+def test_arrays_of_parts_may_be_changed_after_their_use():
+    """Parts that were made of them keep their numbers."""
+    table = np.array([[0.0, 200.0], [0.1, 300.0]])
+    back = np.array([[2e4, 50.0]])
+    values = np.array([0.1, 0.2])
+    hardening = archord.TabularHardening(table)
+    metal = archord.KinematicMaterial(210e3, 0.3, hardening=hardening, back_stresses=back)
+    load = archord.Load("pull", direction="x", displacement=values)
+    for array in (table, back, values):
+        array *= 2
+    assert hardening.points == ((0.0, 200.0), (0.1, 300.0))
+    assert metal.back_stresses == ((2e4, 50.0),)
+    assert load.stages == (0.1, 0.2)
+
+
 def test_a_quantity_of_a_law_is_of_the_whole(run, tmp_path):
     """As the forces are: k times force times slip is worn off, whatever part is modelled."""
     twice = archord.solve(sliding(MPI.COMM_SELF, symmetry=2), tmp_path / "run")
