@@ -42,22 +42,25 @@ def test_a_failed_step_leaves_no_trace():
 
 def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported
-    before."""
+    before, and the state is that of the last one."""
     problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5})
     joint = joint_system(problem, MPI.COMM_SELF)
     accepted = []
     targets = problem.targets
+    path = joint.load_path()
     with pytest.raises(
         StepFailure,
         match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller",
     ):
         march(
-            joint.load_path(),
+            path,
             targets,
             rules=StepRules(minimum=1.0),
             target_done=lambda step, position: accepted.append(step.load),
         )
     assert accepted == targets[:4]
+    assert joint.equilibrium.load == targets[3]
+    assert np.array_equal(joint.equilibrium.state(), path.state)
 
 
 def test_one_large_step_finds_the_plastic_state():
