@@ -89,8 +89,7 @@ class Equilibrium:
         self._accepted_load = load
         self.unknowns.restore(state)
         if self.springs:
-            own = self.unknowns.u.x.array[: self.unknowns.n_dofs].copy()
-            self.springs.rest = own, self.unknowns.levels.copy()
+            self.springs.rest_at(state)
 
     def resume(self, load: float, state: Array, largest_reaction: float) -> None:
         """Take up an accepted state of an earlier process, whose history the points have already,

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from archord.solver.linear.strategy import Facts
 
 _MANY_DOFS = 20_000  # for which a factorisation takes longer than some solves with an old one
-_MANY_DOFS_YIELDING = 2_000  # the same where an elastic joint would be condensed
+_MANY_DOFS_YIELDING = 2_000  # the same where bodies yield
 _MANY_SOLVES = 8  # that cost what a factorisation does
 _NEAR = 2e-3  # residual over reaction below which the matrix of bodies that yield hardly changes
 
@@ -26,8 +26,8 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Lagged:
-    """When to factorise, and how long to iterate with an old factorisation, of bodies of which one
-    ``yields`` or none."""
+    """When to factorise, and how long to iterate with an old factorisation; ``yields`` tells
+    whether bodies can yield."""
 
     def __init__(self, *, yields: bool) -> None:
         self._yields = yields
