@@ -8,6 +8,7 @@ do not meet (docs/peers.md).
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -48,10 +49,12 @@ class Peer:
             )
         except (OSError, subprocess.SubprocessError):
             return None
-        return said.strip()
+        # Kratos prints a banner, too
+        return next((line for line in said.split("\n") if re.fullmatch(r"[\w.+-]+", line)), None)
 
 
 _COARSE = ((0.16, 2), (0.08, 2), (0.04, 2), (0.02, 2))
+_FINE = ((0.08, 1), (0.04, 1), (0.02, 1), (0.01, 1), (0.005, 1))
 _HIGH = ((0.16, 4), (0.08, 4), (0.04, 4), (0.02, 4))
 PEERS = (
     Peer("scikit-fem", "skfem_joint.py", {"elastic": (*_COARSE, (0.01, 2)), "plastic": _COARSE}),
@@ -62,6 +65,7 @@ PEERS = (
         "ngsolve_joint.py",
         {"elastic": _COARSE[1:] + _HIGH, "plastic": _COARSE[1:] + _HIGH[:3]},
     ),
+    Peer("Kratos", "kratos_joint.py", {"elastic": _FINE, "plastic": _FINE[:4]}),
 )
 
 

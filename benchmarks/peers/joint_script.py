@@ -40,6 +40,8 @@ TOLERANCE = 1e-8  # residual over the reaction at which `newton` ends
 FAR = 1e3  # and at which it gives up
 PIN = (-DR, R)  # height of the centre, and radius
 BLOCK = (0.0, R + DR)
+_TRIANGLES = 9  # gmsh's numbers of element types: with six nodes
+_QUADRILATERALS = 3  # with four
 
 
 def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
@@ -49,6 +51,31 @@ def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
     """
     import gmsh
 
+    _draw(gmsh, size, growth, bodies)
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.model.mesh.generate(2)
+    return _meshed(gmsh, _TRIANGLES)
+
+
+def mesh_quadrilaterals(size: float, growth: float, body: tuple[float, float]):
+    """Quadrilaterals of `PIN` or `BLOCK`, sized as in `mesh_bodies`: nodes ``(n, 2)``, elements
+    ``(m, 4)`` and the edges ``(e, 2)`` of elements on the arc."""
+    import gmsh
+
+    # gmsh cuts what it has made, triangles too, into quadrilaterals half as large
+    _draw(gmsh, 2 * size, 2 * growth, (body,))
+    for option, value in (("Algorithm", 8), ("RecombineAll", 1), ("SubdivisionAlgorithm", 1)):
+        gmsh.option.setNumber(f"Mesh.{option}", value)
+    gmsh.model.mesh.generate(2)
+    nodes, cells = _meshed(gmsh, _QUADRILATERALS)
+    (y, radius) = body
+    on_arc = np.abs(np.hypot(nodes[:, 0], nodes[:, 1] - y) - radius) < 1e-9
+    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return nodes, cells, edges[on_arc[edges].all(axis=1)]
+
+
+def _draw(gmsh, size: float, growth: float, bodies) -> None:
+    """Start gmsh with the outlines of the bodies and the sizes of their elements."""
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     geo = gmsh.model.geo
@@ -67,14 +94,18 @@ def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
     for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
         gmsh.option.setNumber(f"Mesh.{option}", 0)
-    gmsh.option.setNumber("Mesh.ElementOrder", 2)
-    gmsh.model.mesh.generate(2)
+
+
+def _meshed(gmsh, kind: int):
+    """Nodes ``(n, 2)`` and elements ``(m, k)`` of gmsh's element type ``kind``; ends gmsh."""
     tags, x, _ = gmsh.model.mesh.getNodes()
-    used, cells = np.unique(gmsh.model.mesh.getElementsByType(9)[1], return_inverse=True)
+    _, of_elements = gmsh.model.mesh.getElementsByType(kind)
+    used, cells = np.unique(of_elements, return_inverse=True)
+    n_corners = gmsh.model.mesh.getElementProperties(kind)[3]
     position = np.zeros(int(tags.max()) + 1, dtype=int)
     position[tags] = np.arange(len(tags))
     gmsh.finalize()
-    return x.reshape(-1, 3)[position[used], :2], cells.reshape(-1, 6)
+    return x.reshape(-1, 3)[position[used], :2], cells.reshape(-1, n_corners)
 
 
 def axis_pressure(angle, pressure) -> float | None:
@@ -128,7 +159,7 @@ def main(joint, kinematics: str, version: str, orders: tuple[int, ...] = (2,)) -
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", choices=["elastic", "plastic"], default="elastic")
     parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
-    parser.add_argument("--order", type=int, choices=orders, default=2)
+    parser.add_argument("--order", type=int, choices=orders, default=orders[0])
     parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
     parser.add_argument("--output", type=Path, default=Path("result.json"))
     parser.add_argument(
