@@ -31,6 +31,8 @@ _STYLES = {
     "scikit-fem": ("#009E73", "s"),
     "GetFEM": ("#CC79A7", "D"),
     "NGSolve": ("#E69F00", "^"),
+    "Kratos": ("#000000", "P"),
+    "asimov-contact": ("#56B4E9", "X"),
 }
 _OTHER = ("0.4", "x")
 _TEXT = 14  # points, to be read on a telephone

@@ -6,8 +6,9 @@ Two families of meshes of each case, which refine near and far elements in diffe
 extrapolated to vanishing elements, each by itself. The value is the mean of both; its error is
 their difference or, if that is larger, the change of an extrapolation when one of its meshes is
 left out. The pressure profile is the mean of meshes of both families that are four times finer
-where the contact ends. The command writes references.json and prints the table of
-docs/work_precision.md; runs that are there are not solved again.
+where the contact ends, and have elements of degree 3 where the joint yields. The command writes
+references.json and prints the table of docs/work_precision.md; runs that are there are not solved
+again.
 """
 
 from __future__ import annotations
@@ -135,15 +136,12 @@ def scene_of(case: str, size: float, growth: float, kinematics: str, *, edge: bo
     """The joint of a ``case`` on a mesh, which may be finer at the ``edge`` of the contact."""
     given = CASES[case]
     mesh = {"growth": growth}
+    analysis = {"kinematics": kinematics}
     if edge:
         mesh["edge_angle"] = given["edge_angle"]
-    return paper_joint(
-        size,
-        given["steps"],
-        given.get("yield_stress"),
-        joint=mesh,
-        analysis={"kinematics": kinematics},
-    )
+        analysis["degree"] = given["profile_degree"]
+    yields = given.get("yield_stress")
+    return paper_joint(size, given["steps"], yields, joint=mesh, analysis=analysis)
 
 
 def solve(

@@ -30,6 +30,7 @@ from archord.benchmarks.peers.installed import Peer, installed
 from archord.benchmarks.timing import Failure, Process, solving
 from archord.geometry.basis import Array
 from archord.postprocess.run import Run
+from archord.presets.arc import ArcProfile
 from archord.report.errors import InputError
 from archord.report.version import VERSION
 from archord.scene.file import AnyScene, parse_any, resolved
@@ -156,9 +157,16 @@ def quantities_of(run: Run) -> dict[str, Any]:
     """What a ``run`` of the paper's joint found at its last step."""
     found: dict[str, Any] = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
     # the unbiased contact integrates one half of the pressure on either side
-    arcs = run.contact().values()
-    sides = [profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in arcs]
+    sides = [_profile_of(arc, run.scene.plastic) for arc in run.contact().values()]
     return found | {"profile": np.mean(sides, axis=0), "dofs": run.summary["mesh"]["dofs"]}
+
+
+def _profile_of(arc: ArcProfile, yields: bool) -> Array:
+    """The profile of one side. Where it ``yields``, pressures at points scatter, and their mean is
+    off by 0.4 %; facet means are not."""
+    if yields:
+        return profile(*arc.facet_means())
+    return profile(arc.angle.ravel(), arc.pressure.ravel())
 
 
 def _pin_of(scene: AnyScene) -> Pin | None:
