@@ -101,7 +101,8 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         max_iterations=analysis.max_iterations,
         guess=guess,
         from_rest=g.dR > 0,
-        kinematics=kinematics(analysis.plane, scene.thickness),
+        kinematics=kinematics(analysis.plane),
+        thickness=scene.thickness,
         coarser=(lambda: joint_problem(_coarser(scene), comm)) if analysis.coarse_start else None,
     )
 

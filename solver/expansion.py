@@ -30,7 +30,8 @@ Rate = float | Callable[[Array], Array]
 def expanded(problem: Problem) -> Problem:
     """The ``problem``, whose mesh is on ranks, with boundary conditions alone. Collective; raises
     ValueError for sets that the mesh lacks, and for a problem that contradicts itself."""
-    return _Expansion(problem).problem() if problem.is_stated else problem
+    expansion = _Expansion(problem)
+    return expansion.problem() if problem.is_stated else expansion.bounded()
 
 
 class _Expansion:
@@ -80,6 +81,7 @@ class _Expansion:
                 self._mean_point(coupling)
         self._require_one_support()
         changes: dict[str, Any] = {
+            "travel": self._farthest(),
             "supports": self.supports,
             "loads": self.loads,
             "couplings": (),
@@ -91,7 +93,7 @@ class _Expansion:
         if self.given_loads:
             travel = self._travel()
             slide = travel if np.isfinite(travel) else 0.0
-            travel = min(travel, self._farthest())
+            travel = min(travel, changes["travel"])
             changes |= {"fit": stated.fits, "stabilise": True, "travel": travel}
             changes["guess"] = self._guess()
         interactions = [self._interaction(part, slide) for part in stated.interactions]
@@ -156,9 +158,14 @@ class _Expansion:
         fits = [i.interference + i.overlap for i in self.stated.interactions]
         return sum(lengths) + max(fits, default=0.0)
 
+    def bounded(self) -> Problem:
+        """The problem as it is, its travel no larger than what no body reaches. Collective."""
+        return replace(self.stated, travel=self._farthest())
+
     def _farthest(self) -> float:
-        """A displacement that no body reaches, under a force neither. Collective."""
-        return _STRETCHED * _largest_side(*self._box())
+        """A displacement that no body reaches, under a force neither, and no larger than the travel
+        that the problem states. Collective."""
+        return min(self.stated.travel, _STRETCHED * _largest_side(*self._box()))
 
     def _require_near(self) -> None:
         """Raise ValueError for a displacement beyond the size of the mesh, as if in other units.

@@ -4,7 +4,7 @@ sets of the mesh."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -73,6 +73,7 @@ class Body:
     name: str
     material: Any
     cells: str = ""
+    _live_of: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the parts; raise `InputError`."""
@@ -82,6 +83,17 @@ class Body:
         require_of(self, isinstance(self.material, str) or is_material, "material", said)
         object.__setattr__(self, "cells", self.cells or self.name)
         _require_name(self, "cells")
+
+    @property
+    def stated(self) -> Any:
+        """The material as its user stated it, whatever a problem made of it."""
+        return self.material if self._live_of is None else self._live_of
+
+    def with_live(self, material: Any) -> Body:
+        """The body with the ``material`` that a problem made of the stated one."""
+        body = replace(self, material=material)
+        object.__setattr__(body, "_live_of", self.stated)
+        return body
 
 
 @in_sentences

@@ -177,7 +177,7 @@ class Problem:
             given = "space" if self.mesh.dimension == 3 else PLANE_STRAIN
         if given is not None:
             self._take(_kinematics(given, self.thickness))
-        bodies = [replace(body, material=self._live(body)) for body in self.bodies]
+        bodies = [body.with_live(self._live(body)) for body in self.bodies]
         object.__setattr__(self, "bodies", bodies)
         for kind in _DIFFERENT:
             names = [part.name for part in getattr(self, kind)]
@@ -196,8 +196,6 @@ class Problem:
         origin = (0.0,) * kinematics.dimension
         couplings = [replace(part, point=part.point or origin) for part in self.couplings]
         object.__setattr__(self, "couplings", couplings)
-        if kinematics.is_plane and kinematics.thickness != 1:
-            object.__setattr__(self, "thickness", kinematics.thickness)
         self._require_fitting_mesh()
 
     def _require_pairs_once(self) -> None:
@@ -277,14 +275,14 @@ class Problem:
     def _live(self, body: Body) -> Any:
         """The material of the ``body`` under the problem's kinematics, or as it is while these wait
         for the mesh."""
-        material = body.material
+        material = body.stated
         if not isinstance(material, str) and (fault := fault_of(material)):
             raise InputError(f'archord.Problem: body "{body.name}".{fault}.')
         if isinstance(material, str):
             try:
                 material = named_material(material, self.units[1])
             except ValueError as error:
-                said = f'body "{body.name}".material = "{body.material}" {error}'
+                said = f'body "{body.name}".material = "{body.stated}" {error}'
                 raise InputError(f"archord.Problem: {said}.") from None
         if self.kinematics is None:
             return material
@@ -413,7 +411,7 @@ def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
             raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
         given = kinematics(given.removeprefix("plane "))
     if thickness is None:
-        return given
+        return given.with_thickness(1.0)  # of a problem before, whose thickness was dropped
     if not (is_number(thickness) and thickness > 0):
         raise InputError(f"archord.Problem: thickness must be positive, not {thickness!r}.")
     try:

@@ -9,6 +9,7 @@ from mpi4py import MPI
 import archord
 from archord.report.errors import InputError
 from archord.scene.file import load_scene
+from archord.solver.conditions import DeadLoad
 from archord.solver.expansion import expanded
 from archord.solver.path.stepping import StepFailure
 from archord.solver.path.system import System
@@ -154,7 +155,14 @@ def test_a_force_beyond_the_limit_load_ends_at_it():
     assert 0.0067 < numbers[1] < numbers[0] < 1.02 * numbers[1] < 0.03
 
 
-def test_a_pressure_beyond_the_limit_load_ends_at_it():
+@pytest.mark.parametrize(
+    "press",
+    [
+        archord.Load("pull", on="bar right", pressure=-300.0),
+        DeadLoad(facets="bar right", pressure=-300.0),
+    ],
+)
+def test_a_pressure_beyond_the_limit_load_ends_at_it(press):
     """What Newton's method throws far away is no equilibrium, however large its round-off is."""
     metal = archord.J2Material(200e3, 0.3, hardening=archord.LinearHardening(200.0))
     mesh = archord.rectangles({"bar": (0.0, 0.0, 2.0, 1.0)}, size=0.5)
@@ -162,7 +170,7 @@ def test_a_pressure_beyond_the_limit_load_ends_at_it():
         mesh,
         [archord.Body("bar", metal)],
         supports=[archord.Support("bar left", fixed="x"), archord.Support("bar bottom", fixed="y")],
-        loads=[archord.Load("pull", on="bar right", pressure=-300.0)],
+        loads=[press],
         kinematics="plane stress",
         steps=6,
     )

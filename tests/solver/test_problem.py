@@ -241,3 +241,24 @@ def test_a_problem_gives_its_kinematics_to_its_materials():
         ValueError, match="plane = 'stress' does not fit a problem whose kinematics"
     ):
         columns(material=Elastic(E, NU, "stress"))
+
+
+@pytest.mark.parametrize(
+    ("key", "first", "then"),
+    [
+        ("thickness", 2.5, None),
+        ("strain", "large", "small"),
+        ("units", ("mm", "MPa"), ("m", "Pa")),
+    ],
+)
+def test_a_problem_that_is_replaced_keeps_nothing_of_the_one_before(key, first, then):
+    """Its thickness, its strain, and the units of a metal given by its name."""
+    bodies = [Body("lower", "S355"), Body("upper", HARDENING)]
+    mesh = blocks(MPI.COMM_SELF, 1, 1)
+    stated = Problem(mesh, bodies, kinematics="plane stress", **{key: first})
+    changed = replace(stated, **{key: then})
+    fresh = Problem(mesh, bodies, kinematics="plane stress", **{key: then})
+    assert (changed.thickness, changed.kinematics) == (fresh.thickness, fresh.kinematics)
+    for one, other in zip(changed.bodies, fresh.bodies, strict=True):
+        assert type(one.material) is type(other.material)
+        assert one.material.E == other.material.E
