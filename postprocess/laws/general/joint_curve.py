@@ -21,6 +21,7 @@ from __future__ import annotations
 import json
 import warnings
 from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,7 +131,7 @@ class JointCurve:
     pin_length: float = 1.0
     radius: float | None = None
 
-    @property
+    @cached_property
     def yields(self) -> bool:
         """Whether the way back is another than first loading, or is known less well."""
         same = np.array_equal(self.y, self.back) and np.array_equal(self.dy, self.dback)
@@ -175,9 +176,11 @@ class JointCurve:
         state = self._first_loading(x)
         returning = x < most
         if returning.any() and self.yields:
-            below = self._way_back(x, most, state)
-            pairs = zip(below, state, strict=True)
-            state = CurveState(*(np.where(returning, *pair) for pair in pairs))
+            state = CurveState(*map(np.asarray, state))
+            first = CurveState(*(values[returning] for values in state))
+            below = self._way_back(x[returning], most[returning], first)
+            for values, found in zip(state, below, strict=True):
+                values[returning] = found
         is_open = x <= 0
         load, *others = (np.where(is_open, 0.0, values) for values in state)
         load = np.where(numbers, load, np.nan)
@@ -251,17 +254,17 @@ class JointCurve:
 
     def _curve(self, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
         """``f`` and its slope at ``x >= 0``."""
-        y, dy = hermite(self.x, f, df, x)
+        x = np.asarray(x)
+        y, dy = map(np.asarray, hermite(self.x, f, df, x))
         if self.touch.size:
             early = x < self.x[1]
-            touch_y, touch_dy = first_touch(self.touch, np.clip(x, 1e-290, self.x[1]))
-            y = np.where(early, touch_y, y)
-            dy = np.where(early, touch_dy, dy)
+            y[early], dy[early] = first_touch(self.touch, np.maximum(x[early], 1e-290))
         is_open = x <= 0
         return np.where(is_open, 0.0, y), np.where(is_open, 0.0, dy)
 
     def _inverse(self, f: Array, df: Array, y: Array) -> Array:
         """The ``x`` at which the rising curve ``f`` is ``y``; 0 where ``y <= 0``."""
+        y = np.asarray(y)
         i = interval(f, y)
         piece = Piece.of(self.x, f, df, i)
         begin = f[i]
@@ -288,8 +291,7 @@ class JointCurve:
         x = np.where(y > f[-1], self.x[-1] + past_end, inside)
         if self.touch.size:
             early = (y > 0) & (y < f[1])
-            at_touch = touch_displacement(self.touch, np.where(early, y, 1.0))
-            x = np.where(early, at_touch, x)
+            x[early] = touch_displacement(self.touch, y[early])
         return np.where(y > 0, x, 0.0)
 
     def to_json(self) -> str:

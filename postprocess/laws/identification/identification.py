@@ -112,10 +112,9 @@ class Model:
         """Law less measured forces over the largest measured force ``(n,)``."""
         return (self.predicted(z).load - self.curve.load) / self.curve.largest
 
-    def jacobian(self, z: Array, chosen: Iterable[int]) -> Array:
-        """Derivatives ``(n, k)`` of the residuals by the ``chosen`` unknowns; a step leads away
-        from the nearer bound."""
-        base = self.residuals(z)
+    def jacobian(self, z: Array, chosen: Iterable[int], base: Array) -> Array:
+        """Derivatives ``(n, k)`` of the residuals, ``base`` at ``z``, by the ``chosen`` unknowns; a
+        step leads away from the nearer bound."""
         columns = []
         for k in chosen:
             low, high = self.bounds[:, k]
@@ -135,16 +134,22 @@ class Model:
         iterations; residuals beyond ``scale`` count less."""
         chosen = np.flatnonzero(np.arange(len(z)) != held)
         low, high = self.bounds[:, chosen]
+        known: dict[bytes, Array] = {}  # residuals of this fit, which the Jacobian needs again
 
         def whole(part: Array) -> Array:
             found = z.copy()
             found[chosen] = part
             return found
 
+        def residuals(part: Array) -> Array:
+            if part.tobytes() not in known:
+                known[part.tobytes()] = self.residuals(whole(part))
+            return known[part.tobytes()]
+
         found = least_squares(
-            lambda part: self.residuals(whole(part)),
+            residuals,
             np.clip(z[chosen], low + 1e-6, high - 1e-6),
-            jac=lambda part: self.jacobian(whole(part), chosen),
+            jac=lambda part: self.jacobian(whole(part), chosen, residuals(part)),
             bounds=(low, high),
             loss="huber",
             f_scale=scale,
@@ -268,8 +273,8 @@ def _deviation(residuals: Array) -> float:
 def _judged(model: Model, found: Any, scale: float) -> Identification:
     """The solution with its intervals and correlations."""
     z = found.x
-    J = model.jacobian(z, range(len(z)))
     r = model.residuals(z)
+    J = model.jacobian(z, range(len(z)), r)
     size = np.linalg.norm(J, axis=0)
     bound = (np.abs(model.bounds - z) < _BOUND).any(axis=0)
     blind = size < _FLAT * size.max()
