@@ -133,8 +133,8 @@ class ProblemFamily:
         return [m[self.scene.accurate] for m in steps]
 
     def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
-        """Whether something is in contact at the end, if anything is to be."""
-        return steps[-1].contact_area > 0 or not self.scene.interaction
+        """Whether something is in contact at any step, if anything is to be."""
+        return any(m.contact_area for m in steps) or not self.scene.interaction
 
 
 def coarser(scene: ProblemScene) -> ProblemScene | None:

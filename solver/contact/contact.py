@@ -175,10 +175,11 @@ class Contact:
         all ranks."""
         return self.interface(name).resultant()
 
-    def moments(self, name: str, point: Sequence[float]) -> Array:
+    def moments(self, name: str, point: Sequence[float], *, deformed: bool) -> Array:
         """Moments ``(t,)`` of this force about ``point``, over all ranks: anticlockwise in a plane,
-        about x, y and z in space, none around an axis."""
-        return self.interface(name).moments(np.asarray(point))
+        about x, y and z in space, none around an axis. They are of the ``deformed`` surface, or as
+        it was."""
+        return self.interface(name).moments(np.asarray(point), deformed=deformed)
 
     def largest_pressed(self) -> float:
         """Sum of the sizes of the points' forces of the interaction where it is largest, over all

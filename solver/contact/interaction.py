@@ -211,14 +211,16 @@ class Interface:
         """Contact force ``(d,)`` on the second surface, over all ranks."""
         return self._summed([pair.forces for pair in self.pairs])
 
-    def moments(self, point: Array) -> Array:
+    def moments(self, point: Array, *, deformed: bool) -> Array:
         """Moments ``(t,)`` of this force about ``point`` ``(d,)``, over all ranks, in the turns of
-        the kinematics: anticlockwise in a plane."""
+        the kinematics: anticlockwise in a plane. They are of the ``deformed`` surface, or as it
+        was."""
         kinematics = self.pairs[0].surface.kinematics
         moments = []
         for pair in self.pairs:
             of_points = np.zeros((len(pair.forces), len(kinematics.turns)))
-            of_turns = kinematics.moments(pair.place - point, pair.forces)
+            place = pair.place(on_opposite=pair.surface is self.surfaces[0], deformed=deformed)
+            of_turns = kinematics.moments(place - point, pair.forces)
             for turn, moment in enumerate(of_turns):
                 of_points[:, turn] = moment
             moments.append(of_points)

@@ -294,10 +294,15 @@ class Pair:
         """Values ``(m,)`` of the points as those ``(n, q)`` of facets."""
         return values.reshape(self.surface.weight.shape)
 
-    @property
-    def place(self) -> Array:
-        """Where the points' forces act ``(m, d)``: on the deformed surface, if they move."""
-        return _flat(self.surface.point) + self._moved[0] * self.moves
+    def place(self, *, on_opposite: bool, deformed: bool) -> Array:
+        """Where the points' forces act ``(m, d)``: on the own surface, or their reactions on the
+        opposite one; where this is now, or, as forces at small strain do, where it was."""
+        own, motion = self._moved
+        partners = self.projection
+        if not on_opposite:
+            return _flat(self.surface.point) + own * deformed
+        nodes = self.opposite.curve.X + motion * deformed
+        return np.einsum("ma,mai->mi", partners.shape, nodes[partners.nodes])
 
     @property
     def weight(self) -> Array:

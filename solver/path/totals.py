@@ -54,9 +54,11 @@ class Totals:
         return self.problem.whole * self.contact.resultant(name)
 
     def contact_moments(self, name: str, point: Sequence[float]) -> Array:
-        """Moments ``(t,)`` of that force at ``point``, on the deformed whole: about z in a plane,
-        about x, y and z in space, none around an axis."""
-        return self.problem.whole * self.contact.moments(name, point)
+        """Moments ``(t,)`` of that force at ``point``, of the whole: about z in a plane, about x, y
+        and z in space, none around an axis. At large strain it acts where the surface is now, at
+        small strain where it was, as reactions do."""
+        of_part = self.contact.moments(name, point, deformed=self.bulk.finite)
+        return self.problem.whole * of_part
 
     def mean_motion(self, facets: str, point: tuple[float, ...]) -> Array:
         """The rigid motion closest to the motion of a set of ``facets``, see `Mean`: the

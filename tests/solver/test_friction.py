@@ -9,12 +9,13 @@ from mpi4py import MPI
 import archord
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
+from archord.geometry.shapes.rectangles import rectangles
 from archord.materials.elasticity import Elastic
 from archord.presets.arc import arc_profiles
 from archord.scene.presets.joint import Scene
 from archord.solver.contact.laws.named import LAWS, contact_law
 from archord.solver.path.system import System
-from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
+from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Load, Problem, Support
 from tests.solver.parts import blocks, solve
 from tests.solver.solving import joint_system
 
@@ -141,20 +142,45 @@ def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
             pair.share * (pair.surface.weight * pair.pressure).sum()
             for pair in system.contact.pairs
         )
-        full.append(mu * r * system.comm.allreduce(pressed))
+        # normals of deformed curves turn with the hole, and pressures get an arm
+        turned = system.mean_motion("hole", (0.0, 0.0))[2] * (kinematics == "current")
+        full.append((mu + turned) * r * system.comm.allreduce(pressed))
         torque.append(system.drive_force("turn"))
         on_contact.append(system.contact_moments("fit", (0.0, 0.0))[0])
+        at_rim = system.reaction_moments("outside", (0.0, 0.0))[0]
+        assert on_contact[-1] == pytest.approx(-at_rim, abs=1e-8 * full[0])
     assert torque[1] < 0.9 * full[0]
-    assert on_contact[2] == pytest.approx(full[0], rel=1e-3)
-    assert on_contact[3] == pytest.approx(
-        full[3], rel=1e-3
-    )  # the bore's linear rotation has widened it
+    assert on_contact[2:] == pytest.approx(full[2:], rel=1e-5)
     if (
         kinematics == "reference"
     ):  # else those who hold feel the normals turn with the pin by an angle, over mu
-        assert torque == pytest.approx(on_contact, rel=1e-3, abs=1e-3 * full[0])
+        assert torque == pytest.approx(on_contact, rel=1e-6, abs=1e-6 * full[0])
     slipped = (path[-1] - on_contact[-1] / torque[1] * path[2]) * r
     assert system.friction_dissipation() == pytest.approx(full[-1] / r * slipped, rel=0.01)
+
+
+@pytest.mark.parametrize("strain", ["small", "large"])
+def test_the_moment_of_contact_is_that_of_the_supports(strain):
+    """A punch is pressed on a foot and slides far: at small strain forces act where bodies were, at
+    large strain where they are."""
+    mesh = rectangles({"foot": (-3, -2, 6, 2), "punch": (-1, 0, 2, 1)}, size=0.6)
+    problem = Problem(
+        mesh,
+        [Body("foot", STEEL), Body("punch", STEEL)],
+        [Interaction("rub", ("punch bottom", "foot top"), friction=0.3)],
+        [Support("foot bottom")],
+        [
+            Load("press", on="punch top", direction="y", displacement=[-0.05, -0.05]),
+            Load("slide", on="punch top", direction="x", displacement=[0.0, 0.5]),
+        ],
+        strain=strain,
+        steps=[1, 2],
+    )
+    system = System(problem)
+    system.solve()
+    moment = system.contact_moments("rub", (7.0, 3.0))
+    at_foot = system.reaction_moments("foot bottom", (7.0, 3.0))
+    assert moment == pytest.approx(-at_foot, rel=1e-8)
 
 
 def test_boundless_friction_ties_what_is_pressed():

@@ -6,6 +6,7 @@ import signal
 import tomllib
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -63,6 +64,19 @@ def test_sizes_of_general_meshes_have_their_heading(capsys, shape, heading, size
     Progress(scene, silent=False)
     assert f" mesh  {heading:>10s}  growth" in capsys.readouterr().out
     assert ProblemFamily(scene).sizes(scene)[0] == pytest.approx(size)
+
+
+def test_a_general_scene_that_is_let_go_notices_its_contact():
+    """What touches at any step is learnt from, though nothing touches at the end."""
+    mesh = {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}}
+    press = {"name": "press", "on": "flat", "direction": "x", "displacement": [0.3, 0.0]}
+    contact = {"name": "contact", "surfaces": ["pin", "hole"]}
+    bodies = [{"name": name, "E": 1.0, "nu": 0.3} for name in ("lug", "pin")]
+    scene = parse_any({"mesh": mesh, "body": bodies, "load": [press], "interaction": [contact]})
+    pressed, free = (SimpleNamespace(contact_area=area) for area in (3.0, 0.0))
+    family = ProblemFamily(scene)
+    assert family.resolved(scene, [pressed, free])
+    assert not family.resolved(scene, [free, free])
 
 
 @pytest.fixture(scope="module")
