@@ -3,7 +3,8 @@ them.
 
 A peer is one standalone script of this folder. Those of PyPI (requirements.txt) have a virtual
 environment of their own, ``.cache/peers-venv`` in the checkout, so that their numpy and archord's
-do not meet (docs/peers.md).
+do not meet (docs/peers.md). The script for asimov-contact finds it in ``.cache/asimov``, where
+``asimov_build.sh`` puts it.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ _LIMIT = 120.0  # seconds; the first import from a cold disk is slow
 @dataclass(frozen=True)
 class Peer:
     """A code beside archord, and the interpreter ``python`` that has it. ``series`` has (element
-    size over R, order) from coarse to fine for each case; one run may take ``time_limit``
-    seconds."""
+    size over R, order) from coarse to fine for each case that the code can solve; one run may take
+    ``time_limit`` seconds."""
 
     label: str
     script: str
@@ -65,6 +66,8 @@ PEERS = (
         "ngsolve_joint.py",
         {"elastic": _COARSE[1:] + _HIGH, "plastic": _COARSE[1:] + _HIGH[:3]},
     ),
+    # of the image target peers, with what asimov_build.sh makes; it has no plasticity
+    Peer("asimov-contact", "asimov_joint.py", {"elastic": (*_COARSE, (0.01, 2))}, sys.executable),
     Peer("Kratos", "kratos_joint.py", {"elastic": _FINE, "plastic": _FINE[:4]}),
 )
 
