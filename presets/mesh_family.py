@@ -40,15 +40,16 @@ _COARSEST_GUESS = 0.3  # element size over R
 class MeshFamily:
     """The meshes ``0, 1, 2, ...`` for ``scene`` that are to make the error of the mesh fall below
     ``accuracy`` with the third, or with the second if that is coarse; each by ``ratio`` finer.
-    Whoever solves them notes their ``dofs``."""
+    Whoever solves them notes their ``dofs``. Estimates assume the ``order``: 1 of rings, as few
+    cells lie in the core that is loaded."""
 
     ratio = RATIO
-    order = 2.0
     dofs = 0
 
     def __init__(self, scene: Scene, accuracy: float) -> None:
         self.scene = scene
         g = scene.joint
+        self.order = 1.0 if g.is_ring else 2.0
         finest = (accuracy / _MARGIN / _CONSTANTS[scene.analysis.degree]) ** (1 / 3)
         self.first = min(_COARSEST, finest * RATIO ** (_LEVELS - 1))
         edge = g.edge_ratio if g.edge_angle is not None else 1.0

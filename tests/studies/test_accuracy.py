@@ -269,6 +269,15 @@ def test_accurate_and_small_contacts_get_small_elements():
     assert b.h / a.h == pytest.approx(angle / 1.17, rel=1e-3)
 
 
+def test_a_ring_is_as_accurate_as_estimated(tmp_path):
+    """Although few cells lie in the core that is loaded. The displacement is the one of elements of
+    0.025 R, and of R/120 in the core."""
+    scene = load_scene(Path("scenes/press_fit.toml"), ["analysis.accuracy=0.01", "load.steps=1"])
+    found = accurate(scene, tmp_path / "ring")
+    true = abs(found.steps[-1]["delta"] / 0.0091614 - 1)
+    assert true < found.accuracy.estimated <= 0.01
+
+
 def test_units_do_not_matter():
     """Metres and pascals instead of millimetres and megapascals: the same meshes in units of R."""
     data, other = (
