@@ -19,7 +19,17 @@ from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
 from archord.solver.problem import Body, Interaction, Problem
 from tests.materials.test_space import ASKEW
-from tests.solver.space import KINDS, LARGE, MATERIALS, NU, E, box, every_material, small_and_large
+from tests.solver.space import (
+    KINDS,
+    LARGE,
+    MATERIALS,
+    NU,
+    E,
+    box,
+    every_material,
+    small_and_large,
+    with_even_nodes,
+)
 
 SIZE = (1.0, 2.0, 1.5)
 
@@ -100,7 +110,8 @@ def test_a_box_is_stretched_to_double_length(kind, comm):
 
 def rectangle(comm, cells, size) -> TaggedMesh:
     """The body "box" of quadrilaterals from the origin, with its sides."""
-    mesh = create_rectangle(comm, [np.zeros(2), np.array(size)], cells, CellType.quadrilateral)
+    corners = [np.zeros(2), np.array(size)]
+    mesh = with_even_nodes(create_rectangle(comm, corners, cells, CellType.quadrilateral))
     index_map = mesh.topology.index_map(2)
     every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     sides = [

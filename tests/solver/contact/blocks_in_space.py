@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import permutations
 
+import basix
 import basix.ufl
 import numpy as np
 from dolfinx import fem
@@ -120,7 +121,8 @@ def bodies(comm, lower=LOWER, upper=UPPER, kind=CellType.tetrahedron, bend=flat)
         cells.append(node.reshape(nodes.shape[:2]) + sum(map(len, points)))
         points.append(places[first])
     straight = np.concatenate(points)
-    element = basix.ufl.element("P", kind.name, 2, shape=(3,))
+    even = basix.LagrangeVariant.equispaced  # as all meshes of archord: forms are compiled once
+    element = basix.ufl.element("P", kind.name, 2, even, shape=(3,))
     chosen = slice(None) if comm.rank == 0 else slice(0, 0)
     mesh = create_mesh(comm, np.concatenate(cells)[chosen], straight[chosen], element)
     V = displacement_space(mesh, 2)
