@@ -100,12 +100,23 @@ def test_cells_are_sound(shape):
     assert (smallest / largest).min() > 0.2
 
 
+SHORT = R / 2
+# half as many elements at fillets, of which the smallest take most of the time
+SHORTER = {
+    lug: (SHORT, 0.1, 20.0, 10.0, 30.0, 2.5, 0.4),
+    bushing: (SHORT, [(5.05, 8.0), (7.98, 14.0)], 2.0, 0.4),
+    quarter_joint: (SHORT, 0.05, 20.0, 2.0, 0.4),
+    half_ring: (SHORT, 0.05, 20.0, 2.0, 0.4, 0.2),
+}
+
+
 @pytest.mark.parametrize("fillet", [0.1, 0.3, 1.0])
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", SHORTER)
 def test_cells_at_fillets_are_not_folded(shape, fillet):
     """However small they are beside the other elements; where a fillet ends it is tangent to a
     face, so that the corners of cells are flat there, and no more than flat."""
-    mesh = gathered(made(shape, *SHAPES[shape], chamfer=0.0, fillet=fillet))
+    sizes = (SHORTER if fillet == 0.1 else SHAPES)[shape]
+    mesh = gathered(made(shape, *sizes, chamfer=0.0, fillet=fillet))
     smallest, largest = smallest_determinants(mesh)
     assert (smallest / largest).min() > -0.01
 
