@@ -11,7 +11,7 @@ and energies are of the whole ring.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -81,11 +81,13 @@ class Kinematics:
     """How a displacement becomes strain; made by `kinematics`.
 
     Forces and energies are per unit thickness of a plane, whose ``thickness`` multiplies what is
-    reported. Only a plane may have one. Raises ValueError.
+    reported. Only a plane may have one. It ``is_of_problem`` if a problem gave it, which may leave
+    it out when it is replaced. Raises ValueError.
     """
 
     name: Plane
     thickness: float = 1.0
+    is_of_problem: bool = field(default=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the name and the thickness."""
@@ -209,8 +211,8 @@ class Kinematics:
         return matrix if large else matrix @ self.small.T
 
     def with_thickness(self, thickness: float) -> Kinematics:
-        """The same, of this ``thickness``."""
-        return replace(self, thickness=thickness)
+        """The same, of this ``thickness`` of a problem."""
+        return replace(self, thickness=thickness, is_of_problem=True)
 
 
 @cache

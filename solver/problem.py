@@ -81,7 +81,8 @@ class Problem:
         Contact in space knows no rigid discs yet. The kinematics of an `Interaction` are of
         contact.
     thickness : float
-        The thickness; forces and energies are per unit thickness without it.
+        The thickness, by default of the kinematics; forces and energies are per unit thickness
+        without it.
     strain : {"small", "large"}
         Small strain, or large strain by logarithms, of all bodies.
     symmetry : float
@@ -196,6 +197,8 @@ class Problem:
         origin = (0.0,) * kinematics.dimension
         couplings = [replace(part, point=part.point or origin) for part in self.couplings]
         object.__setattr__(self, "couplings", couplings)
+        if kinematics.thickness != 1:
+            object.__setattr__(self, "thickness", kinematics.thickness)
         self._require_fitting_mesh()
 
     def _require_pairs_once(self) -> None:
@@ -411,7 +414,7 @@ def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
             raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
         given = kinematics(given.removeprefix("plane "))
     if thickness is None:
-        return given.with_thickness(1.0)  # of a problem before, whose thickness was dropped
+        return given.with_thickness(1.0) if given.is_of_problem else given
     if not (is_number(thickness) and thickness > 0):
         raise InputError(f"archord.Problem: thickness must be positive, not {thickness!r}.")
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import os
 import shutil
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -22,12 +21,6 @@ _PASSED = pytest.StashKey[bool]()
 def pytest_addoption(parser):
     parser.addoption("--kills", type=int, default=8, help="how often test_kill.py kills runs (8)")
     parser.addoption("--cases", type=int, default=12, help="how many scenes tests/fuzz solves (12)")
-
-
-def pytest_configure():
-    """Let gcc optimise forms less, also in processes that tests start: it takes half of the time
-    then, which is a tenth of the suite's on a new checkout, and no number changes."""
-    os.environ["XDG_CONFIG_HOME"] = str(Path(__file__).parent / "settings")
 
 
 def pytest_xdist_auto_num_workers(config):
