@@ -413,10 +413,14 @@ def _kinematics(given: str | Kinematics, thickness: float | None) -> Kinematics:
             known = ", ".join(f'"{name}"' for name in _KINEMATICS)
             raise InputError(f"archord.Problem: kinematics must be one of {known}, not {given!r}.")
         given = kinematics(given.removeprefix("plane "))
+    stated = 1.0 if given.is_of_problem else given.thickness
     if thickness is None:
-        return given.with_thickness(1.0) if given.is_of_problem else given
+        thickness = stated
     if not (is_number(thickness) and thickness > 0):
         raise InputError(f"archord.Problem: thickness must be positive, not {thickness!r}.")
+    if stated not in (1, thickness):
+        said = f"thickness = {thickness:g}, but its kinematics have the thickness {stated:g}"
+        raise InputError(f"archord.Problem: {said}.")
     try:
         return given.with_thickness(thickness)
     except ValueError as error:

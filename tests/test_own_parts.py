@@ -336,6 +336,10 @@ def test_a_thickness_is_the_same_of_a_problem_and_of_its_kinematics(tmp_path):
     [
         ({"thickness": 0.0}, "thickness must be positive, not 0.0"),
         ({"thickness": 2.0, "kinematics": "axisymmetric"}, "thickness = 2: only a plane has"),
+        (
+            {"thickness": 2.0, "kinematics": Kinematics("strain", 5.0)},
+            "thickness = 2, but its kinematics have the thickness 5",
+        ),
         ({"bodies": [archord.Body("slab", archord.Elastic(1.0, 0.3, "stress"))]}, 'body "slab": a'),
     ],
 )

@@ -162,8 +162,8 @@ def quantities_of(run: Run) -> dict[str, Any]:
 
 
 def _profile_of(arc: ArcProfile, yields: bool) -> Array:
-    """The profile of one side. Where it ``yields``, pressures at points scatter, and their mean is
-    off by 0.4 %; facet means are not."""
+    """The profile of one side. Where it ``yields``, pressures at points scatter near the end of the
+    contact, and facet means do not."""
     if yields:
         return profile(*arc.facet_means())
     return profile(arc.angle.ravel(), arc.pressure.ravel())

@@ -101,11 +101,11 @@ def _meshed(gmsh, kind: int):
     tags, x, _ = gmsh.model.mesh.getNodes()
     _, of_elements = gmsh.model.mesh.getElementsByType(kind)
     used, cells = np.unique(of_elements, return_inverse=True)
-    n_corners = gmsh.model.mesh.getElementProperties(kind)[3]
+    n_nodes = gmsh.model.mesh.getElementProperties(kind)[3]
     position = np.zeros(int(tags.max()) + 1, dtype=int)
     position[tags] = np.arange(len(tags))
     gmsh.finalize()
-    return x.reshape(-1, 3)[position[used], :2], cells.reshape(-1, n_corners)
+    return x.reshape(-1, 3)[position[used], :2], cells.reshape(-1, n_nodes)
 
 
 def axis_pressure(angle, pressure) -> float | None:

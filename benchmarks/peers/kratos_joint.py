@@ -7,7 +7,7 @@ applications, and gmsh (all of PyPI), and nothing of archord but `joint_script` 
 - Bodies: bilinear quadrilaterals with a mean volume change (B-bar), nodes on the circles. Kratos'
 contact in planes knows edges with two nodes alone.
 - Contact: Kratos' mortar contact with the augmented Lagrangian, frictionless, pairs on the deformed
-mesh (kinematics "current").
+mesh (kinematics "current"), where the joint yields pairs of the guess of each step.
 - Plasticity: Kratos' J2 law in plane strain (return mapping), perfect.
 - Kratos' Newton solver with Eigen's sparse LU.
 """
@@ -108,6 +108,7 @@ class Joint:
         self.zero = self._state()
 
     def _bodies(self, size: float, growth: float) -> None:
+        """Both bodies' nodes and elements, and the edges of both arcs as conditions."""
         part = self.part
         self.properties = part.CreateNewProperties(1)
         arcs = part.CreateSubModelPart("arcs")
@@ -169,6 +170,7 @@ class Joint:
         return np.concatenate([u, np.array(of_nodes(self.nodes, pressure, 0))])
 
     def _restore(self, state) -> None:
+        """Write a `_state` into the nodes, and move them."""
         n = len(self.nodes)
         write = KM.VariableUtils().SetSolutionStepValuesVector
         write(self.nodes, KM.DISPLACEMENT, KM.Vector(state[: 2 * n]), 0)
@@ -178,8 +180,8 @@ class Joint:
     def elastic(self, delta: float):
         """The state at ``delta`` of bodies that do not yield; from then on they do."""
         start = self.zero.copy()
-        ys = np.array([node.Y0 for node in self.part.GetSubModelPart("pin").Nodes])
-        start[1 : 2 * len(ys) : 2] = -delta
+        n_pin = self.part.GetSubModelPart("pin").NumberOfNodes()  # the first nodes
+        start[1 : 2 * n_pin : 2] = -delta
         found = self.solve(start, delta)[0]
         if self.plastic:
             for name in YIELD:

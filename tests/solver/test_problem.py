@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
 from archord.materials.finite import LargeStrain
-from archord.materials.kinematics import PLANE_STRESS, kinematics
+from archord.materials.kinematics import PLANE_STRESS, Kinematics, kinematics
 from archord.solver.path.load_path import LoadPath
 from archord.solver.path.stepping import StepRules
 from archord.solver.path.system import System
@@ -262,3 +262,11 @@ def test_a_problem_that_is_replaced_keeps_nothing_of_the_one_before(key, first, 
     for one, other in zip(changed.bodies, fresh.bodies, strict=True):
         assert type(one.material) is type(other.material)
         assert one.material.E == other.material.E
+
+
+def test_a_problem_takes_another_thickness_than_its_kinematics_brought():
+    """Or none again."""
+    problem = replace(columns(), kinematics=Kinematics("strain", 5.0))
+    assert problem.whole == replace(problem, steps=3).whole == 5
+    assert replace(problem, thickness=2.0).whole == 2
+    assert replace(problem, thickness=None).whole == 1
