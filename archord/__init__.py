@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from archord.geometry.curve import RigidCircle
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.geometry.meshes.formats.source import Mesh
+    from archord.geometry.rigid_in_space import RigidBall, RigidCylinder
     from archord.geometry.shapes.boxes import boxes
     from archord.geometry.shapes.rectangles import rectangles
     from archord.materials.elasticity import Elastic
@@ -63,7 +64,9 @@ __all__ = [
     "ProblemScene",
     "Quantity",
     "Response",
+    "RigidBall",
     "RigidCircle",
+    "RigidCylinder",
     "Run",
     "Scene",
     "Support",
@@ -86,6 +89,7 @@ _HOME = {
     "archord.geometry.curve": ["RigidCircle"],
     "archord.geometry.meshes.fenicsx": ["gmsh_to_mesh"],
     "archord.geometry.meshes.formats.source": ["Mesh"],
+    "archord.geometry.rigid_in_space": ["RigidBall", "RigidCylinder"],
     "archord.geometry.shapes.boxes": ["boxes"],
     "archord.geometry.shapes.rectangles": ["rectangles"],
     "archord.materials.elasticity": ["Elastic"],

@@ -7,6 +7,7 @@ of travel, so the outward normal is the tangent turned clockwise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -318,10 +319,41 @@ def nearest_circle(x: Array) -> tuple[Array, float]:
     return shift + np.array([a, b]), radius
 
 
-class RigidCircle:
-    """A rigid disc that bodies touch.
+class RigidRound:
+    """What rigid discs, balls and cylinders share: an opposite of one facet with one node, which
+    moves it.
 
-    It is an opposite curve of one facet with one node, which moves it.
+    centre : (d,) the centre
+    radius : the radius
+    """
+
+    n_facets = 1
+    dimension = 2
+
+    def __init__(self, centre: Sequence[float] | Array, radius: float) -> None:
+        self.centre = np.asarray(centre)
+        self.radius = radius
+        is_place = self.centre.shape == (self.dimension,)
+        is_place = is_place and all(map(is_number, self.centre.ravel()))
+        count = {2: "two", 3: "three"}[self.dimension]
+        require_of(self, is_place, "centre", f"must be {count} numbers")
+        require_between(self, "radius", 0, np.inf, "must be positive and finite")
+        self.centre = self.centre.astype(float)
+        self.X = self.centre[None]
+        self.connectivity = np.zeros((1, 1), dtype=np.int32)
+
+    @property
+    def farthest(self) -> float:
+        """The largest number of which distances from it are differences."""
+        return float(max(np.abs(self.centre).max(), self.radius))
+
+    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
+        """Places in ``facets``, and these facets: there is no other."""
+        return np.arange(len(facets)), facets
+
+
+class RigidCircle(RigidRound):
+    """A rigid disc that bodies touch.
 
     Parameters
     ----------
@@ -349,23 +381,6 @@ class RigidCircle:
     [[0.0, 0.0]]
     """
 
-    n_facets = 1
-
-    def __init__(self, centre: Array, radius: float) -> None:
-        self.centre = np.asarray(centre)
-        self.radius = radius
-        is_place = self.centre.shape == (2,) and all(map(is_number, self.centre.ravel()))
-        require_of(self, is_place, "centre", "must be two numbers")
-        require_between(self, "radius", 0, np.inf, "must be positive and finite")
-        self.centre = self.centre.astype(float)
-        self.X = self.centre[None]
-        self.connectivity = np.zeros((1, 1), dtype=np.int32)
-
-    @property
-    def farthest(self) -> float:
-        """The largest number of which distances from the disc are differences."""
-        return float(max(np.abs(self.centre).max(), self.radius))
-
     def closest_point(
         self, x: Array, outward: Array, displacement: Array, start: Index | None = None
     ) -> Projection:
@@ -389,7 +404,3 @@ class RigidCircle:
         )
 
     continued = closest_point
-
-    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
-        """Places in ``facets``, and these facets: there is no other."""
-        return np.arange(len(facets)), facets

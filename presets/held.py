@@ -18,7 +18,6 @@ from archord.materials.material import Array
 from archord.solver.conditions import Dirichlet
 from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.pair import Pair
-from archord.solver.expansion import disc_of
 from archord.solver.parts import Load, Support
 from archord.solver.path.system import System
 from archord.solver.problem import Problem
@@ -88,8 +87,7 @@ def _pairs(problem: Problem) -> list[list[str | float]]:
             pairs += [[name] for name in names]
     for part in problem.interactions:
         if not _is_tied(part):
-            disc = disc_of(part)
-            beside = [disc.radius] if disc else []
+            beside = [part.disc.radius] if part.disc else []
             pairs.append([*_surfaces(part), *beside])
     return pairs
 

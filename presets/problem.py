@@ -17,6 +17,7 @@ from mpi4py import MPI
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.formats.source import CHANGES, Mesh, circles_in
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.rigid_in_space import RigidBall, RigidCylinder
 from archord.materials.kinematics import kinematics
 from archord.presets.mesh_family import coarser
 from archord.report.errors import InputError
@@ -151,7 +152,7 @@ def _body(body: parts.BodySection, plane: Any, strain: str) -> Body:
 def _interaction(part: parts.InteractionSection, analysis: Any) -> Interaction:
     first: Any = part.surfaces[0]
     if part.rigid is not None:
-        first = RigidCircle(np.array(part.rigid.centre), part.rigid.radius)
+        first = _disc(part.rigid)
     law: Any = part.law
     if part.parameters:
         make: Any = LAWS[part.law]
@@ -167,6 +168,13 @@ def _interaction(part: parts.InteractionSection, analysis: Any) -> Interaction:
         interference=part.interference,
         overlap=part.overlap,
     )
+
+
+def _disc(disc: parts.DiscSection) -> RigidCircle | RigidBall:
+    if disc.axis is not None:
+        return RigidCylinder(disc.centre, disc.radius, disc.axis)
+    kind = RigidCircle if len(disc.centre) == 2 else RigidBall
+    return kind(disc.centre, disc.radius)
 
 
 def _load(load: parts.LoadSection) -> Load:

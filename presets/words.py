@@ -21,7 +21,6 @@ from archord.scene.sections.plasticity import parameters_of
 from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.laws.coulomb import Coulomb
 from archord.solver.contact.laws.named import LAWS
-from archord.solver.expansion import disc_of
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.problem import Problem
 
@@ -132,7 +131,7 @@ def _own(part: Any) -> dict[str, Any]:
 
 
 def _interaction(part: Interaction) -> dict[str, Any]:
-    disc = disc_of(part)
+    disc = part.disc
     words: dict[str, Any] = {
         "name": part.name,
         "surfaces": [name for name in part.surfaces if isinstance(name, str)],
@@ -142,7 +141,8 @@ def _interaction(part: Interaction) -> dict[str, Any]:
         "overlap": part.overlap,
     }
     if disc is not None:
-        words["rigid"] = {"centre": disc.centre, "radius": disc.radius}
+        axis = getattr(disc, "axis", None)
+        words["rigid"] = {"centre": disc.centre, "radius": disc.radius, "axis": axis}
     return words | _law(part.law)
 
 

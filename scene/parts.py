@@ -13,7 +13,6 @@ from archord.scene.sections.contact import CONTACT_LAWS, PARAMETERS_IN_WORDS, re
 from archord.scene.sections.keys import (
     Axis,
     Name,
-    Pair,
     PartName,
     Place,
     Positive,
@@ -40,10 +39,19 @@ def turns(freedom: str | None) -> bool:
 
 
 class DiscSection(Section):
-    """A rigid disc."""
+    """A rigid disc; in space a cylinder, infinitely long, or without an axis a ball."""
 
-    centre: Pair = key("centre", "length", example=[0.0, 0.0])
+    centre: Place = key("centre, in space also a point of the axis", "length", example=[0.0, 0.0])
     radius: Positive = key("radius", "length", example=10.0)
+    axis: Axis | None = key(
+        "in space: direction of the axis of a cylinder, which is infinitely long; a ball if absent",
+        other=[0.0, 0.0, 1.0],
+    )
+
+    @model_validator(mode="after")
+    def _axis(self) -> DiscSection:
+        require(self.axis is None or any(self.axis), "axis", "must not be zero")
+        return self
 
 
 class CoreSection(Section):
@@ -146,12 +154,15 @@ class BodySection(Solid):
 
 
 class InteractionSection(Section):
-    """What two surfaces do to each other, or a rigid disc to one."""
+    """What two surfaces do to each other, or a rigid disc (in space a cylinder or a ball) to
+    one."""
 
     name: PartName = key("name of the interaction", example="contact")
     surfaces: Surfaces = key("two facet sets, or one beside a rigid disc", example=["pin", "hole"])
     rigid: DiscSection | None = key(
-        "rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0}
+        "rigid disc, the first surface; in space a cylinder, infinitely long, with an axis = "
+        "[x, y, z], or a ball without",
+        other={"centre": [0.0, 0.0], "radius": 10.0},
     )
     law: ContactLawName = key(
         "contact without friction, with Coulomb's friction, tied surfaces, or soft contact",

@@ -191,6 +191,9 @@ class ProblemScene(Checked):
         """Keys and values of points."""
         points: list[tuple[tuple[str, ...], list[float]]] = []
         points += [(("coupling", c.name, "point"), c.point) for c in self.coupling]
+        for part in self.interaction:
+            if part.rigid is not None:
+                points.append((("interaction", part.name, "rigid", "centre"), part.rigid.centre))
         for load in self.load:
             if load.core:
                 points.append((("load", load.name, "core", "centre"), load.core.centre))
@@ -205,9 +208,10 @@ class ProblemScene(Checked):
         if self.in_space:
             said = "is for planes: bodies in space are drawn whole"
             require(self.analysis.thickness is None, "analysis.thickness", said)
-            said = "is not for bodies in space: mesh the stiff body, too"
-            for part in self.interaction:
-                require(part.rigid is None, ("interaction", part.name, "rigid"), said)
+        for part in self.interaction:
+            is_plane = part.rigid is None or part.rigid.axis is None
+            place = ("interaction", part.name, "rigid", "axis")
+            require(self.in_space or is_plane, place, "is for cylinders in space")
 
     @property
     def _where(self) -> str:

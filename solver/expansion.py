@@ -11,7 +11,6 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import unknown
 from archord.materials.kinematics import PLANE_STRAIN, SPACE
 from archord.solver.conditions import Control, DeadLoad, Dirichlet, Drive, Guess, Mean, Turn
@@ -50,7 +49,7 @@ class _Expansion:
         self.freedoms = freedoms(self.dimension)
         self.edges = [*self.mesh.facet_sets, *self.mesh.point_sets]
         self.couplings = [coupling.name for coupling in problem.couplings]
-        self.discs = [i.name for i in problem.interactions if disc_of(i) is not None]
+        self.discs = [i.name for i in problem.interactions if i.disc is not None]
         self.given_supports = [part for part in problem.supports if isinstance(part, Support)]
         self.given_loads = [part for part in problem.loads if isinstance(part, Load)]
         self.loaded = {_place(load): load.name for load in self.given_loads}
@@ -191,7 +190,7 @@ class _Expansion:
     def _box(self) -> tuple[Array, Array]:
         """The lowest and the highest coordinates of mesh and discs' centres. Collective."""
         comm = self.mesh.mesh.comm
-        discs = [disc_of(part) for part in self.stated.interactions]
+        discs = [part.disc for part in self.stated.interactions]
         centres = [disc.centre for disc in discs if disc is not None]
         d = self.dimension
         nodes = self.mesh.mesh.geometry.x[:, :d]
@@ -343,8 +342,8 @@ class _Expansion:
             self.means.append(Mean(coupling.name, coupling.facets, axis, point, drive))
 
     def _interaction(self, part: Interaction, slide: float) -> Interaction:
-        disc = part.surfaces[0]
-        if isinstance(disc, RigidCircle):
+        disc = part.disc
+        if disc is part.surfaces[0]:
             loads = [load for load in self.given_loads if load.on == part.name]
             rates: dict[str, Any] = {load.name: self._along(load) for load in loads}
             part = replace(part, surfaces=(Rigid(disc, rates), part.surfaces[1]))
@@ -383,11 +382,3 @@ def _largest_side(lowest: Array, highest: Array) -> float:
 def _turns(freedom: str | None) -> bool:
     """Whether a direction is a rotation."""
     return freedom is not None and freedom.startswith("rotation")
-
-
-def disc_of(part: Any) -> RigidCircle | None:
-    """The rigid disc of an interaction, None where both surfaces are of bodies."""
-    first = part.surfaces[0]
-    if isinstance(first, Rigid):
-        return first.circle
-    return first if isinstance(first, RigidCircle) else None

@@ -78,7 +78,7 @@ class Problem:
         The kinematics of strain: how displacement becomes strain, in all bodies. By default, as the
         mesh is: space for tetrahedra and hexahedra, plane strain for triangles and quadrilaterals.
         Axisymmetric problems have the coordinates x = r and y = z, and forces of the whole ring.
-        Contact in space knows no rigid discs yet. The kinematics of an `Interaction` are of
+        The kinematics of an `Interaction` are of
         contact.
     thickness : float
         The thickness, by default of the kinematics; forces and energies are per unit thickness
@@ -227,13 +227,12 @@ class Problem:
         require_of(self, are_names, "units", "must be two names, of a length and of a stress")
 
     def _require_fitting_mesh(self) -> None:
-        """Raise `InputError` for a mesh of other kinematics, and for contact that space lacks."""
+        """Raise `InputError` for a mesh of other kinematics, and for contact that these lack."""
         d = self.kinematics.dimension
         for interaction in self.interactions:
-            lacking = interaction.lacking_in_space()
-            if d == 3 and lacking:
+            if lacking := interaction.lacking(d):
                 said = f'interaction "{interaction.name}" has {lacking}'
-                raise InputError(f"archord.Problem: {said}: space does not know it yet.")
+                raise InputError(f"archord.Problem: {said}.")
         if isinstance(self.mesh, TaggedMesh) and self.mesh.dimension != d:
             cells = self.mesh.mesh.basix_cell().name
             words = next(word for word in _KINEMATICS if self.kinematics.name in word.split())

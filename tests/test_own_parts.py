@@ -431,6 +431,19 @@ def test_a_disc_is_round_and_somewhere(centre, radius, said):
         archord.RigidCircle(centre, radius)
 
 
+@pytest.mark.parametrize(
+    ("centre", "axis", "said"),
+    [
+        ((0.0, 1.0), (0, 0, 1), "centre = .* must be three numbers"),
+        ((0.0, 1.0, 2.0), (0, 1), "axis = .* must be three numbers, not all of them zero"),
+        ((0.0, 1.0, 2.0), (0, 0, 0), "axis = .* must be three numbers, not all of them zero"),
+    ],
+)
+def test_a_cylinder_has_an_axis_somewhere(centre, axis, said):
+    with pytest.raises(archord.InputError, match=f"^archord.RigidCylinder: {said}"):
+        archord.RigidCylinder(centre, 1.0, axis)
+
+
 def test_stages_are_a_list_and_directions_are_words():
     with pytest.raises(archord.InputError, match="must be a number, or a list of numbers"):
         archord.Load("press", direction="y", displacement=[[0.0, 1.0], [2.0, 3.0]])

@@ -70,7 +70,8 @@ def surface_name(interaction: Interaction, side: int) -> str:
 
 
 def deck_mesh(system: System) -> DeckMesh:
-    """The mesh of ``system``, of degree 2 and on one rank."""
+    """The mesh of ``system``, of degree 2 and on one rank. Raises ValueError for a rigid ball or
+    cylinder."""
     problem = system.problem
     of_bodies = {body.name: problem.cells_of(body) for body in problem.bodies}
     cells = _Cells(system, of_bodies)
@@ -87,6 +88,8 @@ def deck_mesh(system: System) -> DeckMesh:
     for interaction in problem.interactions:
         disc, opposite = interaction.surfaces
         if isinstance(disc, Rigid):
+            if not isinstance(disc.circle, RigidCircle):
+                raise ValueError("a rigid ball or cylinder cannot be exported; a body can")
             length = _mean_length(x, surfaces[opposite].nodes)
             rim, ring = _ring(disc.circle, length)
             ring += len(x)

@@ -226,7 +226,9 @@ def require_solid(scene: Any, on_face: bool, radius: float) -> None:
     a face of the pin of this ``radius``."""
     scene.space.check(radius)
     analysis = scene.analysis
-    require(not scene.pin.rigid, "pin.rigid", "must be false in space")
+    has_length = getattr(scene.space, "pin_length", None) is not None
+    said = "is not for a rigid pin, which is infinitely long"
+    require(not (scene.pin.rigid and has_length), "space.pin_length", said)
     require(on_face, "load.at", 'must be "diameter" in space')
     require(analysis.thickness is None, "analysis.thickness", "is for planes; give space.thickness")
     is_plane = "plane" in analysis.model_fields_set

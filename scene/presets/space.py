@@ -49,7 +49,9 @@ class Space(Depth):
         example=10.0,
     )
     pin_length: Positive | None = key(
-        "length of the pin, the whole; the thickness if absent", "length", other=15.0
+        "length of the pin, the whole; the thickness if absent; a rigid pin is infinitely long",
+        "length",
+        other=15.0,
     )
 
     def check(self, radius: float) -> None:
@@ -87,8 +89,18 @@ def solid(general: dict[str, Any], space: Depth) -> dict[str, Any]:
     middle = {"name": "mid-plane", "on": "mid-plane", "fixed": ["z"]}
     analysis = general["analysis"]
     in_space = {"plane": "space", "symmetry": 2 * analysis["symmetry"]}
+    contacts = [
+        part | {"rigid": _cylinder(part["rigid"])} if "rigid" in part else part
+        for part in general["interaction"]
+    ]
     return general | {
         "mesh": {"shape": shape},
+        "interaction": contacts,
         "support": [*general["support"], middle],
         "analysis": analysis | in_space,
     }
+
+
+def _cylinder(disc: dict[str, Any]) -> dict[str, Any]:
+    """The cylinder along z over a ``disc``."""
+    return disc | {"centre": [*disc["centre"], 0.0], "axis": [0.0, 0.0, 1.0]}

@@ -21,14 +21,15 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import ProjectionError, RigidCircle
+from archord.geometry.curve import ProjectionError, RigidCircle, RigidRound
+from archord.geometry.rigid_in_space import RigidBall
 from archord.report.errors import InputError, in_sentences, require_between, require_of
 from archord.solver.contact.laws.law import ContactLaw, fault_of
 from archord.solver.contact.laws.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.surface import RigidSurface, Surface
 
-Vector = tuple[float, float]
+Vector = tuple[float, ...]
 # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
 GAMMA_FACTOR = 0.5
 
@@ -36,9 +37,10 @@ GAMMA_FACTOR = 0.5
 @dataclass(frozen=True)
 class Rigid:
     """A rigid disc displaced by ``rate`` times the displacement of the ``drive``, or by rates of
-    drives by name; in an axisymmetric problem a sphere on the axis."""
+    drives by name; in an axisymmetric problem a sphere on the axis, in space a ball or a
+    cylinder."""
 
-    circle: RigidCircle
+    circle: RigidCircle | RigidBall
     rate: Vector | Mapping[str, Vector] = (0.0, 0.0)
     drive: str = ""
 
@@ -58,7 +60,8 @@ class Interaction:
     name : str
         The name of the interaction.
     surfaces : tuple of str
-        Two facet sets, of one body each. The first may be a rigid disc, a `RigidCircle`.
+        Two facet sets, of one body each. The first may be a rigid disc, a `RigidCircle`, or in
+        space a `RigidBall` or a `RigidCylinder`.
     law : str or ContactLaw
         The contact law: a name, "frictionless", "tied" or "coulomb", or an object that keeps the
         protocol of `archord.solver.contact.laws.law.ContactLaw`.
@@ -107,7 +110,7 @@ class Interaction:
     def __post_init__(self) -> None:
         """Check the parts; raise `InputError`."""
         require_of(self, isinstance(self.name, str) and self.name != "", "name", "must be a name")
-        kinds = (str, Rigid, RigidCircle)
+        kinds = (str, Rigid, RigidRound)
         two = not isinstance(self.surfaces, str) and len(self.surfaces) == 2
         known = two and isinstance(self.surfaces[0], kinds) and isinstance(self.surfaces[1], str)
         said = "must be two facet sets, or a rigid disc and one"
@@ -128,12 +131,25 @@ class Interaction:
         except ValueError as error:
             raise InputError(f'archord.Interaction: interaction "{self.name}": {error}.') from None
 
-    def lacking_in_space(self) -> str:
-        """What problems in space cannot do yet of this interaction; empty if there is nothing."""
-        if not isinstance(self.surfaces[0], str):
-            return "a rigid disc"
-        law = contact_law(self.law, self.friction).in_space()
-        return "a law of slip for planes" if law is None else ""
+    @property
+    def disc(self) -> RigidCircle | RigidBall | None:
+        """The rigid disc, in space a ball or a cylinder; None where both surfaces are of bodies."""
+        first = self.surfaces[0]
+        if isinstance(first, Rigid):
+            return first.circle
+        return None if isinstance(first, str) else first
+
+    def lacking(self, dimension: int) -> str:
+        """What problems of this ``dimension`` do not know of this interaction; empty if there is
+        nothing."""
+        disc = self.disc
+        if disc is not None and disc.dimension != dimension:
+            if dimension == 3:
+                return "a rigid disc: in space there are a RigidBall and a RigidCylinder"
+            return f"a {type(disc).__name__}: in a plane there is a RigidCircle"
+        if dimension == 3 and contact_law(self.law, self.friction).in_space() is None:
+            return "a law of slip for planes: space does not know it yet"
+        return ""
 
 
 class Interface:

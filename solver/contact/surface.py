@@ -17,6 +17,7 @@ from dolfinx import fem
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis
 from archord.geometry.curve import Curve, RigidCircle, in_pieces
 from archord.geometry.patches import Patches
+from archord.geometry.rigid_in_space import RigidBall
 from archord.geometry.strain import PointStrain
 from archord.kernels.compat import cell_nodes
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
@@ -332,7 +333,8 @@ def _normal(tangents: list[Array]) -> Array:
 
 
 class RigidSurface:
-    """A rigid disc, around an axis a sphere, as a surface of one facet without points of its own.
+    """A rigid disc, around an axis a sphere, in space a ball or a cylinder, as a surface of one
+    facet without points of its own.
 
     curve_dofs : (1,) a block dof behind the block dofs of the displacement
     rate : (drives, d) displacement per unit of each drive
@@ -341,11 +343,12 @@ class RigidSurface:
 
     n_facets = 1
 
-    def __init__(self, circle: RigidCircle, rate: npt.ArrayLike = (0.0, 0.0)) -> None:
+    def __init__(self, circle: RigidCircle | RigidBall, rate: npt.ArrayLike | None = None) -> None:
         self.curve = circle
         self.curve_dofs = np.zeros(1, dtype=np.int64)
-        self.rate = np.atleast_2d(np.asarray(rate, dtype=float))
-        self.motion: Array = np.zeros((1, self.rate.shape[1]))
+        still = np.zeros((1, circle.dimension))
+        self.rate = still if rate is None else np.atleast_2d(np.asarray(rate, dtype=float))
+        self.motion: Array = still
 
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, d)``, whatever the displacement of the bodies."""

@@ -438,6 +438,20 @@ def test_a_rigid_disc_around_an_axis_is_refused():
         DeckModel(SimpleNamespace(problem=problem), None)
 
 
+def test_a_rigid_ball_is_refused():
+    mesh = archord.boxes({"block": (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)}, size=1.0, kind="hexahedra")
+    ball = archord.RigidBall((0.5, 2.0, 0.5), 1.0)
+    problem = Problem(
+        mesh,
+        [Body("block", Elastic(1.0, 0.3))],
+        [Interaction("press", (ball, "block top"))],
+        [archord.Support("block bottom")],
+        [archord.Load("down", on="press", direction="y", displacement=-0.01)],
+    )
+    with pytest.raises(ValueError, match="a rigid ball or cylinder cannot be exported; a body"):
+        deck_mesh(System(problem))
+
+
 @pytest.mark.parametrize("unit", [1000.0, 1e-3])
 def test_the_deck_does_not_depend_on_the_unit_of_length(unit):
     """Nodes scale to the digits of the format, and the penetration with them."""

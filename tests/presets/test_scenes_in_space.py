@@ -18,7 +18,11 @@ AXES = [
     {"name": side, "on": side, "fixed": [axis]}
     for side, axis in (("left", "x"), ("front", "y"), ("base", "z"))
 ]
+CLAMP = {"name": "clamp", "on": "base", "fixed": ["x", "y", "z"]}
 PRESS = {"name": "press", "on": "lid", "direction": "z", "displacement": -0.002}
+BALL = {"centre": [0.4, 0.5, 5.0], "radius": 3.0}
+ROLLER = {"name": "roller", "surfaces": ["lid"], "rigid": BALL | {"axis": [1.0, 0.1, 0.0]}}
+ROLLED = {"support": [CLAMP], "load": [PRESS | {"on": "roller", "displacement": -0.02}]}
 
 
 def boxes(sizes) -> None:
@@ -90,7 +94,6 @@ POINT = {"name": "crank", "facets": "lid", "point": [0.5, 0.5, 2.0]}
 TURN = {"name": "turn", "on": "crank", "direction": "rotation y", "displacement": 1e-4}
 HELD = {"name": "held", "on": "crank", "fixed": ["x", "y", "z", "rotation x", "rotation z"]}
 TIED = ON_EACH_OTHER | {"law": "tied"}
-CLAMP = {"name": "clamp", "on": "base", "fixed": ["x", "y", "z"]}
 
 
 @pytest.mark.parametrize("kind", ["rigid", "distributing"])
@@ -135,14 +138,15 @@ FAULTS = {
         "coupling": [POINT | {"point": [0.0, 0.0]}],
         "load": [TURN],
     },
-    'interaction "joint".rigid is not for bodies in space': {
-        "interaction": [
-            {
-                "name": "joint",
-                "surfaces": ["lower top"],
-                "rigid": {"centre": [0.0, 0.0], "radius": 1.0},
-            }
-        ]
+    'interaction "roller".rigid.centre = .* must have 3 numbers in space': {
+        "interaction": [ON_EACH_OTHER, ROLLER | {"rigid": {"centre": [0.0, 3.0], "radius": 1.0}}]
+    },
+    'interaction "roller".rigid.axis = .* must not be zero': {
+        "interaction": [ON_EACH_OTHER, ROLLER | {"rigid": BALL | {"axis": [0.0, 0.0, 0.0]}}]
+    },
+    'load "press".direction = "rotation x" must be "x", "y" or "z": .roller. is no coupling': {
+        "interaction": [ON_EACH_OTHER, ROLLER],
+        "load": [PRESS | {"on": "roller", "direction": "rotation x"}],
     },
     'load "weight".core.centre = .* must have 3 numbers in space': {
         "load": [
@@ -191,6 +195,8 @@ RUNS = {
     },
     "one side": {"interaction": [ON_EACH_OTHER | {"integrated": "lower top"}]},
     "reference": {"analysis": {"kinematics": "reference"}},
+    "a cylinder": ROLLED | {"interaction": [TIED, ROLLER | {"friction": 0.1}]},
+    "a ball": ROLLED | {"interaction": [TIED, ROLLER | {"rigid": BALL}]},
     "a coupling": {
         "coupling": [POINT],
         "load": [TURN, PRESS | {"on": "crank"}],

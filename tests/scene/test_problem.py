@@ -195,6 +195,12 @@ def test_an_interference_has_a_stage_of_its_own():
             {"centre": [0.0], "radius": 1.0},
             'interaction "contact".rigid.centre',
         ),
+        (
+            "interaction.0",
+            {"name": "contact", "surfaces": ["pin"]}
+            | {"rigid": {"centre": [0.0, 0.0], "radius": 1.0, "axis": [0.0, 0.0, 1.0]}},
+            'interaction "contact".rigid.axis = .* is for cylinders in space',
+        ),
         ("mesh.file", None, "mesh.file is missing"),
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),

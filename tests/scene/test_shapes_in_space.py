@@ -35,6 +35,25 @@ def test_a_preset_in_space_is_the_general_scene_that_it_prints(data):
     assert scene.units.force_of(scene.analysis.depth) == "N"
 
 
+RIGID = {"pin": {"rigid": True}}
+
+
+@pytest.mark.parametrize("data", [LUG, BUSHING, JOINT], ids=["lug", "bushing", "joint"])
+def test_a_rigid_pin_in_space_is_a_cylinder_along_z(data):
+    """On the disc of the plane; a length of its own is refused."""
+    rigid = data | RIGID
+    plane = parse_any(rigid) if data is not JOINT else parse_any(parse_any(rigid).general())
+    scene = parse_any(rigid | {"space": {"thickness": 8.0}})
+    disc = plane.interaction[0].rigid
+    cylinder = scene.interaction[0].rigid
+    assert cylinder.centre == [*disc.centre, 0.0]
+    assert cylinder.radius == disc.radius
+    assert cylinder.axis == [0.0, 0.0, 1.0]
+    said = "^scene: space.pin_length = 12.0 is not for a rigid pin, which is infinitely long.$"
+    with pytest.raises(InputError, match=said):
+        parse_any(rigid | SPACE)
+
+
 @pytest.mark.parametrize(
     ("place", "value", "said"),
     [
@@ -42,7 +61,6 @@ def test_a_preset_in_space_is_the_general_scene_that_it_prints(data):
         ("space.fillet", 0.1, "space.fillet = 0.1 is instead of a chamfer."),
         ("space.chamfer", 3.0, "space.chamfer = 3.0 must be at most 1.98: 0.2 R, and 0.45 of"),
         ("space.depth", 3.0, "space.depth = 3.0 is not a known key"),
-        ("pin", {"rigid": True}, "pin.rigid = true must be false in space."),
         ("load", {"force": 1e3, "at": "centre"}, 'load.at = "centre" must be "diameter" in space'),
         ("analysis", {"thickness": 3.0}, "analysis.thickness = 3.0 is for planes; give space.th"),
         ("analysis", {"plane": "stress"}, 'analysis.plane = "stress" is not for a joint in space'),
@@ -128,6 +146,14 @@ def test_the_whole_lug_carries_what_twice_its_half_does():
     whole = pulled(changed(LUG, "lug.half", False) | pin, thickness=8.0)
     assert whole.drive_force("pull") == pytest.approx(half.drive_force("pull"), rel=2e-3)
     assert whole.drive_force("pull") == pytest.approx(-whole.reaction("clamp")[0], rel=1e-6)
+
+
+def test_a_very_stiff_pin_is_a_rigid_pin():
+    """A pin as long as the lug, 1e6 times stiffer."""
+    rigid = pulled(LUG | RIGID, thickness=8.0)
+    stiff = pulled(LUG | {"pin": {"E": 2.1e11, "nu": 0.3}}, thickness=8.0)
+    assert rigid.drive_force("pull") == pytest.approx(stiff.drive_force("pull"), rel=1e-3)
+    assert rigid.drive_force("pull") == pytest.approx(-rigid.reaction("clamp")[0], rel=1e-6)
 
 
 def test_a_thin_lug_is_in_plane_stress():

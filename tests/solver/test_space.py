@@ -264,7 +264,10 @@ def test_what_space_cannot_do_yet_is_said_in_a_sentence(comm):
     rubbing = Interaction("joint", ("x0", "x1"), OwnFriction())
     on_disc = Interaction("joint", (archord.RigidCircle((0.0, 0.0), 1.0), "x1"))
     for interaction, lacking in ((rubbing, "a law of slip for planes"), (on_disc, "a rigid disc")):
-        with pytest.raises(archord.InputError, match=f'interaction "joint" has {lacking}: space'):
+        with pytest.raises(archord.InputError, match=f'interaction "joint" has {lacking}: .*space'):
             Problem(box(comm), bodies, [interaction], kinematics="space")
+    on_ball = Interaction("joint", (archord.RigidBall((0.0, 0.0, 0.0), 1.0), "x1"))
+    with pytest.raises(archord.InputError, match='"joint" has a RigidBall: in a plane there is'):
+        Problem(rectangle(comm, (1, 1), (1.0, 1.0)), bodies, [on_ball])
     with pytest.raises(archord.InputError, match=r"thickness = 2: .* bodies in space are drawn"):
         Problem(box(comm), bodies, kinematics="space", thickness=2.0)
