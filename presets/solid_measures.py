@@ -4,7 +4,7 @@ the rim of each hole, how far contact reaches, and how the pin of a clevis bends
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -58,7 +58,7 @@ class Bearing:
     def semi_angle(self, state: Accepted) -> float:
         """The angle from the load axis to which the hole bears, at its middle."""
         hole = state.met[self.contact][-1]
-        inside = _inside(hole.X, _twice(self.middle))
+        inside = _inside(_folded(hole.X), _twice(self.middle))
         angle = self.angle(hole.X)[inside]
         is_pressed = hole.raw_pressure[inside] > 0
         return self.span * mean_over(angle, is_pressed, hole.weight[inside], self.span)
@@ -71,10 +71,11 @@ class Bearing:
         angle, and a parabola along the pin, are fitted to the motion of points.
         """
         pin = state.met[self.contact][0]
-        inside = _inside(pin.X, _twice(self.middle))
+        X = _folded(pin.X)
+        inside = _inside(X, _twice(self.middle))
         angle = self.angle(pin.X)[inside]
         low, high = self.middle
-        beside = (2 * pin.X[..., 2][inside] - low - high) / (high - low)
+        beside = (2 * X[..., 2][inside] - low - high) / (high - low)
         around = [np.cos(k * angle) for k in range(_COSINES + 1)]
         along = [beside, beside**2, beside * np.cos(angle)]
         moved = (pin.coordinates[..., 0] - pin.X[..., 0])[inside]
@@ -141,7 +142,7 @@ def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
         name = bearing.contact
         strips = {"mid": bearing.middle, "rim": bearing.rim}
         for where, strip in strips.items():
-            largest = partial(_in, bearing.largest, strip)
+            largest = partial(_in, bearing.largest, _drawn(shape, strip))
             yield Measure(f"{name} {where} pressure", stress, largest)
         yield Measure(f"{name} eps", "rad", bearing.semi_angle)
     if shape.kind == "clevis":
@@ -155,6 +156,17 @@ def _inside(X: Array, strip: Strip) -> np.ndarray:
     return (z >= low) & (z <= high)
 
 
+def _above(x: Array) -> np.ndarray:
+    """Whether points ``(m, 3)`` are in the upper half of the whole."""
+    return x[:, 2] > 0
+
+
+def _folded(X: Array) -> Array:
+    """The points ``X`` ``(n, q, 3)``, with those below the mid-plane at their images."""
+    x, y, z = np.moveaxis(X, -1, 0)
+    return np.stack([x, y, np.abs(z)], axis=-1)
+
+
 def _twice(strip: Strip) -> Strip:
     """The ``strip`` with twice the width: wide enough for points at all angles."""
     low, high = strip
@@ -162,8 +174,16 @@ def _twice(strip: Strip) -> Strip:
     return low - beside, high + beside
 
 
-def _in(value: Callable[[Accepted, Strip], float], strip: Strip, state: Accepted) -> float:
-    return value(state, strip)
+def _in(
+    value: Callable[[Accepted, Strip], float], strips: Iterable[Strip], state: Accepted
+) -> float:
+    return max(value(state, strip) for strip in strips)
+
+
+def _drawn(shape: Any, strip: Strip) -> set[Strip]:
+    """The ``strip``, and in the whole its image."""
+    low, high = strip
+    return {strip} if shape.space.half else {strip, (-high, -low)}
 
 
 def _middle(shape: Any, height: float = 0.0) -> Strip:
@@ -192,8 +212,8 @@ def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     bearing = Bearing(contact, shape.radius, (0.0, 0.0), (0.0, -1.0), math.pi / 2, *strips)
     yield Measure("delta", units.length, lambda state: -state.driven[load][0])
     yield Measure("P", units.force_of(1.0), lambda state: -state.driven[load][1])
-    yield Measure("p0", units.stress, partial(_in, bearing.peak, bearing.middle))
-    yield Measure("rim pressure", units.stress, partial(_in, bearing.peak, bearing.rim))
+    for name, strip in (("p0", bearing.middle), ("rim pressure", bearing.rim)):
+        yield Measure(name, units.stress, partial(_in, bearing.peak, _drawn(shape, strip)))
     yield Measure("eps", "rad", bearing.semi_angle)
 
 
@@ -237,8 +257,9 @@ def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
 
     def moment(state: Accepted) -> float:
         """About y, at the mid-plane, of the contact forces on one half of the whole pin."""
-        of_both_halves = sum(state.contact_moments(b.contact)[1] for b in (inner, outer))
-        return abs(float(of_both_halves)) / 2
+        moments = state.system.contact_moments
+        found = sum(moments(b.contact, (0.0, 0.0, 0.0), _above)[1] for b in (inner, outer))
+        return abs(float(found)) / (2 if shape.space.half else 1)
 
     def deflection(state: Accepted) -> float:
         return abs(inner.moved(state) - outer.moved(state))

@@ -47,8 +47,10 @@ def mesh_joint(
     if space is not None:
         rims = Rims.of(space, radius)
         slabs = slabs_of(sketch, space["thickness"] / radius, space["pin_length"] / radius)
-        joint = mesh_solids(comm, sketch, slabs, rims, radius=radius, partitioner=partitioner)
-        return replace(joint, point_sets=_centres(pins, radius, 3))
+        how = {"half": space.get("half", True), "partitioner": partitioner}
+        joint = mesh_solids(comm, sketch, slabs, rims, radius=radius, **how)
+        points = {**joint.point_sets, **_centres(pins, radius, 3)}
+        return replace(joint, point_sets=points)
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo

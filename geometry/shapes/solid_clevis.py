@@ -1,8 +1,8 @@
 """A clevis in space: one pin through an inner plate and two outer ones, perhaps in bushings.
 
-A quarter is modelled, y >= 0 and z >= 0. The inner plate's clamp is on the side -x, the clamps of
-the outer plates are on the side +x. The inner hole's centre is the origin. The pin touches the
-inner plate on the side +x and the outer ones on the side -x.
+A quarter is modelled, y >= 0 and z >= 0, or the half y >= 0. The inner plate's clamp is on the
+side -x, the clamps of the outer plates are on the side +x. The inner hole's centre is the origin.
+The pin touches the inner plate on the side +x and the outer ones on the side -x.
 """
 
 from __future__ import annotations
@@ -83,6 +83,6 @@ def solid_clevis(
     end = top + space["overhang"] / radius
     slabs.append(Slab("pin", "pin", 0.0, between_plates, {"pin": "inner pin"}))
     slabs.append(Slab("pin", "pin", between_plates, end, {"pin": "outer pin"}))
-    return mesh_solids(
-        comm, sketch, slabs, Rims.of(space, radius), radius=radius, partitioner=partitioner
-    )
+    of_rims = Rims.of(space, radius)
+    how = {"half": space.get("half", True), "partitioner": partitioner}
+    return mesh_solids(comm, sketch, slabs, of_rims, radius=radius, **how)

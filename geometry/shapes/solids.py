@@ -14,10 +14,16 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import gathered, gmsh_to_mesh, set_mesh_options
+from archord.geometry.meshes.fenicsx import (
+    distribute,
+    gathered,
+    gmsh_to_mesh,
+    set_mesh_options,
+)
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.quality import is_folded
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.mirrored import mirrored
 from archord.geometry.shapes.sketch import Sketch, around
 
 MIDDLE = "mid-plane"  # the set of facets at z = 0
@@ -87,9 +93,11 @@ def mesh_solids(
     rims: Rims,
     *,
     radius: float,
+    half: bool = True,
     partitioner=None,
 ) -> TaggedMesh:
-    """Mesh the ``slabs`` of a ``sketch``, times ``radius``, with all nodes of cylinders on them.
+    """Mesh the ``slabs`` of a ``sketch``, times ``radius``, with all nodes of cylinders on them;
+    with their images below z = 0, if not ``half`` is wanted alone (see `mirrored`).
 
     Facets over the lines of a set are the set, with a name of the slab's own where it has one.
     Further sets are "mid-plane" (z = 0), "faces" (the other flat ends), and "rim", the chamfers or
@@ -101,7 +109,10 @@ def mesh_solids(
     made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key)
     made.mesh.geometry.x[:] *= radius
     _require_sound(made)
-    return made
+    if half:
+        return made
+    drawn = gathered(made)
+    return distribute(comm, drawn and mirrored(drawn), partitioner)
 
 
 def _require_sound(made: TaggedMesh) -> None:

@@ -181,6 +181,7 @@ class ClevisScene(Preset):
             shape,
             2,
             bodies,
+            ["flat", "inner clamp"],
             interaction=contacts,
             support=[
                 {"name": "inner clamp", "on": "inner clamp", "fixed": ["x", "y"]},

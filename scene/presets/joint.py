@@ -171,7 +171,8 @@ class Scene(Checked):
             "load": [press],
             "path": {"steps": load.stage_steps},
         }
-        return general_scene(self, shape, 2, {"block": self.block}, **parts)
+        middles = ["block held"] if pin.rigid else ["pin top", "block held"]
+        return general_scene(self, shape, 2, {"block": self.block}, middles, **parts)
 
     def resolved_data(self) -> dict[str, Any]:
         """The table of the scene, with every default filled in but for what an accuracy chooses."""

@@ -183,7 +183,8 @@ class Preset(Checked):
             "load": [pull],
             "path": {"steps": self.load.steps},
         }
-        return general_scene(self, shape, 2 if half else 1, solids, **parts)
+        middles = [held] if rigid else [place, held]
+        return general_scene(self, shape, 2 if half else 1, solids, middles, **parts)
 
 
 def general_scene(
@@ -191,10 +192,13 @@ def general_scene(
     shape: dict[str, Any],
     symmetry: int,
     solids: Mapping[str, Solid],
+    middles: Sequence[str] = (),
+    /,
     **parts: Any,
 ) -> dict[str, Any]:
-    """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that
-    ``scene`` has, too, the keys that were given, as an accuracy chooses some others."""
+    """The general scene of a pin in ``solids``, with its other ``parts``; of ``middles`` see
+    `solid`. Of the sections that ``scene`` has, too, the keys that were given, as an accuracy
+    chooses some others."""
     pin = scene.pin
     said = {
         name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")
@@ -218,7 +222,7 @@ def general_scene(
         ],
     }
     general = said | parts | {"analysis": said["analysis"] | {"symmetry": symmetry}}
-    return solid(general, scene.space) if scene.space is not None else general
+    return general if scene.space is None else solid(general, scene.space, middles)
 
 
 def require_solid(scene: Any, on_face: bool, radius: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from archord.scene.sections.bodies import NotNegative
@@ -16,6 +17,7 @@ _HOLLOWEST = 0.9  # bore over R
 class Depth(Section):
     """The third dimension of a joint, mirrored at z = 0: what all joints have of it."""
 
+    half: bool = key("model the half z >= 0 alone", default=True)
     chamfer: NotNegative = key(
         "leg of a chamfer of 45 degrees at the rims of the holes that the pin lies in",
         "length",
@@ -44,7 +46,7 @@ class Space(Depth):
     """The joint in space instead of a plane: bodies of a length along z."""
 
     thickness: Positive = key(
-        "length along z of all bodies but the pin, the whole: half of it is modelled",
+        "length along z of all bodies but the pin, the whole",
         "length",
         example=10.0,
     )
@@ -83,12 +85,15 @@ class ClevisSpace(Depth):
         return self.model_dump()
 
 
-def solid(general: dict[str, Any], space: Depth) -> dict[str, Any]:
-    """The ``general`` scene of a plane joint in ``space``, with the mid-plane as a mirror."""
+def solid(general: dict[str, Any], space: Depth, middles: Sequence[str]) -> dict[str, Any]:
+    """The ``general`` scene of a plane joint in ``space``, with the mid-plane as a mirror; of the
+    whole, the ``middles`` of these facet sets are held along z, where the mirror leaves them."""
     shape = general["mesh"]["shape"] | {"space": space.model_dump(exclude_none=True)}
-    middle = {"name": "mid-plane", "on": "mid-plane", "fixed": ["z"]}
+    held = ["mid-plane"] if space.half else [f"{name} middle" for name in middles]
+    supports = [{"name": name, "on": name, "fixed": ["z"]} for name in held]
     analysis = general["analysis"]
-    in_space = {"plane": "space", "symmetry": 2 * analysis["symmetry"]}
+    copies = 2 if space.half else 1
+    in_space = {"plane": "space", "symmetry": copies * analysis["symmetry"]}
     contacts = [
         part | {"rigid": _cylinder(part["rigid"])} if "rigid" in part else part
         for part in general["interaction"]
@@ -96,7 +101,7 @@ def solid(general: dict[str, Any], space: Depth) -> dict[str, Any]:
     return general | {
         "mesh": {"shape": shape},
         "interaction": contacts,
-        "support": [*general["support"], middle],
+        "support": [*general["support"], *supports],
         "analysis": analysis | in_space,
     }
 

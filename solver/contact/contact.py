@@ -22,7 +22,7 @@ from dolfinx import fem
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.materials.material import Points
-from archord.solver.contact.interaction import Interface, on_every_rank
+from archord.solver.contact.interaction import Interface, Within, on_every_rank
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -175,11 +175,19 @@ class Contact:
         all ranks."""
         return self.interface(name).resultant()
 
-    def moments(self, name: str, point: Sequence[float], *, deformed: bool) -> Array:
+    def moments(
+        self,
+        name: str,
+        point: Sequence[float],
+        *,
+        deformed: bool,
+        within: Within | None = None,
+    ) -> Array:
         """Moments ``(t,)`` of this force about ``point``, over all ranks: anticlockwise in a plane,
         about x, y and z in space, none around an axis. They are of the ``deformed`` surface, or as
-        it was."""
-        return self.interface(name).moments(np.asarray(point), deformed=deformed)
+        it was; of places for which ``within`` is true."""
+        at = np.asarray(point)
+        return self.interface(name).moments(at, deformed=deformed, within=within)
 
     def largest_pressed(self) -> float:
         """Sum of the sizes of the points' forces of the interaction where it is largest, over all

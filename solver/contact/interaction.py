@@ -12,7 +12,7 @@ which ``a(v, v) + share gamma |v_n|^2`` exceeds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -30,6 +30,7 @@ from archord.solver.contact.pair import Pair
 from archord.solver.contact.surface import RigidSurface, Surface
 
 Vector = tuple[float, ...]
+Within = Callable[[Array], np.ndarray]  # whether points (m, d) are in a part
 # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
 GAMMA_FACTOR = 0.5
 
@@ -227,16 +228,19 @@ class Interface:
         """Contact force ``(d,)`` on the second surface, over all ranks."""
         return self._summed([pair.forces for pair in self.pairs])
 
-    def moments(self, point: Array, *, deformed: bool) -> Array:
+    def moments(self, point: Array, *, deformed: bool, within: Within | None = None) -> Array:
         """Moments ``(t,)`` of this force about ``point`` ``(d,)``, over all ranks, in the turns of
         the kinematics: anticlockwise in a plane. They are of the ``deformed`` surface, or as it
-        was."""
+        was; of its places ``x`` ``(m, d)`` for which ``within(x)`` is true."""
         kinematics = self.pairs[0].surface.kinematics
         moments = []
         for pair in self.pairs:
             of_points = np.zeros((len(pair.forces), len(kinematics.turns)))
             place = pair.place(on_opposite=pair.surface is self.surfaces[0], deformed=deformed)
-            of_turns = kinematics.moments(place - point, pair.forces)
+            forces = pair.forces
+            if within is not None:
+                forces = forces * within(place)[:, None]
+            of_turns = kinematics.moments(place - point, forces)
             for turn, moment in enumerate(of_turns):
                 of_points[:, turn] = moment
             moments.append(of_points)

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
+from archord.solver.contact.interaction import Within
 from archord.solver.distortion import Distortion
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.problem import Body, Problem
@@ -53,11 +54,15 @@ class Totals:
         """Force ``(d,)`` of the interaction ``name``, the first without, on its second surface."""
         return self.problem.whole * self.contact.resultant(name)
 
-    def contact_moments(self, name: str, point: Sequence[float]) -> Array:
+    def contact_moments(
+        self, name: str, point: Sequence[float], within: Within | None = None
+    ) -> Array:
         """Moments ``(t,)`` of that force at ``point``, of the whole: about z in a plane, about x, y
         and z in space, none around an axis. At large strain it acts where the surface is now, at
-        small strain where it was, as reactions do."""
-        of_part = self.contact.moments(name, point, deformed=self.bulk.finite)
+        small strain where it was, as reactions do. Of a part of the surface, at places ``x``
+        ``(m, d)`` for which ``within(x)`` is true."""
+        deformed = self.bulk.finite
+        of_part = self.contact.moments(name, point, deformed=deformed, within=within)
         return self.problem.whole * of_part
 
     def mean_motion(self, facets: str, point: tuple[float, ...]) -> Array:
@@ -130,9 +135,7 @@ class Totals:
         largest = self.comm.allreduce(here, op=MPI.MAX)
         return largest, self.problem.whole * self.comm.allreduce(part)
 
-    def largest_peeq(
-        self, *bodies: Body, within: Callable[[Array], np.ndarray] | None = None
-    ) -> tuple[float, ...]:
+    def largest_peeq(self, *bodies: Body, within: Within | None = None) -> tuple[float, ...]:
         """Largest PEEQ at a quadrature point of the ``bodies``, of those at ``x`` ``(n, d)`` for
         which ``within(x)`` is true; and the coordinates of its place. Zeros without any."""
         nowhere = (0.0,) * self.problem.kinematics.dimension
