@@ -35,6 +35,7 @@ from archord.scene.sections.analysis import friction_doubts
 from archord.solver.contact.laws.law import ContactLaw
 from archord.solver.contact.laws.named import contact_law
 from archord.solver.expansion import expanded
+from archord.solver.path.mirrors import Mirror
 from archord.solver.path.system import System
 from archord.solver.problem import Problem
 
@@ -82,6 +83,8 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
     """The account of a general problem, whose mesh is in a ``file``, if any."""
     measures = [*part_measures(scene), *solid_measures(scene)]
     by_factor = [column("step"), column("load_factor", of="at")]
+    # found by all ranks, as one alone tells the facts
+    mirrors = system.mirrors if scene.in_space else []
     return Account(
         scene,
         system,
@@ -92,7 +95,7 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         fixed=fixed(system),
         per_step=(*per_step(system), "slip"),
         balance=_balance_of(scene, system.problem.kinematics.axes),
-        facts=partial(_facts, scene, system, file),
+        facts=partial(_facts, scene, system, mirrors, file),
         warnings=warnings,
         checks=step_checks(scene, system),
         refusal=partial(refusal, system),
@@ -142,7 +145,9 @@ def _balance_of(scene: ProblemScene, axes: Sequence[str]) -> Callable[[Accepted,
     return balance
 
 
-def _facts(scene: ProblemScene, system: System, file: str | None) -> dict[str, Any]:
+def _facts(
+    scene: ProblemScene, system: System, mirrors: Sequence[Mirror], file: str | None
+) -> dict[str, Any]:
     """Sizes of the mesh, which is in a ``file``, if any, and what was made of the scene."""
     source = {"file": scene.mesh.file} if scene.mesh.file else {}
     if file:
@@ -153,8 +158,8 @@ def _facts(scene: ProblemScene, system: System, file: str | None) -> dict[str, A
         for interface in system.contact.interfaces
     }
     model: dict[str, Any] = {"contact_shares": shares}
-    if scene.in_space and system.mirrors:
-        model["mirrors"] = [(mirror.axis, mirror.at) for mirror in system.mirrors]
+    if mirrors:
+        model["mirrors"] = [(mirror.axis, mirror.at) for mirror in mirrors]
     return {
         "mesh": sizes(system) | source,
         "model": model,

@@ -90,6 +90,14 @@ def test_a_mesh_of_solids_makes_a_scene_of_space(mesh, analysis):
     assert account.warnings == []
 
 
+def test_one_rank_alone_tells_the_facts(mesh, monkeypatch):
+    """Of a part with mirrors, too, for which all ranks look before."""
+    account = account_of(parse_any(table(mesh, analysis={"symmetry": 8})), MPI.COMM_SELF)
+    monkeypatch.setattr("archord.solver.path.mirrors._ends", None)
+    mirrors = account.facts()["model"]["mirrors"]
+    assert [axis for axis, _ in mirrors] == [0, 1, 2]
+
+
 POINT = {"name": "crank", "facets": "lid", "point": [0.5, 0.5, 2.0]}
 TURN = {"name": "turn", "on": "crank", "direction": "rotation y", "displacement": 1e-4}
 HELD = {"name": "held", "on": "crank", "fixed": ["x", "y", "z", "rotation x", "rotation z"]}
