@@ -248,6 +248,8 @@ class _Expansion:
         control: Control = "force" if is_force and not spread else "displacement"
         self.drives.append(Drive(load.name, self.stated.values(load), control))
         if load.kind == "pressure":
+            if load.on in self.discs:
+                raise ValueError(f"the load {load.name!r} is a pressure: {load.on!r} has no facets")
             self.loads.append(DeadLoad(facets=load.on, pressure=1.0, drive=load.name))
             return
         if _turns(load.direction) and load.on not in self.couplings:

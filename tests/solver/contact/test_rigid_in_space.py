@@ -250,6 +250,15 @@ def test_tangent_is_the_derivative_of_the_forces(disc, kinematics, friction):
         assert np.linalg.norm(error) < 1e-6 * np.linalg.norm(difference)
 
 
+def test_no_pressure_acts_on_a_disc():
+    mesh = box(MPI.COMM_SELF, (1, 1, 1))
+    contact = Interaction("press", (RigidBall(OVER, RADIUS), "x1"))
+    loads = [Load("blow", on="press", pressure=1.0)]
+    given = Problem(mesh, [Body("box", Elastic(E, 0.3))], [contact], [Support("x0")], loads)
+    with pytest.raises(ValueError, match="the load 'blow' is a pressure: 'press' has no facets"):
+        System(given)
+
+
 def test_points_that_face_away_carry_nothing():
     """All sides of a box may be of the contact surface: also the one below a cylinder whose
     normal points from it, and those across the axis."""
