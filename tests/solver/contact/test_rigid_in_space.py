@@ -269,3 +269,22 @@ def test_points_that_face_away_carry_nothing():
     assert found.found.tolist() == [True, False, False, False]
     assert all(np.isfinite(values).all() for values in vars(found).values())
     np.testing.assert_array_equal(found.point[0], [0, -1, 0])
+
+
+def test_a_ball_presses_as_hertz_says():
+    """Radius of contact and largest pressure under the force, on a quarter of a block 12 times as
+    wide and deep as the contact, with about four elements along its radius."""
+    radius = 10.0
+    mesh = box(MPI.COMM_SELF, (8, 8, 8), kind=CellType.hexahedron)
+    mesh.mesh.geometry.x[:] = 12.0 * mesh.mesh.geometry.x**2.2
+    contact = Interaction("press", (RigidBall((0.0, 0.0, -radius), radius), "z0"))
+    load = Load("down", on="press", direction="z", displacement=0.1)
+    held = [Support("z1"), Support("x0", fixed="x"), Support("y0", fixed="y")]
+    body = Body("box", Elastic(E, 0.3))
+    system = solved(Problem(mesh, [body], [contact], held, [load], steps=1, symmetry=4))
+    force = system.drive_force("down")
+    pair = system.equilibrium.contact.pairs[0]
+    area = 4 * pair.integral(pair.active)
+    hertz = (3 * force * radius * (1 - 0.3**2) / (4 * E)) ** (1 / 3)
+    assert np.sqrt(area / np.pi) == pytest.approx(hertz, rel=0.03)
+    assert pair.pressure.max() == pytest.approx(1.5 * force / (np.pi * hertz**2), rel=0.03)
