@@ -3,6 +3,7 @@ PyPI. What uses dolfinx imports this first."""
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import sys
 from contextlib import suppress
@@ -23,6 +24,23 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
     # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the
     # process with a page
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
+
+# of malloc.h
+_TRIM_THRESHOLD, _MMAP_THRESHOLD, _MMAP_MAX = -1, -3, -4
+_LARGE = 32 * 2**20  # bytes: glibc takes no larger threshold
+
+
+def _give_memory_back() -> None:
+    """Let the memory of freed arrays go back to the system, the large ones' at once. SuperLU_DIST,
+    which Debian's PETSc loads, has glibc keep it until the process ends."""
+    with suppress(AttributeError, OSError):  # another C library
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_MAX, 2**16)
+        mallopt(_MMAP_THRESHOLD, _LARGE)
+        mallopt(_TRIM_THRESHOLD, 2 * _LARGE)
+
+
+_give_memory_back()
 
 _REASONS = vars(PETSc.SNES.ConvergedReason)
 RESIDUAL_NOT_FINITE = _REASONS.get(

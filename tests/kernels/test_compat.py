@@ -1,4 +1,8 @@
-"""The names that differ between releases: found in the one that is here."""
+"""The names that differ between releases: found in the one that is here; and memory that goes back
+to the system."""
+
+import resource
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -6,6 +10,9 @@ from dolfinx.mesh import create_unit_square
 from mpi4py import MPI
 
 from archord.kernels.compat import RESIDUAL_NOT_FINITE, ghosted_vector, versions
+
+_STATM = Path("/proc/self/statm")
+_MEGABYTES = 200
 
 
 @pytest.mark.mpi
@@ -29,3 +36,17 @@ def test_releases_and_the_residual_that_is_no_number_have_names():
     assert found.keys() == {"dolfinx", "petsc", "mpi"}
     assert all(found.values())
     assert MPI.Get_library_version().split()[0] in found["mpi"]
+
+
+def _resident() -> float:
+    """Megabytes of memory that this process holds."""
+    return int(_STATM.read_text().split()[1]) * resource.getpagesize() / 2**20
+
+
+@pytest.mark.skipif(not _STATM.exists(), reason="not Linux")
+def test_freed_arrays_go_back_to_the_system():
+    before = _resident()
+    array = np.ones(_MEGABYTES * 2**17)
+    assert _resident() > before + 0.9 * _MEGABYTES
+    del array
+    assert _resident() < before + 0.1 * _MEGABYTES
