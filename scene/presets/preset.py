@@ -183,7 +183,11 @@ class Preset(Checked):
             "load": [pull],
             "path": {"steps": self.load.steps},
         }
-        middles = [held] if rigid else [place, held]
+        outward = laws[1:] or [""] * (len(gaps) - 1)
+        sleeves = zip(surfaces[1:-1:2], outward, strict=True)
+        middles = [held, *(name for name, law in sleeves if law != "tied")]
+        if not rigid:
+            middles.insert(0, place)
         return general_scene(self, shape, 2 if half else 1, solids, middles, **parts)
 
 

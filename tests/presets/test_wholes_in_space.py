@@ -112,6 +112,14 @@ def test_a_whole_is_the_general_scene_that_it_prints(data):
     assert "mid-plane" not in {support.on for support in both.support}
 
 
+@pytest.mark.parametrize("bonded", [True, False])
+def test_a_sleeve_that_is_not_bonded_is_held_along_z(bonded):
+    scene = parse_any(whole(LUG | {"bushing": STEEL | {"thickness": 2.0, "bonded": bonded}}))
+    middles = [support.on for support in scene.support if support.fixed == ["z"]]
+    sleeve = [] if bonded else ["bushing inside middle"]
+    assert middles == ["flat middle", "clamp middle", *sleeve]
+
+
 @pytest.mark.mpi
 def test_the_mesh_of_a_whole_is_a_half_and_its_image(comm):
     """Its sets have both sides, each of which is a set, too, and so are their nodes between."""
