@@ -6,7 +6,8 @@ fresh ones to check the law on.
 
 Joints are drawn as in law_design.py. Every body that yields then gets a hardening curve of its own,
 of one of the `CURVES`; half of the joints whose bodies yield at one stress have one curve for both.
-To these come pairs of named metals as they are, with a clearance that is drawn.
+To these come pairs of named metals as they are, with a clearance that is drawn. Joints to fit to
+have more pairs with the softest metal, and of metals that yield at nearly one stress.
 
     python3 -m archord.studies.hardening_design --metals stress > metals.sweep.toml
 
@@ -48,10 +49,13 @@ from archord.studies.law_design import (
 _KINDS = {"both": 84, "block": 54, "pin": 42, "block weaker": 42, "pin weaker": 42}
 JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
 PAIRS = 80  # of named metals, in each plane
+SOFT_PAIRS = 40  # the same, to fit to: with the softest metal as one body or both
+CLOSE_PAIRS = 40  # the same, of unlike metals that yield at nearly one stress
 NUMBER = sum(JOINTS.values()) + 2 * PAIRS
 CURVES = ("line", "Swift", "Voce", "plateau", "metal")
 _LATEST = 1.8  # x0 beyond which yielding says little of hardening
 _PAIR_CLEARANCES = (0.002, 0.01)  # dR/R of pairs
+_CLOSE = 0.35  # |ln| of the bodies' s of close pairs, at most
 _ALL_PAIRS_CLEARANCE = 0.005
 _SPARE = 4  # times as many joints are drawn as have an earlier x0
 _SEED = 3600
@@ -109,15 +113,40 @@ def pair(metal_of: Mapping[str, Any], strain: bool, clearance: float) -> Drawn:
     return Drawn(own, (float(strain), *elastic, *strengths), first, first, 0.5, 1.0)
 
 
-def pairs(number: int, plane: str, random: np.random.Generator) -> Iterator[Drawn]:
-    """``number`` pairs of named metals that yield early enough and are in the law's range."""
+def any_pair(_: Drawn) -> bool:
+    """Takes every pair of metals."""
+    return True
+
+
+def is_soft(joint: Drawn) -> bool:
+    """Whether a body of the pair ``joint`` is of the metal that yields at the smallest strain, as its
+    nu tells, which no other metal has."""
+    softest = min(metals().values(), key=lambda metal: metal["hardening"][0][1] / metal["E"])
+    return any(joint.own[f"{body}.nu"] == softest["nu"] for body in BODIES)
+
+
+def is_close(joint: Drawn) -> bool:
+    """Whether the bodies of the pair ``joint`` yield at nearly one stress."""
+    *_, pin, block = joint.numbers
+    return pin != block and abs(np.log(block / pin)) < _CLOSE
+
+
+def pairs(
+    number: int,
+    plane: str,
+    random: np.random.Generator,
+    is_wanted: Callable[[Drawn], bool] = any_pair,
+) -> Iterator[Drawn]:
+    """``number`` wanted pairs of named metals that yield early enough and are in the law's
+    range."""
     names = sorted(metals())
     low, high = _PAIR_CLEARANCES
     found = 0
     while found < number:
         metal_of = {body: metals()[random.choice(names)] for body in BODIES}
         joint = pair(metal_of, plane == "strain", low * (high / low) ** random.random())
-        if joint.first < _LATEST and min(joint.numbers[5:]) > SMALLEST_S[plane]:
+        in_range = joint.first < _LATEST and min(joint.numbers[5:]) > SMALLEST_S[plane]
+        if in_range and is_wanted(joint):
             found += 1
             yield joint
 
@@ -148,8 +177,9 @@ def hardened(joint: Drawn, random: np.random.Generator) -> Drawn:
     return replace(joint, own=own)
 
 
-def drawn(share: float, seed: int) -> Iterator[Drawn]:
-    """A ``share`` of `JOINTS`, which harden, and of `PAIRS`."""
+def drawn(share: float, seed: int, *, special: bool = False) -> Iterator[Drawn]:
+    """A ``share`` of `JOINTS`, which harden, and of `PAIRS`; and of the ``special`` pairs, which
+    are hard to tell from others."""
     random = np.random.default_rng(seed)
     for kind, count in JOINTS.items():
         wanted = max(round(count * share), 1)
@@ -158,8 +188,12 @@ def drawn(share: float, seed: int) -> Iterator[Drawn]:
         early = (joint for joint in candidates if joint.first < _LATEST)
         for joint, _ in zip(early, range(wanted), strict=False):
             yield hardened(joint, random)
-    for plane in SMALLEST_S:
-        yield from pairs(round(PAIRS * share), plane, random)
+    kinds: list[tuple[int, Callable[[Drawn], bool]]] = [(PAIRS, any_pair)]
+    if special:
+        kinds += [(SOFT_PAIRS, is_soft), (CLOSE_PAIRS, is_close)]
+    for number, is_wanted in kinds:
+        for plane in SMALLEST_S:
+            yield from pairs(round(number * share), plane, random, is_wanted)
 
 
 def rows_to_fit(given: Iterable[Drawn]) -> Iterator[Row]:
@@ -200,7 +234,7 @@ def main() -> None:
         rows = sweep_file(rows_to_fit(all_pairs(given.metals)))
         text = checking(rows, given.element_size)
     else:
-        text = sweep_file(rows_to_fit(drawn(1.0, _SEED)))
+        text = sweep_file(rows_to_fit(drawn(1.0, _SEED, special=True)))
     plane = 'plane = "strain"\n'
     print(text.replace(plane, f"{plane}tolerance = {_TOLERANCE}\n", 1), end="")
 

@@ -35,14 +35,15 @@ TERMS = (
     *("share", "soft", "weaker", "apart", "clearance", "rise", "gain", "onset", "onset onset"),
     *("s onset", "gain onset", "share onset", "x share", "s share", "x soft", "x weaker"),
     *("weaker weaker", "rise rise", "gain gain", "x bend", "apart bend"),
+    *("x x x", "onset onset onset", "sharp", "x sharp"),
 )
 INPUTS = (
-    *("1", "x", "s", "share", "soft", "weaker", "apart", "clearance"),
+    *("1", "x", "s", "share", "soft", "weaker", "apart", "sharp", "clearance"),
     *("rise", "bend", "gain", "onset"),
 )
-_PAIRS = [(*term.split(), "1")[:2] for term in TERMS]  # the inputs that make each of `TERMS`
-# (terms, 2) their places
-_FACTORS = np.array([[INPUTS.index(name) for name in pair] for pair in _PAIRS])
+_NAMES = [(*term.split(), "1", "1")[:3] for term in TERMS]  # the inputs that make each of `TERMS`
+# (terms, 3) their places
+_FACTORS = np.array([[INPUTS.index(name) for name in names] for names in _NAMES])
 _WIDTH = 0.7  # standard deviation of ln(strain)
 _PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
 STRAINS = np.exp(_WIDTH * _PLACES)  # over eps_rep
@@ -58,6 +59,7 @@ _SHIFTS = 1 + _SMALL * np.array([[[0.0], [1.0], [0.0]], [[0.0], [0.0], [1.0]]])
 _NEAREST = 0.05  # x below which eps_rep is no more asked for
 _EARLIEST = 1.2  # x of first yield by s_eff over x, above which nothing has yielded
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
+_SHARP = 0.12  # the same, within which the strain passes from one body to the other
 _NEARLY_ALIKE = 0.15  # the same, beyond which the curve of the weaker body alone tells of p0
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
 _YIELDED = 0.02  # of P
@@ -148,6 +150,7 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
         "soft": soft,
         "weaker": weaker,
         "apart": np.abs(weaker),
+        "sharp": np.tanh(weaker / _SHARP),
         "clearance": np.log(clearance / 0.005),
         "rise": at.own.rise,
         "bend": at.own.bend,
@@ -157,8 +160,8 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
     inputs = np.empty((len(INPUTS), *ls.shape))
     for k, name in enumerate(INPUTS):
         inputs[k] = of[name]
-    one, other = _FACTORS.T
-    product: Array = inputs[one] * inputs[other]
+    one, other, third = _FACTORS.T
+    product: Array = inputs[one] * inputs[other] * inputs[third]
     return product
 
 

@@ -466,6 +466,7 @@ const WIDE = 3; // factor on a strain, up and down
 const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
 const EARLIEST = 1.2; // x of first yield by s_eff over x, above which nothing has yielded
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
+const SHARP = 0.12; // the same, within which the strain passes from one body to the other
 const NEARLY_ALIKE = 0.15; // the same, beyond which the curve of the weaker body alone tells of p0
 
 /** The mean s by a strain, of strains about it. */
@@ -490,6 +491,7 @@ function lnStrain(model, coefficients, { p, m, n, clearance }, body, first, x, {
         soft: body === "pin" ? p * m : (1 - p) * n,
         weaker,
         apart: Math.abs(weaker),
+        sharp: Math.tanh(weaker / SHARP),
         clearance: Math.log(clearance / 0.005),
         rise,
         bend,

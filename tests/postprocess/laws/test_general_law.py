@@ -35,6 +35,7 @@ from archord.postprocess.laws.general.hardening_model import (
     representative,
 )
 from archord.postprocess.laws.general.joint import LawJoint
+from archord.scene.presets.joint import Scene
 
 X = np.linspace(0.0, 3.0, 241)
 
@@ -323,6 +324,55 @@ def test_every_named_metal_has_a_law(name: str, plane: str) -> None:
     assert (found.at(x, x[-1]).load <= load).all()
 
 
+@pytest.mark.parametrize(
+    ("plane", "pin", "block", "solved"),
+    [
+        (
+            "stress",
+            "CuSn12-C",
+            "S355",
+            {
+                0.2848: 0.237016,
+                0.3414: 0.286391,
+                0.4091: 0.343313,
+                0.4904: 0.410058,
+                1.012: 0.766976,
+            },
+        ),
+        (
+            "stress",
+            "CuSn12-C",
+            "CuSn12-C",
+            {0.4425: 0.38258, 0.6267: 0.543912, 1.056: 0.853459, 1.496: 1.08859, 1.78: 1.20852},
+        ),
+        (
+            "strain",
+            "CuSn12-C",
+            "S275",
+            {0.6218: 0.557374, 1.251: 1.3469, 1.491: 1.62174, 1.775: 1.88593},
+        ),
+    ],
+)
+def test_pairs_of_named_metals_are_within_a_part_in_70(
+    plane: str, pin: str, block: str, solved: dict[float, float]
+) -> None:
+    """P/(E* dR) by delta/dR at R = 10, dR = 0.05, as `archord.studies.hardening_design --metals`
+    solves it, of the pairs that are hardest to tell."""
+    scene = Scene.model_validate(
+        {
+            "joint": {"radius": 10.0, "clearance": 0.05},
+            "analysis": {"plane": plane},
+            "load": {"displacement": 2.0},
+            "pin": {"material": pin},
+            "block": {"material": block},
+        }
+    )
+    described = LawJoint.from_scene(scene)
+    x, y = np.array([*solved.items()]).T
+    told = general_law(described).at(x * described.clearance)
+    np.testing.assert_allclose(told.load / described.unit, y, rtol=0.015)
+
+
 def test_a_law_tells_the_joint_that_it_is_of() -> None:
     """Zeros that are no defaults included: nu, and the share of a rigid pin."""
     for change in ({"pin_share": 0.0}, {"pin_nu": 0.0, "pin_yield": 400.0}, {"friction": 0.1}):
@@ -426,7 +476,7 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
     than 1 %."""
     clearance = 0.005
     first = 0.17
-    second = {"strain": 1.17, "stress": 1.45}[plane] * first
+    second = {"strain": 1.17, "stress": 1.4}[plane] * first
 
     def line(strain: np.ndarray) -> np.ndarray:
         return first * (1 + 0.43 * strain / clearance)
