@@ -119,7 +119,7 @@ def any_pair(_: Drawn) -> bool:
 
 
 def is_soft(joint: Drawn) -> bool:
-    """Whether a body of the pair ``joint`` is of the metal that yields at the smallest strain, as its
+    """Whether a body of the pair ``joint`` is of the metal that yields at the smallest strain; its
     nu tells, which no other metal has."""
     softest = min(metals().values(), key=lambda metal: metal["hardening"][0][1] / metal["E"])
     return any(joint.own[f"{body}.nu"] == softest["nu"] for body in BODIES)
