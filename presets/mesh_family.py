@@ -33,6 +33,8 @@ _FEWEST_FACETS = 3.0  # in contact: of a contact of fewer facets nothing can be 
 _OF_FILES = 2.0  # ratio of the element sizes of a file
 _FIRST_OF_SHAPE = 2.0  # first element size of a shape over the size in its scene
 _MOST_DOFS = 1_500_000
+_LEAST_RATIO = 1.02  # of two meshes that are told apart
+_FEWEST_IN_SPACE = 3  # meshes of shapes in space: two of them may agree by chance
 _COARSER = 3.0  # element size of a mesh for guesses over the size of the mesh itself
 _COARSEST_GUESS = 0.3  # element size over R
 
@@ -41,9 +43,10 @@ class MeshFamily:
     """The meshes ``0, 1, 2, ...`` for ``scene`` that are to make the error of the mesh fall below
     ``accuracy`` with the third, or with the second if that is coarse; each by ``ratio`` finer.
     Whoever solves them notes their ``dofs``. Estimates assume the ``order``: 1 of rings, as few
-    cells lie in the core that is loaded."""
+    cells lie in the core that is loaded. They need the ``fewest`` meshes."""
 
     ratio = RATIO
+    fewest = 2
     dofs = 0
 
     def __init__(self, scene: Scene, accuracy: float) -> None:
@@ -72,6 +75,10 @@ class MeshFamily:
             return None
         return self.scene.model_copy(update={"joint": joint} | chosen(self.scene, substeps))
 
+    def ratio_of(self, coarser: int, finer: int) -> float:
+        """The ratio of the element sizes of two meshes of so many dofs."""
+        return self.ratio
+
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size over R and growth of ``scene``."""
         return scene.joint.h / scene.joint.radius, scene.joint.growth
@@ -95,7 +102,7 @@ class ProblemFamily:
     """The meshes ``0, 1, 2, ...`` for ``scene``, each by ``ratio`` finer. Its corners, as where an
     edge is clamped, let forces converge with the ``order`` 1.5 at the end, like their energy
     (Williams 1952), and where bodies yield single differences are too small for more. Whoever
-    solves them notes their ``dofs``."""
+    solves them notes their ``dofs``. Estimates need the ``fewest`` meshes."""
 
     order = 1.5
     dofs = 0
@@ -104,6 +111,8 @@ class ProblemFamily:
         self.scene = scene
         self.shape = scene.mesh.shape
         self.ratio = _OF_FILES if self.shape is None else RATIO
+        self.is_drawn_in_space = scene.in_space and self.shape is not None
+        self.fewest = _FEWEST_IN_SPACE if self.is_drawn_in_space else 2
 
     def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
         """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would
@@ -117,6 +126,14 @@ class ProblemFamily:
             changes = {"shape": resized(self.shape, factor * self.shape.h, factor)}
         mesh = self.scene.mesh.model_copy(update=changes)
         return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
+
+    def ratio_of(self, coarser: int, finer: int) -> float:
+        """The ratio of the element sizes of two meshes of so many dofs: solids that are thin beside
+        coarse elements have hardly more of smaller ones."""
+        if not self.is_drawn_in_space:
+            return self.ratio
+        found = (finer / coarser) ** (1 / 3)
+        return min(self.ratio, max(_LEAST_RATIO, found))
 
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size over R and growth of ``scene``; of a file, the size over the size of its own

@@ -135,6 +135,7 @@ class _Search:
         curves: list[
             Curve
         ] = []  # in steps of the final length, on the meshes that resolve the contact
+        dofs = []  # of these meshes
         for mesh in count():
             curve, level = self._solve(mesh, self.substeps)
             if curve is None:
@@ -143,10 +144,13 @@ class _Search:
             if self.step_error is None:
                 curve, level = self._choose_steps(mesh, curve, level)
             curves.append(curve)
-            self.mesh_error = mesh_error(curves, self.family.ratio, self.family.order)
+            dofs.append(level.dofs)
+            ratio = self.family.ratio_of(*dofs[-2:]) if len(dofs) > 1 else self.family.ratio
+            self.mesh_error = mesh_error(curves, ratio, self.family.order)
             self._tell(replace(level, mesh_error=self.mesh_error))
             left = max(self.asked - (self.step_error or 0.0), self.asked / 2)
-            if self.mesh_error is not None and self.mesh_error <= left:
+            is_small = self.mesh_error is not None and self.mesh_error <= left
+            if is_small and len(curves) >= self.family.fewest:
                 return
 
     def _choose_steps(self, mesh: int, curve: Curve, level: Level) -> tuple[Curve, Level]:

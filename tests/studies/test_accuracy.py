@@ -66,6 +66,20 @@ def test_sizes_of_general_meshes_have_their_heading(capsys, shape, heading, size
     assert ProblemFamily(scene).sizes(scene)[0] == pytest.approx(size)
 
 
+def test_thin_solids_have_hardly_more_cells_of_a_smaller_size():
+    """Errors are estimated by the cells that there are, from three meshes at least."""
+    mesh = {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}}
+    press = {"name": "press", "on": "flat", "direction": "x", "displacement": 0.1}
+    data = {"mesh": mesh, "body": [{"name": "lug", "E": 1.0, "nu": 0.3}], "load": [press]}
+    plane = ProblemFamily(parse_any(data))
+    mesh["shape"]["space"] = {"thickness": 4.0}
+    solid = ProblemFamily(parse_any(data | {"analysis": {"plane": "space"}}))
+    assert (plane.fewest, solid.fewest) == (2, 3)
+    assert plane.ratio_of(4000, 5000) == solid.ratio_of(1000, 5000) == mesh_family.RATIO
+    assert solid.ratio_of(4000, 5000) == pytest.approx(1.25 ** (1 / 3))
+    assert solid.ratio_of(4000, 4000) > 1
+
+
 def test_a_general_scene_that_is_let_go_notices_its_contact():
     """What touches at any step is learnt from, though nothing touches at the end."""
     mesh = {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}}
@@ -405,5 +419,6 @@ def test_a_joint_in_space_is_solved_to_the_accuracy(tmp_path):
     run = archord.solve(scene, tmp_path / "run", comm=MPI.COMM_SELF)
     assert run.status == "done"
     assert 0 < run.summary["accuracy"]["estimated"] < 0.05
+    assert len(run.summary["accuracy"]["levels"]) >= 3
     again = archord.solve(tmp_path / "run" / "scene.toml", tmp_path / "again", comm=MPI.COMM_SELF)
     assert again.columns["press force"] == run.columns["press force"]
