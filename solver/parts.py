@@ -73,7 +73,7 @@ class Body:
     name: str
     material: Any
     cells: str = ""
-    _live_of: Any = field(default=None, init=False, repr=False, compare=False)
+    _made: Any = field(default=(None, None), repr=False, compare=False, kw_only=True)
 
     def __post_init__(self) -> None:
         """Check the parts; raise `InputError`."""
@@ -87,13 +87,12 @@ class Body:
     @property
     def stated(self) -> Any:
         """The material as its user stated it, whatever a problem made of it."""
-        return self.material if self._live_of is None else self._live_of
+        live, stated = self._made
+        return self.material if live is None or live is not self.material else stated
 
     def with_live(self, material: Any) -> Body:
         """The body with the ``material`` that a problem made of the stated one."""
-        body = replace(self, material=material)
-        object.__setattr__(body, "_live_of", self.stated)
-        return body
+        return replace(self, material=material, _made=(material, self.stated))
 
 
 @in_sentences

@@ -264,6 +264,18 @@ def test_a_problem_that_is_replaced_keeps_nothing_of_the_one_before(key, first, 
         assert one.material.E == other.material.E
 
 
+def test_a_body_that_is_replaced_keeps_nothing_of_its_problem():
+    """Neither its strain nor the units of its metal; a new material takes the place of both."""
+    mesh = blocks(MPI.COMM_SELF, 1, 1)
+    bodies = [Body("lower", "S355"), Body("upper", HARDENING)]
+    first, second = Problem(mesh, bodies, strain="large").bodies
+    renamed = [replace(first, name="other", cells="lower"), second]
+    there = Problem(mesh, renamed, units=("m", "Pa"))
+    assert not any(body.material.finite for body in there.bodies)
+    assert pytest.approx(210e9) == there.bodies[0].material.E
+    assert replace(first, material=HARDENING).stated is HARDENING
+
+
 def test_a_problem_takes_another_thickness_than_its_kinematics_brought():
     """Or none again."""
     problem = replace(columns(), kinematics=Kinematics("strain", 5.0))
