@@ -15,7 +15,7 @@ from archord.postprocess.comparison import COMMON, COMPARED, Comparison, differi
 from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
-from archord.report.doubts import kind
+from archord.report.doubts import kind, of_cases
 from archord.report.table import Table
 
 _MOST = 40  # rows of a table
@@ -57,7 +57,8 @@ def run_text(run: Run, width: int = 0) -> str:
 
 
 def sweep_text(sweep: Sweep) -> str:
-    """Cases of a sweep by status, what was varied, where they ended, and why some did not."""
+    """Cases of a sweep by status, what was varied, where they ended, why some did not, and each
+    kind of their warnings once."""
     cases = sweep.cases
     plural = "s" if len(sweep) != 1 else ""
     lines = [f"{sweep.folder}: {len(sweep)} case{plural}: {sweep.states}"]
@@ -74,6 +75,8 @@ def sweep_text(sweep: Sweep) -> str:
             lines.append(f"case {case}: {message}")
     for case, fault in sweep.unread.items():
         lines.append(f"case {case} is left out: {fault}")
+    warnings = of_cases((case, run.warnings) for case, run in sweep.runs.items())
+    lines += [f"warning: {warning}" for warning in warnings]
     return "\n".join(lines)
 
 

@@ -33,6 +33,21 @@ def kind(said: str) -> str:
     return "".join(parts)
 
 
+def of_cases(warnings: Iterable[tuple[int, Iterable[str]]]) -> list[str]:
+    """Each kind of the ``warnings`` of cases by their numbers once, with the first case that has it
+    and how many more have."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for number, said in warnings:
+        own = {kind(warning): warning for warning in reversed(list(said))}
+        for name, warning in own.items():
+            found.setdefault(name, []).append((number, warning))
+    told = []
+    for (number, warning), *others in found.values():
+        more = f" and {len(others)} more" if others else ""
+        told.append(f"case {number}{more}: {warning}")
+    return told
+
+
 @dataclass
 class Told:
     """A kind of warning: what is ``said`` of the step ``worst``, and the ``first`` step that gave

@@ -16,7 +16,7 @@ from typing import Any
 from archord.output.files.disk import replace_file
 from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
-from archord.report.doubts import kind
+from archord.report.doubts import of_cases
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.scene.sections.errors import toml_value
@@ -153,17 +153,8 @@ def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> 
 def warnings_of(sweep: Sweep, folder: Path) -> list[str]:
     """Each kind of warning of the runs in the sweep's ``folder`` once, with the first case that has
     it and how many more have."""
-    found: dict[str, list[tuple[int, str]]] = {}
-    for case in sweep.distinct:
-        warnings = report_of(of_case(case, folder)).get("warnings", [])
-        own = {kind(warning): warning for warning in reversed(warnings)}
-        for name, warning in own.items():
-            found.setdefault(name, []).append((case.number, warning))
-    told = []
-    for (number, warning), *others in found.values():
-        more = f" and {len(others)} more" if others else ""
-        told.append(f"case {number}{more}: {warning}")
-    return told
+    of_runs = ((case.number, report_of(of_case(case, folder))) for case in sweep.distinct)
+    return of_cases((number, report.get("warnings", [])) for number, report in of_runs)
 
 
 def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Row], list[Row]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from archord.postprocess.judgement.convergence import Refined, group
+from archord.postprocess.judgement.convergence import Refined, group, twins
 from archord.postprocess.laws.calibration import POOR, check_compatible, fit_curve
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run
@@ -97,7 +97,11 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
             of[curve.name] = case.run
         except InputError as error:
             left_out.append((case.run, str(error)))
-    for refined in group(runs):
+    again = {run.name: of[first.name] for run, first in twins(runs)}
+    left_out += [
+        (of[run], f"{first} is the same joint on the same mesh") for run, first in again.items()
+    ]
+    for refined in group([run for run in runs if run.name not in again]):
         name = of[refined.run.name]
         left_out += [
             (of[run.name], f"{name} is the same joint on a finer mesh") for run in refined.coarser

@@ -140,17 +140,36 @@ def _slope(delta: Array, curve: Array) -> Array:
 def group(runs: list[RunCurve]) -> list[Refined]:
     """Runs of one scene that differ only in element size, together; in the order of the first of
     each. Raises `InputError` for two runs of the same scene on the same mesh."""
+    for run, first in twins(runs):
+        raise InputError(
+            f"{run.name}: is the same scene on the same mesh as {first.name}; give one of them."
+        )
+    groups = _by_scene(runs).values()
+    return [Refined(same[0], tuple(same[1:])) for same in groups]
+
+
+def twins(runs: list[RunCurve]) -> list[tuple[RunCurve, RunCurve]]:
+    """The runs that are of the same scene on the same mesh as one before them, each with that
+    one."""
+    found = []
+    for same in _by_scene(runs).values():
+        first = same[0]
+        for run in same[1:]:
+            if math.isclose(first.scene.joint.h, run.scene.joint.h, rel_tol=1e-9):
+                found.append((run, first))
+            else:
+                first = run
+    return found
+
+
+def _by_scene(runs: list[RunCurve]) -> dict[tuple, list[RunCurve]]:
+    """The runs of each scene, the finest mesh first."""
     scenes: dict[tuple, list[RunCurve]] = {}
     for run in runs:
         scenes.setdefault(_without_mesh(run.scene), []).append(run)
     for same in scenes.values():
         same.sort(key=lambda run: run.scene.joint.h)
-        for a, b in pairwise(same):
-            if math.isclose(a.scene.joint.h, b.scene.joint.h, rel_tol=1e-9):
-                raise InputError(
-                    f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them."
-                )
-    return [Refined(same[0], tuple(same[1:])) for same in scenes.values()]
+    return scenes
 
 
 def _without_mesh(scene: Scene) -> tuple:

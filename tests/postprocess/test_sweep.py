@@ -85,6 +85,9 @@ def test_show_prints_the_cases_and_draws_them(sweep, tmp_path, capsys):
     assert f"{loaded.cases['P'][0]:.6g}" in rows["1"]
     assert rows["1"][1:] == rows["3"][1:]
     assert "case 4: no equilibrium at delta" in printed
+    warnings = [line for line in printed.splitlines() if line.startswith("warning: case 1")]
+    assert any("only" in line and "facets in contact" in line for line in warnings)
+    assert len(warnings) == len({line.partition(": ")[2] for line in warnings})
     assert matplotlib.image.imread(copy / "picture.png").std() > 0.05
     (loaded.run(2).folder / "run.json").write_text("{")
     assert list(archord.load(copy).runs) == [1]

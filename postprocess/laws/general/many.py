@@ -25,10 +25,11 @@ _OTHERS = ("block_size", "whole", "fixed_pairs")
 
 
 class Loads(NamedTuple):
-    """What the law says of ``n`` joints; a row with a reason is nan.
+    """What the law says of ``n`` joints; a row with a reason is nan, or has a nan where a
+    displacement is missing.
 
     - ``load``, ``error`` ``(n,)`` or ``(n, k)``: forces, and errors that 9 in 10 joints keep
-    - ``reason`` ``(n,)``: why a joint has no forces, empty if it has
+    - ``reason`` ``(n,)``: why a joint lacks forces, empty if it has all
     """
 
     load: Array
@@ -94,6 +95,8 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
         if farthest > law.limit * law.reach / law.x[-1]:
             reason[row] = f"archord: delta = {farthest:g} is beyond {law.limit:g}, 3 dR"
             continue
+        if np.isnan(deltas[row] + deepests[row]).any():
+            reason[row] = "archord: a displacement is missing"
         state = law.at(deltas[row], deepests[row])
         load[row] = state.load
         error[row] = state.error

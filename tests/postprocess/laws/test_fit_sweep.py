@@ -27,6 +27,8 @@ block = { E = 1.0, nu = 0.3 }
 load = { displacement = 2.0, steps = 4 }
 """
 
+SIZE = "relative_element_size = 0.2"
+
 
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory) -> Path:
@@ -66,6 +68,26 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     assert re.search(rf"left out: {cases[2].run}: .*block.hardening = 0.1 does not fit", printed)
     assert notes["distinct cases"] == "4"
     assert (notes.get("rms", "above 5% in 0 of 2") in printed) == (stored.rms > 0.05).any()
+
+
+def test_a_joint_that_is_there_twice_is_left_out_once(tmp_path, capsys):
+    """As with two tolerances: the first case stays, with its coarser mesh."""
+    cases = """list = [
+        { analysis.tolerance = 1e-8 },
+        { analysis.tolerance = 1e-9 },
+        { joint.relative_element_size = 0.3 },
+    ]
+    [base]"""
+    words = SWEEP.partition("[base]")[2].replace("relative_element_size = 0.12", SIZE)
+    (tmp_path / "twice.sweep.toml").write_text(cases + words)
+    out = str(tmp_path / "out")
+    assert run(["sweep", str(tmp_path / "twice.sweep.toml"), "-o", out, "-q"]) == 0
+    assert run(["fit", out]) == 0
+    printed = capsys.readouterr().out
+    first, again, coarse = (case.run for case in read_sweep(tmp_path / "out/sweep.toml").distinct)
+    assert list(read_rows(tmp_path / "out" / "fit.csv")[0].run) == [first]
+    assert f"left out: {again}: {first} is the same joint on the same mesh" in printed
+    assert f"left out: {coarse}: {first} is the same joint on a finer mesh" in printed
 
 
 def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys):

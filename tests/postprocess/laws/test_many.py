@@ -51,6 +51,17 @@ def test_a_frame_is_a_table_of_joints():
     assert not found.reason.any()
 
 
+@pytest.mark.parametrize("given", [{"delta": [0.02, np.nan]}, {"deepest": [0.05, np.nan]}])
+def test_a_missing_displacement_is_told(given):
+    """Of its joint alone, whose other displacements keep their forces."""
+    found = loads(SAME | {"clearance": [0.05, 0.05]}, **{"delta": 0.02} | given)
+    assert list(np.isnan(found.load)) == [False, True]
+    assert list(found.reason) == ["", "archord: a displacement is missing"]
+    both = loads(SAME | {"clearance": 0.05}, [[0.02, np.nan]])
+    assert list(np.isnan(both.load[0])) == [False, True]
+    assert both.reason[0]
+
+
 def test_displacements_and_ways_back_belong_to_joints():
     """One of each joint, whatever the other has: as many joints as columns change nothing."""
     table = SAME | {"clearance": [0.05, 0.04], "block_yield": 250.0}
