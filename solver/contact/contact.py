@@ -116,6 +116,7 @@ class Contact:
             return False
         grew = [each.extend() for each in self._reaches if each.pair.moves]
         if any(grew):
+            del self.tangent  # with its large arrays, before the next one is made
             self.tangent = ContactTangent(self._reaches, self._block_size)
         return any(grew)
 

@@ -121,9 +121,9 @@ class TangentMatrix:
         """Allocate every slot that bulk and contact may fill; in a condensed matrix, slots of
         contact alone."""
         tangent = self.contact.tangent
-        self._slots = self._slots_of(tangent.rows, tangent.columns)
         nothing: Array = np.zeros((0, self.dimension, self.dimension))
         self._of_contact = Filled(np.zeros(0, dtype=np.int64), nothing)
+        self._slots = self._slots_of(tangent.rows, tangent.columns)
         if self.condensed is not None:
             inside = self._slots.in_matrix
             self.condensed.occupy(tangent.rows[inside], tangent.columns[inside])
