@@ -128,6 +128,8 @@ class TangentMatrix:
             inside = self._slots.in_matrix
             self.condensed.occupy(tangent.rows[inside], tangent.columns[inside])
             return
+        if self.A:
+            self.A.setPreallocationNNZ(0)  # solvers refer to it until they have the next one
         self.A.destroy()
         self._elastic.destroy()
         rows, columns = self.contact.pattern()
