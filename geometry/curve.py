@@ -329,6 +329,7 @@ class RigidRound:
 
     n_facets = 1
     dimension = 2
+    axis: Array | None = None  # of a cylinder
 
     def __init__(self, centre: Sequence[float] | Array, radius: float) -> None:
         self.centre = np.asarray(centre)

@@ -123,11 +123,12 @@ class RigidCylinder(RigidBall):
         axis: Sequence[float] | Array = (0.0, 0.0, 1.0),
     ) -> None:
         super().__init__(centre, radius)
-        self.axis = np.asarray(axis)
-        is_direction = self.axis.shape == (3,) and all(map(is_number, self.axis.ravel()))
-        is_direction = is_direction and bool(self.axis.any())
+        given = np.asarray(axis)
+        self.axis: Array = given
+        is_direction = given.shape == (3,) and all(map(is_number, given.ravel()))
+        is_direction = is_direction and bool(given.any())
         require_of(self, is_direction, "axis", "must be three numbers, not all of them zero")
-        self.axis = unit(self.axis.astype(float))
+        self.axis = unit(given.astype(float))
 
     def _ray(self, from_centre: Array) -> Array:
         """The vectors ``(m, 3)`` to points, across the axis."""

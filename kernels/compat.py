@@ -25,8 +25,11 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
     # process with a page
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
-# of malloc.h
-_TRIM_THRESHOLD, _MMAP_THRESHOLD, _MMAP_MAX = -1, -3, -4
+# numbers of parameters in malloc.h
+_TRIM_THRESHOLD = -1
+_MMAP_THRESHOLD = -3
+_MMAP_MAX = -4
+_MOST_MAPPED = 2**16  # arrays that are mapped at once: glibc's own default
 _LARGE = 32 * 2**20  # bytes: glibc takes no larger threshold
 
 
@@ -35,7 +38,7 @@ def _give_memory_back() -> None:
     which Debian's PETSc loads, has glibc keep it until the process ends."""
     with suppress(AttributeError, OSError):  # another C library
         mallopt = ctypes.CDLL(None).mallopt
-        mallopt(_MMAP_MAX, 2**16)
+        mallopt(_MMAP_MAX, _MOST_MAPPED)
         mallopt(_MMAP_THRESHOLD, _LARGE)
         mallopt(_TRIM_THRESHOLD, 2 * _LARGE)
 

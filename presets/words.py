@@ -141,8 +141,7 @@ def _interaction(part: Interaction) -> dict[str, Any]:
         "overlap": part.overlap,
     }
     if disc is not None:
-        axis = getattr(disc, "axis", None)
-        words["rigid"] = {"centre": disc.centre, "radius": disc.radius, "axis": axis}
+        words["rigid"] = {"centre": disc.centre, "radius": disc.radius, "axis": disc.axis}
     return words | _law(part.law)
 
 

@@ -119,10 +119,11 @@ def any_pair(_: Drawn) -> bool:
 
 
 def is_soft(joint: Drawn) -> bool:
-    """Whether a body of the pair ``joint`` is of the metal that yields at the smallest strain; its
-    nu tells, which no other metal has."""
+    """Whether a body of the pair ``joint`` is of the metal that yields at the smallest strain."""
     softest = min(metals().values(), key=lambda metal: metal["hardening"][0][1] / metal["E"])
-    return any(joint.own[f"{body}.nu"] == softest["nu"] for body in BODIES)
+    strain = softest["hardening"][0][1] / softest["E"]
+    strains = [joint.own[f"{body}.yield_stress"] / joint.own[f"{body}.E"] for body in BODIES]
+    return bool(np.isclose(strains, strain, rtol=1e-9).any())
 
 
 def is_close(joint: Drawn) -> bool:

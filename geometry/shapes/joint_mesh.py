@@ -47,8 +47,15 @@ def mesh_joint(
     if space is not None:
         rims = Rims.of(space, radius)
         slabs = slabs_of(sketch, space["thickness"] / radius, space["pin_length"] / radius)
-        how = {"half": space.get("half", True), "partitioner": partitioner}
-        joint = mesh_solids(comm, sketch, slabs, rims, radius=radius, **how)
+        joint = mesh_solids(
+            comm,
+            sketch,
+            slabs,
+            rims,
+            radius=radius,
+            half=bool(space.get("half", True)),
+            partitioner=partitioner,
+        )
         points = {**joint.point_sets, **_centres(pins, radius, 3)}
         return replace(joint, point_sets=points)
 

@@ -83,6 +83,12 @@ def solid_clevis(
     end = top + space["overhang"] / radius
     slabs.append(Slab("pin", "pin", 0.0, between_plates, {"pin": "inner pin"}))
     slabs.append(Slab("pin", "pin", between_plates, end, {"pin": "outer pin"}))
-    of_rims = Rims.of(space, radius)
-    how = {"half": space.get("half", True), "partitioner": partitioner}
-    return mesh_solids(comm, sketch, slabs, of_rims, radius=radius, **how)
+    return mesh_solids(
+        comm,
+        sketch,
+        slabs,
+        Rims.of(space, radius),
+        radius=radius,
+        half=bool(space.get("half", True)),
+        partitioner=partitioner,
+    )

@@ -129,7 +129,8 @@ class TangentMatrix:
             self.condensed.occupy(tangent.rows[inside], tangent.columns[inside])
             return
         if self.A:
-            self.A.setPreallocationNNZ(0)  # solvers refer to it until they have the next one
+            # its entries go now: solvers keep the matrix itself until they get the next one
+            self.A.setPreallocationNNZ(0)
         self.A.destroy()
         self._elastic.destroy()
         rows, columns = self.contact.pattern()
