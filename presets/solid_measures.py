@@ -142,7 +142,7 @@ def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
         name = bearing.contact
         strips = {"mid": bearing.middle, "rim": bearing.rim}
         for where, strip in strips.items():
-            largest = partial(_in, bearing.largest, _drawn(shape, strip))
+            largest = partial(_largest_over, bearing.largest, _modelled(shape, strip))
             yield Measure(f"{name} {where} pressure", stress, largest)
         yield Measure(f"{name} eps", "rad", bearing.semi_angle)
     if shape.kind == "clevis":
@@ -174,14 +174,15 @@ def _twice(strip: Strip) -> Strip:
     return low - beside, high + beside
 
 
-def _in(
+def _largest_over(
     value: Callable[[Accepted, Strip], float], strips: Iterable[Strip], state: Accepted
 ) -> float:
+    """The largest ``value`` of the ``strips``."""
     return max(value(state, strip) for strip in strips)
 
 
-def _drawn(shape: Any, strip: Strip) -> set[Strip]:
-    """The ``strip``, and in the whole its image."""
+def _modelled(shape: Any, strip: Strip) -> set[Strip]:
+    """The ``strip``; where the whole is modelled, its image below the mid-plane, too."""
     low, high = strip
     return {strip} if shape.space.half else {strip, (-high, -low)}
 
@@ -213,7 +214,9 @@ def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     yield Measure("delta", units.length, lambda state: -state.driven[load][0])
     yield Measure("P", units.force_of(1.0), lambda state: -state.driven[load][1])
     for name, strip in (("p0", bearing.middle), ("rim pressure", bearing.rim)):
-        yield Measure(name, units.stress, partial(_in, bearing.peak, _drawn(shape, strip)))
+        yield Measure(
+            name, units.stress, partial(_largest_over, bearing.peak, _modelled(shape, strip))
+        )
     yield Measure("eps", "rad", bearing.semi_angle)
 
 

@@ -197,7 +197,7 @@ def difference(one: Curve, other: Curve, largest: float) -> float:
 
 def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST) -> float | None:
     """Relative error of the last of ``curves``, from coarse to fine, the element size falling by
-    ``ratio`` each time.
+    ``ratio`` the last time, and before as if by the same.
 
     A curve is one number for each output step. The order of joints is 3 in the mean, but
     differences scatter by a factor of two or three, as the contact ends anywhere in an element. So
