@@ -2,7 +2,8 @@
 
 fields.h5 holds the arrays. fields.xdmf describes them to ParaView and pyvista, and holds none;
 `archord export --vtk` makes VTKHDF files of the same arrays. Cells are curved and of second order,
-whatever the degree of the elements. Arrays are in the order of the mesh generator, whatever the
+whatever the degree of the elements. The nodes of mirrored cells are in the order that gives these a
+positive determinant, as VTK wants it. Arrays are in the order of the mesh generator, whatever the
 number of ranks.
 
 Displacements are nodal. The others are the rows of `output.cell_fields`: means over cells, and what
@@ -17,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from archord.geometry.basis import dimension_of
+from archord.geometry.meshes.cells import are_mirrored, turned
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
 from archord.output.cell_fields import CELL_FIELDS, CellField, cell_means
@@ -89,13 +92,15 @@ class FieldWriter:
         self._second = second = SecondOrder(order.kind, order.nodes_of_cell)
         _, in_vtk_order = CELLS[second.cells.shape[1]]
         x = second(order.coordinates)
-        cells = second.cells[:, in_vtk_order]
+        corners = second.cells[:, : second.corners]
+        d = dimension_of(order.kind)
+        are_inside_out = are_mirrored(order.kind, x[corners, :d])
+        cells = turned(order.kind, 2, second.cells, are_inside_out)[:, in_vtk_order]
         self._n_nodes = len(x)
         self._cells_shape = (len(cells), cells.shape[1])
         self._grids: list[str] = []  # of the steps so far, as fields.xdmf has them
         self._recovery = None
         if "points/coordinates" in mesh:
-            corners = second.cells[:, : second.corners]
             places = mesh["points/coordinates"]
             degree = order.system.problem.degree
             nodes = x[:, : places.shape[-1]]

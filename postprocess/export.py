@@ -135,18 +135,26 @@ def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
         bulk_quadrature,
         tabulate,
     )
+    from archord.geometry.meshes.cells import in_mirror
 
     mesh = run.fields(step)
     x = run.points(step)["coordinates"]
     is_point = ~np.isnan(x).any(axis=-1)  # cells of fewer points than others have none behind
     kinds = {6: TRIANGLE, 9: QUADRILATERAL, 10: TETRAHEDRON, 27: HEXAHEDRON}
     kind = kinds[mesh.cells.shape[1]]
-    rules = [
-        bulk_quadrature(kind, run.scene.analysis.degree, full=full)[0] for full in (False, True)
-    ]
-    shapes = {len(points): tabulate(kind, 2, points)[0] for points in rules}
     _, in_vtk_order = CELLS[mesh.cells.shape[1]]
     cells = mesh.cells[:, np.argsort(in_vtk_order)]
+    nodes = mesh.coordinates[cells]
+    n_points = is_point.sum(axis=1)
+    groups = []  # of cells with the same points, and the basis there
+    for full in (False, True):
+        points, _ = bulk_quadrature(kind, run.scene.analysis.degree, full=full)
+        of_rule = np.flatnonzero(n_points == len(points))
+        places = x[of_rule, : len(points)]
+        bases = [tabulate(kind, 2, X)[0] for X in (points, in_mirror(points))]
+        off = [np.abs(basis @ nodes[of_rule] - places).sum(axis=(1, 2)) for basis in bases]
+        nearest = np.argmin(off, axis=0)  # cells that were mirrored count their nodes otherwise
+        groups += [(of_rule[nearest == k], basis) for k, basis in enumerate(bases)]
     cell, _ = np.nonzero(is_point)
     vertices = np.arange(len(cell))[:, None]
     grid = Grid(in_space(x[is_point]), vertices, VERTEX, {"CellData/body": mesh.body[cell]})
@@ -154,10 +162,8 @@ def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     def values(step: int) -> Arrays:
         nodal = run.fields(step).displacement[cells]
         displacement = np.zeros_like(x)
-        for n_points, shape in shapes.items():
-            of_rule = is_point.sum(axis=1) == n_points
-            moved = np.einsum("qa,mak->mqk", shape, nodal[of_rule])
-            displacement[of_rule, :n_points] = moved
+        for of_group, basis in groups:
+            displacement[of_group, : len(basis)] = basis @ nodal[of_group]
         found = {"PointData/displacement": in_space(displacement[is_point])}
         at_points = run.points(step)
         del at_points["coordinates"]

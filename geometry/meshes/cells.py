@@ -132,6 +132,30 @@ def outer_sides(kind: basix.CellType, cells: np.ndarray) -> tuple[np.ndarray, np
     return sides[alone], alone // n_sides(kind)
 
 
+def in_mirror(X: Array) -> Array:
+    """Points ``X`` ``(q, d)`` of a reference cell, with its first two axes exchanged."""
+    x, y, *others = X.T
+    return np.stack([y, x, *others], axis=1)
+
+
+def are_mirrored(kind: basix.CellType, x: Array) -> np.ndarray:
+    """Which cells ``(m,)`` have a negative determinant at the first of their nodes ``x`` ``(m, a,
+    d)``."""
+    distance = basix.geometry(kind).sum(axis=1)
+    beside = np.flatnonzero(distance == 1)
+    edges = x[:, beside] - x[:, :1]
+    return np.linalg.det(edges) < 0
+
+
+def turned(kind: basix.CellType, order: int, cells: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """``cells`` ``(m, a)`` of this ``order``, those ``which`` ``(m,)`` are chosen with their nodes
+    as in a mirror."""
+    points = lagrange_element(kind, order).points
+    apart = points[:, None] - in_mirror(points)
+    image = np.abs(apart).sum(axis=2).argmin(axis=0)
+    return np.where(which[:, None], cells[:, image], cells)
+
+
 def inner_weights(kind: basix.CellType, order: int) -> Array:
     """Weights ``(i, b)`` that place the ``i`` nodes inside a cell by the ``b`` nodes on its sides.
 

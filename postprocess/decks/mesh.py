@@ -9,7 +9,8 @@ import numpy as np
 
 from archord.geometry.basis import Array, dimension_of
 from archord.geometry.curve import RigidCircle
-from archord.postprocess.decks.numbering import Ints, are_mirrored, numbering
+from archord.geometry.meshes.cells import are_mirrored
+from archord.postprocess.decks.numbering import Ints, numbering
 from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Rigid
 

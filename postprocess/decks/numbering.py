@@ -42,13 +42,6 @@ _SIDES = {
     TETRAHEDRON: ["012", "031", "132", "230"],
     HEXAHEDRON: ["0123", "4765", "0451", "1562", "2673", "3740"],
 }
-# corners beside the first one whose directions from it have a positive determinant
-_BESIDE = {
-    TRIANGLE: [1, 2],
-    QUADRILATERAL: [1, 3],
-    TETRAHEDRON: [1, 2, 3],
-    HEXAHEDRON: [1, 3, 4],
-}
 
 
 class Numbering(NamedTuple):
@@ -92,11 +85,3 @@ def _around(side: str) -> list[str]:
     if len(side) == 2:
         return [side]
     return [start + end for start, end in zip(side, side[1:] + side[0], strict=True)]
-
-
-def are_mirrored(kind: basix.CellType, x: npt.NDArray[np.floating]) -> npt.NDArray[np.bool_]:
-    """Which cells ``(n,)`` of this ``kind`` have a negative determinant
-    at the places ``x`` ``(n, k, d)`` of their nodes."""
-    corners = np.array(_CORNERS[kind])
-    beside = x[:, corners[_BESIDE[kind]]]
-    return np.linalg.det(beside - x[:, corners[:1]]) < 0
