@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from archord.geometry.meshes.formats.source import scale_lacks
 from archord.scene.columns import require_different
 from archord.scene.parts import (
     IN_PLANE,
@@ -162,6 +163,8 @@ class ProblemScene(Checked):
         for load in self.load:
             near = load.largest_turn <= _RIGHT_ANGLE or self._turns_finitely(load.on)
             require(near, ("load", load.name, "displacement"), _TURNS_LINEARLY)
+        lacking = scale_lacks(self.mesh.file or "", self.mesh.scale, self.units.length)
+        require(not lacking, "mesh.scale", lacking)
         self._require_dimension()
         self._directions()
         require_different(self)

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.meshes.formats.source import Mesh
+from archord.geometry.meshes.formats.source import Mesh, scale_lacks
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.faults import fault_of
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
@@ -225,6 +225,9 @@ class Problem:
         names = self.units if isinstance(self.units, (tuple, list)) else ()
         are_names = len(names) == 2 and all(isinstance(name, str) for name in names)
         require_of(self, are_names, "units", "must be two names, of a length and of a stress")
+        if isinstance(self.mesh, Mesh):
+            lacking = scale_lacks(self.mesh.file, self.mesh.scale, self.units[0])
+            require_of(self.mesh, not lacking, "scale", lacking)
 
     def _require_fitting_mesh(self) -> None:
         """Raise `InputError` for a mesh of other kinematics, and for contact that these lack."""

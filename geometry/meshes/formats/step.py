@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 SUFFIXES = (".step", ".stp", ".brep")
-_ENTITY = re.compile(r"#(\d+)\s*=\s*(\w+)\s*\((.*?)\)\s*;", re.DOTALL)
+# a complex entity, as a rational spline, has several kinds within its brackets and none before them
+_ENTITY = re.compile(r"#(\d+)\s*=\s*(\w*)\s*\((.*?)\)\s*;", re.DOTALL)
 _REFERENCE = re.compile(r"#(\d+)")
 _NAME = re.compile(r"\s*'((?:[^']|'')*)'")
 _SURFACES = {"PLANE": "Plane", "CYLINDRICAL_SURFACE": "Cylinder", "CONICAL_SURFACE": "Cone"}

@@ -67,6 +67,41 @@ def test_solids_and_faces_have_their_volumes_areas_and_names(plate):
     np.testing.assert_allclose(r, RADIUS, rtol=1e-9)
 
 
+def test_faces_of_rational_splines_have_names(module, tmp_path):  # noqa: F811
+    """A file tells a rational spline by several words in brackets, with no word before them."""
+    occ = gmsh.model.occ
+    pin = occ.addCylinder(0, 0, 0, 0, 0, 1, RADIUS)
+    occ.dilate([(3, pin)], 0, 0, 0, 1, 1, 2)  # which makes splines
+    occ.synchronize()
+    path = tmp_path / "spline.step"
+    gmsh.write(str(path))
+    assert "BOUNDED_SURFACE()" in path.read_text()
+    named(path, f1="round", f2="top")
+    found = content(Mesh(path, size=1.0).on(MPI.COMM_SELF))[2]
+    assert found["facets", "round"][1] == pytest.approx(2 * HOLE, rel=1e-3)
+    assert found["facets", "top"][1] == pytest.approx(np.pi * RADIUS**2, rel=1e-3)
+
+
+@pytest.mark.parametrize(("length", "scale"), [("m", 0.001), ("in", 1 / 25.4)])
+def test_a_step_file_is_scaled_to_the_unit_of_the_scene(length, scale):
+    """It is read in mm, so that another unit without a scale is wrong for certain."""
+    body = {"name": "bar", "E": 210e9, "nu": 0.3}
+    keys = {
+        "units": {"length": length, "stress": "Pa"},
+        "body": [body],
+        "load": [{"name": "pull", "on": "face 1", "direction": "x", "force": 1.0}],
+    }
+    said = f'mesh.scale must not be 1, .* the unit of length is "{length}"; give {scale:.10g}'
+    with pytest.raises(archord.InputError, match=said):
+        archord.ProblemScene(mesh={"file": "bar.step"}, **keys)
+    stated = [Body("bar", Elastic(210e9, NU))]
+    with pytest.raises(archord.InputError, match=f'"{length}"; give'):
+        Problem("bar.STP", stated, units=(length, "Pa"))
+    for file, factor in (("bar.step", scale), ("bar.brep", 1.0), ("bar.msh", 1.0)):
+        archord.ProblemScene(mesh={"file": file, "scale": factor}, **keys)
+        Problem(Mesh(file, scale=factor), stated, units=(length, "Pa"))
+
+
 def test_brep_files_and_capital_suffixes(plate):
     brep = Mesh(plate.with_suffix(".brep"), size=1.0).on(MPI.COMM_SELF)
     assert list(brep.cell_sets) == ["solid 1", "solid 2"]
