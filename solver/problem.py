@@ -14,8 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.meshes.formats.source import Mesh, scale_lacks
+from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.units_of_files import scale_lacks
 from archord.materials.faults import fault_of
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
 from archord.materials.named import named_material

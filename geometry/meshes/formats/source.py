@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 _KINDS = "a mesh or CAD file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
 _LONGEST = 40  # characters of a value in a message
 CHANGES = ("scale", "order", "refine", "size", "sizes", "sets")  # but for the circles
-# of other units of length than the one in which STEP files are read
-_MILLIMETRES = {"um": 1e-3, "cm": 10.0, "m": 1e3, "in": 25.4, "inch": 25.4, "ft": 304.8}
 # centre and radius, and the axis of a cylinder
 Disc = tuple[tuple[float, ...], float] | tuple[tuple[float, ...], float, tuple[float, ...]]
 
@@ -152,19 +150,6 @@ class Mesh:
         from archord.geometry.meshes.formats.read import tagged
 
         return tagged(*self.source) if isinstance(self.source, tuple) else self.source
-
-
-def scale_lacks(file: str, scale: float, length: str) -> str:
-    """What is said of the ``scale`` of a STEP ``file`` where the unit of ``length`` needs another
-    one; nothing where it may be right."""
-    is_step = file.lower().endswith((".step", ".stp"))
-    if not is_step or scale != 1 or length not in _MILLIMETRES:
-        return ""
-    wanted = 1 / _MILLIMETRES[length]
-    return (
-        "must not be 1, as STEP files are read in mm, whatever their unit, and the unit of length "
-        f'is "{length}"; give {wanted:.10g}'
-    )
 
 
 def circles_in(sections: Sequence[Any]) -> dict[str, Disc]:
