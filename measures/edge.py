@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
     from archord.solver.path.system import System
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
+_ALIKE = 1e-7  # relative difference of values that images in a mirror have, too
 _ON_CONE = 1e-6  # of the largest shear: what comes as close slides
 OF_FRICTION = ("shear", "sticks")  # of one with friction also
 
@@ -109,8 +110,16 @@ class _Displaced(ContactProfile):
     def largest(self) -> tuple[float, Array]:
         """Largest projected pressure, and the undeformed place ``(d,)`` where it is."""
         where_pressed = np.where(self.raw_pressure > 0, self.pressure, 0.0)
-        at = np.unravel_index(np.argmax(where_pressed), self.pressure.shape)
+        at = np.unravel_index(_first_largest(where_pressed), self.pressure.shape)
         return max(float(self.pressure[at]), 0.0), self.X[at]
+
+
+def _first_largest(values: Array) -> int:
+    """Where the largest of ``values``, counted through, is; the first place of several that differ
+    by round-off, as images in a mirror do."""
+    flat = values.ravel()
+    largest = flat.max()
+    return int(np.argmax(flat >= largest - _ALIKE * abs(largest)))
 
 
 def _size(values: Array) -> Array:
@@ -144,7 +153,7 @@ class PatchProfile(_Displaced):
         Pressures at points, projected ones too, scatter more and more on finer meshes where a
         contact of plastic bodies ends within a facet.
         """
-        piece = int(np.argmax(self.facet_pressure))
+        piece = _first_largest(self.facet_pressure)
         of_facet = self.facet == self.facet[piece]
         points = self.X[of_facet].reshape(-1, 3)
         weights = self.weight[of_facet].ravel()

@@ -17,6 +17,8 @@ from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.problem import Body, Problem
 
 _AT_REST = 10.0  # times the round-off: forces that are none
+_ALIKE = 1e-7  # relative difference of values that images in a mirror have, too
+_DIGITS = 9  # of places that are not one
 
 
 class Totals:
@@ -137,17 +139,27 @@ class Totals:
 
     def largest_peeq(self, *bodies: Body, within: Within | None = None) -> tuple[float, ...]:
         """Largest PEEQ at a quadrature point of the ``bodies``, of those at ``x`` ``(n, d)`` for
-        which ``within(x)`` is true; and the coordinates of its place. Zeros without any."""
-        nowhere = (0.0,) * self.problem.kinematics.dimension
-        found = [(0.0, *nowhere)]
+        which ``within(x)`` is true; and the coordinates of its place, of several that differ by
+        round-off the last one along x, then y, then z. Zeros without any."""
+        d = self.problem.kinematics.dimension
+        values: list[Array] = [np.zeros(0)]
+        places: list[Array] = [np.zeros((0, d))]
         for body in bodies:
             peeq, x = self.bulk.peeq_of(self.problem.tag(body))
             if within is not None:
                 peeq = np.where(within(x), peeq, 0.0)
-            if peeq.any():
-                at = int(np.argmax(peeq))
-                found.append((float(peeq[at]), *x[at].tolist()))
-        return max(self.comm.allgather(max(found)))
+            values.append(peeq)
+            places.append(x)
+        peeq = np.concatenate(values)
+        x = np.concatenate(places)
+        largest = self.comm.allreduce(peeq.max(initial=0.0), op=MPI.MAX)
+        size = self.comm.allreduce(np.abs(x).max(initial=0.0), op=MPI.MAX)
+        alike = x[peeq >= max((1 - _ALIKE) * largest, np.finfo(float).tiny)]
+        rounded = np.round(alike / max(size, np.finfo(float).tiny), _DIGITS)
+        here = sorted(zip(rounded.tolist(), alike.tolist(), strict=True))[-1:]
+        of_all = [found for of_rank in self.comm.allgather(here) for found in of_rank]
+        _, place = max(of_all, default=([], [0.0] * d))
+        return float(largest), *place
 
     def distortion(self) -> Distortion:
         """How far cells are strained, turned and turned over, in the last evaluation."""

@@ -44,6 +44,7 @@ JOINT = {
     "output": {"fields": False},
 }
 RIGID = LUG | {"pin": {"rigid": True}, "space": {"thickness": 12.0, "rim_ratio": 1.0}}
+YIELDING = LUG | {"plate": STEEL | {"yield_stress": 400.0}}
 SLEEVE = STEEL | {"thickness": 2.0, "bonded": True}
 PLATE = STEEL | {"width": 32.0, "length": 22.0}
 CLEVIS = {
@@ -70,14 +71,25 @@ def last_of(data, folder):
 
 TOLD = {
     "joint": (JOINT, ("P", "p0", "rim pressure", "eps", "block y", "contact contact area")),
-    "lug": (LUG, ("pull force", "pin in lug mid pressure", "pin in lug rim pressure", "clamp y")),
+    "lug": (
+        LUG,
+        (
+            "pull force",
+            "pin in lug at z",
+            "pin in lug mid pressure",
+            "pin in lug rim pressure",
+            "clamp y",
+        ),
+    ),
     "rigid pin": (RIGID, ("pull force", "pin in lug mid pressure", "pin in lug rim pressure")),
+    "yielding lug": (YIELDING, ("pull force", "lug peeq_max", "lug at x", "lug at y", "lug at z")),
     "clevis": (
         CLEVIS,
         (
             "pull force",
             *("pin in inner rim pressure", "pin in outer rim pressure", "pin in outer eps"),
             *("pin bending moment", "pin deflection", "pin deflection by hand"),
+            *("pin in inner at z", "pin in outer at z"),
         ),
     ),
 }
