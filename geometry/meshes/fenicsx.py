@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -23,7 +24,7 @@ from archord.geometry.meshes.cells import corners_of, n_corners, sides_between, 
 from archord.geometry.meshes.mesh_arrays import MeshArrays, gmsh_dimension
 from archord.geometry.meshes.mesh_cache import kept_mesh
 from archord.geometry.meshes.refine import Circle, on_circles
-from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import SAME_PLACE, TaggedMesh
 from archord.kernels.compat import cell_nodes
 
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
@@ -40,6 +41,7 @@ _OPTIONS = {
     "HighOrderOptimize": 0,
 }
 _ARRAYS = ("x", "cells", "bodies", "facets", "tags")
+_NO_NODES = np.zeros(0, dtype=np.int64)
 _UNTAGGED = np.iinfo(np.int32).min  # the tag of a cell that has none
 
 
@@ -206,8 +208,25 @@ def distribute(
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = meshtags_from_entities(mesh, dim - 1, adjacencylist(corners), tags)
     places = {name: made.x[nodes] for name, nodes in made.point_sets.items() if comm.rank == 0}
-    points = comm.bcast(places)
-    return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points, made.notes)
+    points, point_tags = comm.bcast((places, _tags_at_points(made)))
+    sets = made.cell_sets, made.facet_sets, points
+    return TaggedMesh(mesh, cells, facets, *sets, made.notes, point_tags)
+
+
+def _tags_at_points(mesh: MeshArrays) -> dict[str, list[frozenset[int]]]:
+    """The tags of the cells at each node of the point sets."""
+    in_sets = np.concatenate([_NO_NODES, *mesh.point_sets.values()])
+    tags = _tags_at(mesh, in_sets)
+    return {name: [tags[int(n)] for n in nodes] for name, nodes in mesh.point_sets.items()}
+
+
+def _tags_at(mesh: MeshArrays, nodes: np.ndarray) -> dict[int, frozenset[int]]:
+    """The tags of the cells at each of the ``nodes``."""
+    cell, place = np.nonzero(np.isin(mesh.cells, nodes))
+    found = defaultdict[int, set[int]](set)
+    for node, tag in zip(mesh.cells[cell, place], mesh.bodies[cell], strict=True):
+        found[int(node)].add(int(tag))
+    return {int(node): frozenset(found[int(node)]) for node in nodes}
 
 
 def gathered(tagged: TaggedMesh) -> MeshArrays | None:
@@ -246,8 +265,7 @@ def gathered(tagged: TaggedMesh) -> MeshArrays | None:
     found = sides_between(kind, cells, np.searchsorted(nodes, corners))
     facets = sides_of(kind, cells)[found]
     order = np.argsort(number)
-    points = {name: cKDTree(x).query(places)[1] for name, places in tagged.point_sets.items()}
-    return MeshArrays(
+    made = MeshArrays(
         x,
         kind,
         cells[order],
@@ -256,9 +274,21 @@ def gathered(tagged: TaggedMesh) -> MeshArrays | None:
         tags,
         dict(tagged.cell_sets),
         dict(tagged.facet_sets),
-        points,
-        tagged.notes,
+        notes=tagged.notes,
     )
+    tree = cKDTree(x)
+    near = SAME_PLACE * np.abs(x).max(initial=0.0)
+    points = {}
+    for name, places in tagged.point_sets.items():
+        distance, nearest = tree.query(places)
+        points[name] = nearest
+        tags = tagged.point_tags.get(name, ())
+        if len(tags) == len(places):
+            beside = tree.query_ball_point(places, distance + near)
+            for k in np.flatnonzero([len(nodes) > 1 for nodes in beside]):
+                at = _tags_at(made, np.array(beside[k]))
+                points[name][k] = next((n for n in beside[k] if at[n] == tags[k]), nearest[k])
+    return replace(made, point_sets=points)
 
 
 def usual_cut(dimension: int, n_parts: int) -> Cut:

@@ -4,7 +4,7 @@ supports are found by."""
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 
-_SAME_PLACE = 1e-8  # of the mesh's size
+SAME_PLACE = 1e-8  # of the mesh's size
 
 Sets = Mapping[str, tuple[int, ...]]
 
@@ -27,6 +27,8 @@ class TaggedMesh:
     - ``cell_sets``, ``facet_sets``: the tags of each set, several where sets overlap
     - ``point_sets``: coordinates ``(k, 2)`` of the nodes of each set
     - ``notes``: what to warn of, by how the mesh was made
+    - ``point_tags``: the tags of the cells at each node of the point sets, perhaps not of all: they
+      tell nodes of several bodies at one place apart
     """
 
     mesh: Mesh
@@ -36,6 +38,7 @@ class TaggedMesh:
     facet_sets: Sets
     point_sets: Mapping[str, Array] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    point_tags: Mapping[str, Sequence[frozenset[int]]] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:
@@ -81,18 +84,37 @@ class TaggedMesh:
             raise ValueError(f"the point set {name!r} is empty: no cell has a node of it")
         comm = self.mesh.comm
         size = np.abs(self.mesh.geometry.x).max(initial=0.0)
-        near = _SAME_PLACE * comm.allreduce(size, op=MPI.MAX)
-        alike = cKDTree(points).query_ball_point(points, near, return_length=True)
+        near = SAME_PLACE * comm.allreduce(size, op=MPI.MAX)
+        alike = cKDTree(points).query_ball_point(points, near)
         x = V.tabulate_dof_coordinates()[:, : points.shape[1]]
         here = cKDTree(x).query_ball_point(points, near)
         n_owned = V.dofmap.index_map.size_local
-        owned = [sum(dof < n_owned for dof in dofs) for dofs in here]
-        found = comm.allreduce(np.array(owned))
-        for x, y, *_ in points[found != alike]:
+
+        def is_told() -> np.ndarray:
+            """Whether as many nodes are at each point as the set has there. Collective."""
+            owned = [sum(dof < n_owned for dof in dofs) for dofs in here]
+            return comm.allreduce(np.array(owned)) == list(map(len, alike))
+
+        told = is_told()
+        tags = self.point_tags.get(name, ())
+        if len(tags) == len(points):
+            for k in np.flatnonzero(~told):
+                here[k] = self._of_tags(V, here[k], tags[k])
+                alike[k] = [other for other in alike[k] if tags[other] == tags[k]]
+            told = is_told()
+        for x, y, *_ in points[~told]:
             raise ValueError(
                 f"the point set {name!r} does not tell which node at ({x:g}, {y:g}) it means"
             )
         return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
+
+    def _of_tags(
+        self, V: fem.FunctionSpace, dofs: Sequence[int], tags: frozenset[int]
+    ) -> list[int]:
+        """The ``dofs`` at cells of this rank that have one of the ``tags``."""
+        cells = self.cells.indices[np.isin(self.cells.values, list(tags))]
+        of_cells = np.intersect1d(V.dofmap.list[cells], dofs)
+        return [int(dof) for dof in of_cells]
 
     def cells_behind(self, name: str) -> np.ndarray:
         """Cells ``(n,)`` of this rank at the facets of the set ``name``, ghosts included."""

@@ -7,7 +7,8 @@ import pytest
 from dolfinx import fem
 from dolfinx.mesh import compute_midpoints
 
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord import rectangles
+from archord.geometry.meshes.fenicsx import distribute, gathered, gmsh_to_mesh
 
 
 def squares(gmsh):
@@ -78,6 +79,27 @@ def test_dofs_are_those_of_facets_points_or_cells(mesh, comm):
         mesh.dofs_in(V, "nowhere")
     with pytest.raises(ValueError, match="'void' is empty: no cell has a node of it"):
         mesh.dofs_in(V, "void")
+
+
+@pytest.mark.mpi
+def test_points_of_bodies_in_touch_are_told_apart(comm):
+    """By the bodies that they belong to, after a mesh is gathered, too."""
+    boxes = {"left": (0.0, 0.0, 1.0, 1.0), "right": (1.0, 0.0, 1.0, 1.0)}
+    drawn = rectangles(boxes, size=0.5, comm=comm)
+    whole = gathered(drawn)
+    if whole is not None:
+        for body in boxes:
+            own = np.unique(whole.cells[np.isin(whole.bodies, whole.cell_sets[body])])
+            is_touching = np.abs(whole.x[own, 0] - 1) < 1e-9
+            whole.point_sets[f"end of {body}"] = own[is_touching]
+    mesh = distribute(comm, whole)
+    again = distribute(comm, gathered(mesh))
+    for made in (mesh, again):
+        V = fem.functionspace(made.mesh, ("Lagrange", 2, (2,)))
+        for body in boxes:
+            found = made.dofs_in(V, f"end of {body}")
+            assert comm.allreduce((found < V.dofmap.index_map.size_local).sum()) == 5
+            assert np.isin(found, made.dofs_in(V, body)).all()
 
 
 def test_a_name_that_is_none_gets_the_list(mesh):
