@@ -35,6 +35,7 @@ _FIRST_OF_SHAPE = 2.0  # first element size of a shape over the size in its scen
 _MOST_DOFS = 1_500_000
 _LEAST_RATIO = 1.02  # of two meshes that are told apart
 _FEWEST_IN_SPACE = 3  # meshes of shapes in space: two of them may agree by chance
+_REFINED = 8.0  # times as many dofs: of three meshes that hardly refine, all may agree by chance
 _COARSER = 3.0  # element size of a mesh for guesses over the size of the mesh itself
 _COARSEST_GUESS = 0.3  # element size over R
 
@@ -78,6 +79,10 @@ class MeshFamily:
     def ratio_of(self, coarser: int, finer: int) -> float:
         """The ratio of the element sizes of two meshes of so many dofs."""
         return self.ratio
+
+    def are_enough(self, dofs: Sequence[int]) -> bool:
+        """Whether meshes of so many ``dofs`` tell their error."""
+        return len(dofs) >= self.fewest
 
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size over R and growth of ``scene``."""
@@ -134,6 +139,12 @@ class ProblemFamily:
             return self.ratio
         found = (finer / coarser) ** (1 / 3)
         return min(self.ratio, max(_LEAST_RATIO, found))
+
+    def are_enough(self, dofs: Sequence[int]) -> bool:
+        """Whether meshes of so many ``dofs`` tell their error: in space one more is needed where
+        they hardly refine."""
+        hardly = self.is_drawn_in_space and dofs[-1] < _REFINED * dofs[0]
+        return len(dofs) >= self.fewest + hardly
 
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size over R and growth of ``scene``; of a file, the size over the size of its own

@@ -150,7 +150,7 @@ class _Search:
             self._tell(replace(level, mesh_error=self.mesh_error))
             left = max(self.asked - (self.step_error or 0.0), self.asked / 2)
             is_small = self.mesh_error is not None and self.mesh_error <= left
-            if is_small and len(curves) >= self.family.fewest:
+            if is_small and self.family.are_enough(dofs):
                 return
 
     def _choose_steps(self, mesh: int, curve: Curve, level: Level) -> tuple[Curve, Level]:

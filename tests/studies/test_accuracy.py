@@ -67,7 +67,8 @@ def test_sizes_of_general_meshes_have_their_heading(capsys, shape, heading, size
 
 
 def test_thin_solids_have_hardly_more_cells_of_a_smaller_size():
-    """Errors are estimated by the cells that there are, from three meshes at least."""
+    """Errors are estimated by the cells that there are, from three meshes at least, and from four
+    where these hardly refine."""
     mesh = {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}}
     press = {"name": "press", "on": "flat", "direction": "x", "displacement": 0.1}
     data = {"mesh": mesh, "body": [{"name": "lug", "E": 1.0, "nu": 0.3}], "load": [press]}
@@ -78,6 +79,10 @@ def test_thin_solids_have_hardly_more_cells_of_a_smaller_size():
     assert plane.ratio_of(4000, 5000) == solid.ratio_of(1000, 5000) == mesh_family.RATIO
     assert solid.ratio_of(4000, 5000) == pytest.approx(1.25 ** (1 / 3))
     assert solid.ratio_of(4000, 4000) > 1
+    assert solid.are_enough([4000, 13000, 42000])
+    assert not solid.are_enough([4000, 7000, 14000])
+    assert solid.are_enough([4000, 7000, 14000, 24000])
+    assert plane.are_enough([4000, 5000])
 
 
 def test_a_general_scene_that_is_let_go_notices_its_contact():
