@@ -250,6 +250,8 @@ def given(part: Any) -> str:
     hidden = {"name", "own"}
     if own is not None:  # it takes the place of these keys
         hidden |= {"law", "friction", "hardening"}
+    if getattr(part, "friction", 0.0) and getattr(part, "law", "") == "frictionless":
+        hidden.add("law")  # the name of the law without its friction
     keys = part.model_dump(exclude_none=True, exclude=hidden)
     said = [f"{key} = {value}" for key, value in keys.items() if _says_something(value)]
     if own is not None:

@@ -12,9 +12,11 @@ import archord
 from archord.measures.parts import part_measures
 from archord.output.run import solve_scene
 from archord.presets.account import account_of
+from archord.presets.views import given
 from archord.presets.words import words_of
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_scene
+from archord.scene.parts import InteractionSection
 from tests.solver.parts import blocks
 
 BODIES = [archord.Body(name, archord.Elastic(1000.0, 0.3)) for name in ("lower", "upper")]
@@ -163,3 +165,10 @@ def test_partners_of_the_beginning_are_told_of_where_surfaces_slide_far(tmp_path
     stated = problem([contact], loads=[press, slide])
     said = [text for text in told_of(stated, tmp_path / "run") if "partners" in text]
     assert len(said) == 2 * (kinematics == "reference")
+
+
+def test_a_contact_with_friction_is_not_called_frictionless():
+    parts = {"name": "contact", "surfaces": ["a", "b"]}
+    assert "law" not in given(InteractionSection(**parts, friction=0.1))
+    assert "law = frictionless" in given(InteractionSection(**parts))
+    assert "law = coulomb" in given(InteractionSection(**parts, law="coulomb", friction=0.1))
