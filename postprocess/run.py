@@ -7,6 +7,7 @@ Arrays and tables are read when they are asked for, and pandas is imported only 
 from __future__ import annotations
 
 import csv
+import logging
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -40,6 +41,10 @@ from archord.scene.file import load_scene
 if TYPE_CHECKING:
     import pandas as pd
 
+_UNKNOWN_MIRRORS = (
+    "archord: %s: not all mirrors of the modelled part are known (docs/results.md): if one of them "
+    "is across the axis, the line load is on the modelled side alone, with the force of both sides."
+)
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
 _NEEDED = (*_WHOLE, "seconds")
 
@@ -210,7 +215,8 @@ class Run:
         """The load of an ``interaction`` in space at ``step`` (the last) on its second surface,
         along the axis through a ``point`` along a ``direction``; of pieces between the places
         ``along`` the axis, by default 40 equal ones. It is of the whole, on both sides of a mirror
-        across the axis. Raises `InputError`."""
+        across the axis; the logger "archord" warns where mirrors are not known. Raises
+        `InputError`."""
         self._require_space("line loads")
         shares = self.summary["model"]["contact_shares"]
         if interaction not in shares:
@@ -225,7 +231,9 @@ class Run:
             1.0 if side == part.surfaces[-1] else -1.0 for side in part.surfaces if side in met
         ]
         whole = self.scene.analysis.symmetry * np.multiply(signs, shares[interaction])
-        mirrors = self.summary["model"].get("mirrors", ())  # runs of version 0.2 lack them
+        mirrors = self.summary["model"].get("mirrors") or ()  # runs of version 0.2 lack them
+        if 2 ** len(mirrors) < self.scene.analysis.symmetry:
+            logging.getLogger("archord").warning(_UNKNOWN_MIRRORS, self.folder)
         return line_load(profiles, whole, Axis(point, direction), along, mirrors)
 
     def _require_space(self, what: str) -> None:

@@ -73,6 +73,18 @@ def test_a_line_load_is_of_both_sides_of_a_mirror(runs):
     assert force[1] == pytest.approx(runs[1].columns["joint force y"][-1], rel=1e-12)
 
 
+def test_a_line_load_tells_of_mirrors_that_are_not_known(runs, monkeypatch, caplog):
+    _, quarter = runs
+    for run in runs:
+        run.line_load("joint")
+    assert not caplog.records
+    monkeypatch.setitem(quarter.summary["model"], "mirrors", [])
+    load = quarter.line_load("joint", along=[0, 2]).load
+    assert 2 * load[0, 1] == pytest.approx(quarter.columns["joint force y"][-1], rel=1e-9)
+    [told] = caplog.records
+    assert "not all mirrors of the modelled part are known" in told.getMessage()
+
+
 def test_rollers_that_might_be_mirrors_are_none(comm):
     """Where three sides are held across themselves, nothing tells which two are mirrors."""
     supports = [*MIRRORS, Support("lower bottom", fixed="y")]
