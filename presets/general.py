@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from hashlib import sha256
 from itertools import product
@@ -85,6 +85,8 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
     by_factor = [column("step"), column("load_factor", of="at")]
     # found by all ranks, as one alone tells the facts
     mirrors = system.mirrors if scene.in_space else []
+    if scene.in_space and 2 ** len(mirrors) < system.problem.symmetry:
+        warnings = [*warnings, *_without_images(scene)]
     return Account(
         scene,
         system,
@@ -103,6 +105,17 @@ def _account(scene: ProblemScene, system: System, warnings: list[str], file: str
         fit=_steps_without_work(scene, system),
         copies=system.problem.symmetry,
     )
+
+
+def _without_images(scene: ProblemScene) -> Iterator[str]:
+    """What to warn of where not all mirrors of a part are known."""
+    spread = [part.name for part in scene.coupling if part.kind == "distributing"]
+    if spread:
+        names = ", ".join(map(repr, spread))
+        yield (
+            "not all mirrors of the modelled part are known: mean motions of facets that meet one "
+            f"of the others ({names}) are of the modelled facets, without their images"
+        )
 
 
 def _steps_without_work(scene: ProblemScene, system: System) -> int:

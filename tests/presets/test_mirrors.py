@@ -85,6 +85,14 @@ def test_a_line_load_tells_of_mirrors_that_are_not_known(runs, monkeypatch, capl
     assert "not all mirrors of the modelled part are known" in told.getMessage()
 
 
+def test_motions_without_images_are_told(runs, tmp_path):
+    supports = [*MIRRORS, Support("lower bottom", fixed="y")]
+    run = archord.solve(pressed(True, supports=supports), tmp_path / "rollers")
+    assert any("not all mirrors" in warning and "('end')" in warning for warning in run.warnings)
+    for known in runs:
+        assert not any("mirrors" in warning for warning in known.warnings)
+
+
 def test_rollers_that_might_be_mirrors_are_none(comm):
     """Where three sides are held across themselves, nothing tells which two are mirrors."""
     supports = [*MIRRORS, Support("lower bottom", fixed="y")]
