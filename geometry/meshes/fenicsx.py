@@ -42,6 +42,8 @@ _OPTIONS = {
 }
 _ARRAYS = ("x", "cells", "bodies", "facets", "tags")
 _NO_NODES = np.zeros(0, dtype=np.int64)
+_NO_TAGS: frozenset[int] = frozenset()
+_SLANTED = np.array([1.0, np.sqrt(2.0), np.pi])
 _UNTAGGED = np.iinfo(np.int32).min  # the tag of a cell that has none
 
 
@@ -214,10 +216,27 @@ def distribute(
 
 
 def _tags_at_points(mesh: MeshArrays) -> dict[str, list[frozenset[int]]]:
-    """The tags of the cells at each node of the point sets."""
+    """The tags of the cells at each node of the point sets that may lie where another node is; none
+    at others, as they are found by their places."""
     in_sets = np.concatenate([_NO_NODES, *mesh.point_sets.values()])
-    tags = _tags_at(mesh, in_sets)
-    return {name: [tags[int(n)] for n in nodes] for name, nodes in mesh.point_sets.items()}
+    if not len(in_sets):
+        return {}
+    beside = np.intersect1d(in_sets, _beside_others(mesh.x))
+    tags = _tags_at(mesh, beside)
+    return {
+        name: [tags.get(int(node), _NO_TAGS) for node in nodes]
+        for name, nodes in mesh.point_sets.items()
+    }
+
+
+def _beside_others(x: Array) -> np.ndarray:
+    """The nodes ``(k,)`` of all ``x`` ``(n, d)`` that may lie where another one is, and few more:
+    those with the same place along a slanted line."""
+    along = x @ _SLANTED[: x.shape[1]]
+    order = np.argsort(along)
+    near = SAME_PLACE * np.linalg.norm(_SLANTED) * np.abs(x).max(initial=0.0)
+    first = np.flatnonzero(np.diff(along[order]) <= near)
+    return order[np.union1d(first, first + 1)]
 
 
 def _tags_at(mesh: MeshArrays, nodes: np.ndarray) -> dict[int, frozenset[int]]:

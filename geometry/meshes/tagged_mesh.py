@@ -27,7 +27,7 @@ class TaggedMesh:
     - ``cell_sets``, ``facet_sets``: the tags of each set, several where sets overlap
     - ``point_sets``: coordinates ``(k, 2)`` of the nodes of each set
     - ``notes``: what to warn of, by how the mesh was made
-    - ``point_tags``: the tags of the cells at each node of the point sets, perhaps not of all: they
+    - ``point_tags``: the tags of the cells at nodes of the point sets, empty where not needed: they
       tell nodes of several bodies at one place apart
     """
 
