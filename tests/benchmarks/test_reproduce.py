@@ -12,7 +12,7 @@ from archord.benchmarks.paper.figures import FIGURES, LAYOUTS
 from archord.benchmarks.paper.reproduce import chosen, reproduce
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs, case, cases
 
-STEPS = 5
+STEPS = 4
 
 
 @pytest.fixture(scope="module")
