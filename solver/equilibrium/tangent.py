@@ -165,7 +165,8 @@ class TangentMatrix:
         tangent = self.contact.tangent
         inside = self._slots.in_matrix[of_contact.at]
         at = of_contact.at[inside]
-        values = of_contact.values[inside] * self._slots.is_free[at]
+        values = of_contact.values[inside]
+        values *= self._slots.is_free[at]
         add_blocks(A, tangent.rows[at], tangent.columns[at], values)
         A.assemble()
 
