@@ -111,7 +111,7 @@ class _Displaced(ContactProfile):
         """Largest projected pressure, and the undeformed place ``(d,)`` where it is."""
         where_pressed = np.where(self.raw_pressure > 0, self.pressure, 0.0)
         at = np.unravel_index(_first_largest(where_pressed), self.pressure.shape)
-        return max(float(self.pressure[at]), 0.0), self.X[at]
+        return float(where_pressed.max()), self.X[at]
 
 
 def _first_largest(values: Array) -> int:
@@ -158,7 +158,7 @@ class PatchProfile(_Displaced):
         points = self.X[of_facet].reshape(-1, 3)
         weights = self.weight[of_facet].ravel()
         middle = np.average(points, axis=0, weights=weights)
-        return max(float(self.facet_pressure[piece]), 0.0), middle
+        return max(float(self.facet_pressure.max()), 0.0), middle
 
 
 @dataclass(frozen=True, kw_only=True)
