@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from archord.geometry.units_of_files import scale_lacks
+from archord.report.units import scale_lacks
 from archord.scene.columns import require_different
 from archord.scene.parts import (
     IN_PLANE,

@@ -16,7 +16,6 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.units_of_files import scale_lacks
 from archord.materials.faults import fault_of
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
 from archord.materials.named import named_material
@@ -27,6 +26,7 @@ from archord.report.errors import (
     require_between,
     require_of,
 )
+from archord.report.units import scale_lacks
 from archord.solver.conditions import DeadLoad, Dirichlet, Drive, Guess, Mean, Turn
 from archord.solver.contact.interaction import Interaction, Rigid
 from archord.solver.parts import Body, Coupling, Load, Support

@@ -304,8 +304,9 @@ def gathered(tagged: TaggedMesh) -> MeshArrays | None:
         tags = tagged.point_tags.get(name, ())
         if len(tags) == len(places):
             beside = tree.query_ball_point(places, distance + near)
-            for k in np.flatnonzero([len(nodes) > 1 for nodes in beside]):
-                at = _tags_at(made, np.array(beside[k]))
+            several = np.flatnonzero([len(nodes) > 1 for nodes in beside])
+            at = _tags_at(made, np.concatenate([_NO_NODES, *beside[several]]))
+            for k in several:
                 points[name][k] = next((n for n in beside[k] if at[n] == tags[k]), nearest[k])
     return replace(made, point_sets=points)
 

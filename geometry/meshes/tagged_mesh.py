@@ -98,8 +98,10 @@ class TaggedMesh:
         told = is_told()
         tags = self.point_tags.get(name, ())
         if len(tags) == len(points):
-            for k in np.flatnonzero(~told):
-                here[k] = self._of_tags(V, here[k], tags[k])
+            doubtful = np.flatnonzero(~told)
+            at_tags = {these: self._dofs_at(V, these) for these in {tags[k] for k in doubtful}}
+            for k in doubtful:
+                here[k] = [dof for dof in here[k] if dof in at_tags[tags[k]]]
                 alike[k] = [other for other in alike[k] if tags[other] == tags[k]]
             told = is_told()
         for x, y, *_ in points[~told]:
@@ -108,13 +110,10 @@ class TaggedMesh:
             )
         return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
 
-    def _of_tags(
-        self, V: fem.FunctionSpace, dofs: Sequence[int], tags: frozenset[int]
-    ) -> list[int]:
-        """The ``dofs`` at cells of this rank that have one of the ``tags``."""
+    def _dofs_at(self, V: fem.FunctionSpace, tags: frozenset[int]) -> set[int]:
+        """The block dofs of this rank's cells that have one of the ``tags``."""
         cells = self.cells.indices[np.isin(self.cells.values, list(tags))]
-        of_cells = np.intersect1d(V.dofmap.list[cells], dofs)
-        return [int(dof) for dof in of_cells]
+        return set(V.dofmap.list[cells].ravel().tolist())
 
     def cells_behind(self, name: str) -> np.ndarray:
         """Cells ``(n,)`` of this rank at the facets of the set ``name``, ghosts included."""

@@ -156,7 +156,8 @@ class Totals:
         size = self.comm.allreduce(np.abs(x).max(initial=0.0), op=MPI.MAX)
         alike = x[peeq >= max((1 - _ALIKE) * largest, np.finfo(float).tiny)]
         rounded = np.round(alike / max(size, np.finfo(float).tiny), _DIGITS)
-        here = sorted(zip(rounded.tolist(), alike.tolist(), strict=True))[-1:]
+        last = np.lexsort(rounded.T[::-1])[-1:]
+        here = list(zip(rounded[last].tolist(), alike[last].tolist(), strict=True))
         of_all = [found for of_rank in self.comm.allgather(here) for found in of_rank]
         _, place = max(of_all, default=([], [0.0] * d))
         return float(largest), *place

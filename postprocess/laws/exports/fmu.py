@@ -28,6 +28,7 @@ from archord.postprocess.laws.exports.names import check_name
 from archord.postprocess.laws.exports.program import Program
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.report.units import METRES
 from archord.report.version import VERSION
 
 _SOURCE = Path(__file__).with_name("fmu.c")
@@ -40,7 +41,6 @@ _MODEL = """/* What fmu.c has to know of the law {name}. */
 #define CLEARANCE {clearance!r}
 """
 _GUID = '#define GUID "{guid}"\n'
-_LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "inch": 0.0254}  # in m
 _FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}  # in N
 _FLAGS = ["-std=c99", "-O2", "-fPIC", "-shared", "-s", "-Wl,--build-id=none"]
 _ABILITIES = {  # of both kinds of FMU
@@ -285,9 +285,9 @@ def _units(program: Program) -> dict[str, tuple[str, dict[str, str]]]:
     """Name and base of the unit of every quantity; none if the law's units are not known ones."""
     length = program.length_unit
     force = program.force_unit.removesuffix(f"/{length}")
-    if length not in _LENGTHS or force not in _FORCES:
+    if length not in METRES or force not in _FORCES:
         return {}
-    metre = _LENGTHS[length]
+    metre = METRES[length]
     newton = _FORCES[force]
     return {
         "length": (length, {"m": "1", "factor": repr(metre)}),

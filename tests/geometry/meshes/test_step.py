@@ -91,13 +91,19 @@ def test_a_step_file_is_scaled_to_the_unit_of_the_scene(length, scale):
         "body": [body],
         "load": [{"name": "pull", "on": "face 1", "direction": "x", "force": 1.0}],
     }
-    said = f'mesh.scale must not be 1, .* the unit of length is "{length}"; give {scale:.10g}'
-    with pytest.raises(archord.InputError, match=said):
-        archord.ProblemScene(mesh={"file": "bar.step"}, **keys)
+    said = f'mesh.scale.* is far from {scale:.10g}, .* the unit of length "{length}"'
+    for wrong in (1.0, 1000.0):
+        with pytest.raises(archord.InputError, match=said):
+            archord.ProblemScene(mesh={"file": "bar.step", "scale": wrong}, **keys)
     stated = [Body("bar", Elastic(210e9, NU))]
-    with pytest.raises(archord.InputError, match=f'"{length}"; give'):
+    with pytest.raises(archord.InputError, match=f'scale = 1.0 is far .*"{length}"'):
         Problem("bar.STP", stated, units=(length, "Pa"))
-    for file, factor in (("bar.step", scale), ("bar.brep", 1.0), ("bar.msh", 1.0)):
+    for file, factor in (
+        ("bar.step", scale),
+        ("bar.step", 2 * scale),
+        ("bar.brep", 1.0),
+        ("bar.msh", 1.0),
+    ):
         archord.ProblemScene(mesh={"file": file, "scale": factor}, **keys)
         Problem(Mesh(file, scale=factor), stated, units=(length, "Pa"))
 
