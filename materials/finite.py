@@ -16,13 +16,14 @@ forces are per undeformed thickness, and the thickness follows.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from archord.materials.elasticity import TRACE
+from archord.materials.elasticity import TRACE, Elastic
 from archord.materials.hardening import Scaled
 from archord.materials.j2 import J2Material
 from archord.materials.kinematics import SPACE, Kinematics
@@ -108,7 +109,13 @@ class LargeStrain(Material):
         return LargeStrain(self.inner.elastic())
 
     def under(self, kinematics: Kinematics) -> LargeStrain:
-        """The inner material in a problem of these ``kinematics``, at large strain."""
+        """The inner material in a problem of these ``kinematics``, at large strain. Raises
+        ValueError for a material of one's own in plane stress: it does not tell how thick it is."""
+        if kinematics.is_thin and not isinstance(self.inner, Elastic):
+            raise ValueError(
+                "true stresses at large strain need the thickness, which in plane stress is known "
+                "of Elastic and what is made from it alone"
+            )
         return replace(self, inner=self.inner.under(kinematics))
 
     def state(self, n: int) -> State:
@@ -140,7 +147,7 @@ class LargeStrain(Material):
         m = self.inner
         if not isinstance(m, J2Material):
             return m.update(strain, state)
-        normal = np.array([float(place < 3) for place in m.working])
+        normal = _normals(m.working)
         if m.kinematics.is_thin:
             # it follows the stress, which hardly depends on it: its derivative is left out
             elastic_stress, *_ = m.update(strain, state)
@@ -177,17 +184,30 @@ class LargeStrain(Material):
         and ``state``."""
         logarithm = _logarithm(strain)
         T, *_ = self._logarithmic(logarithm.strain, state)
-        return self.energy(T)
+        return self.inner.stored(logarithm.strain, T, state)
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
         """Cauchy's stress ``(n, n_stress)`` after an update to the gradients ``strain``, the
         nominal ``stress`` and ``state``."""
         logarithm = _logarithm(strain)
         T, _, _ = self._logarithmic(logarithm.strain, state)
-        compliance = (1 - 2 * self.inner.nu) / self.inner.E
-        trace = T[:, :3].sum(axis=1)
-        J = np.exp(compliance * trace)
+        if self._is_thin:
+            compliance = (1 - 2 * self.inner.nu) / self.inner.E
+            volume = compliance * T[:, :3].sum(axis=1)
+        else:
+            volume = logarithm.strain @ _normals(logarithm.working)
+        J = np.exp(volume)
         return logarithm.kirchhoff(stress, T) / J[:, None]
+
+    @property
+    def _is_thin(self) -> bool:
+        """Whether the thickness follows from the stress, by isotropic elasticity."""
+        return isinstance(self.inner, Elastic) and self.inner.kinematics.is_thin
+
+
+def _normals(working: Sequence[int]) -> Array:
+    """Takes strains ``(n, k)``, whose components have these places in a stress, to their trace."""
+    return np.array([float(place < 3) for place in working])
 
 
 def _logarithm(gradient: Array) -> Logarithm | SpatialLogarithm:

@@ -292,15 +292,14 @@ class Problem:
                 raise InputError(f"archord.Problem: {said}.") from None
         if self.kinematics is None:
             return material
+        if self.strain == "large" and not material.finite:
+            from archord.materials.finite import LargeStrain
+
+            material = LargeStrain(material)
         try:
-            material = material.under(self.kinematics)
+            return material.under(self.kinematics)
         except ValueError as error:
             raise InputError(f'archord.Problem: body "{body.name}": {error}.') from None
-        if self.strain == "small" or material.finite:
-            return material
-        from archord.materials.finite import LargeStrain
-
-        return LargeStrain(material)
 
     @property
     def mesh_file(self) -> str:

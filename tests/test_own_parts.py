@@ -133,6 +133,62 @@ def test_own_classes_may_write_into_the_history_that_they_get(run, tmp_path):
     assert not points.state.depth.any()
 
 
+@dataclass(frozen=True)
+class Fibres(archord.Material):
+    """Two families of fibres along x and y, stiffer the further they are stretched, whose ``E`` and
+    ``nu`` are no isotropic solid's."""
+
+    E: float = 10.0
+    nu: float = 0.3
+    yields = True
+
+    @property
+    def elastic_tangent(self):
+        return self.E * np.diag([1.0, 2.0, 0.5])
+
+    def update(self, strain, state):
+        growth = strain**2 * [1, 1, 0]
+        working = strain @ self.elastic_tangent * (1 + growth)
+        tangent = self.elastic_tangent * (1 + 3 * growth)[:, None, :]
+        return np.insert(working, 2, 0.0, axis=1), tangent, state
+
+    def stored(self, strain, stress, state):
+        growth = strain**2 * [0.5, 0.5, 0]
+        return (strain**2 @ self.elastic_tangent * (1 + growth)).sum(axis=1) / 2
+
+
+def stretched(**given) -> archord.Problem:
+    """A bar of `Fibres` that is stretched by 30 %."""
+    parts = {
+        "bodies": [archord.Body("bar", Fibres())],
+        "supports": [
+            archord.Support("bar left", fixed="x"),
+            archord.Support("bar bottom", fixed="y"),
+        ],
+        "loads": [archord.Load("pull", on="bar right", direction="x", displacement=0.6)],
+    }
+    mesh = archord.rectangles({"bar": (0, 0, 2, 1)}, size=1.0)
+    return archord.Problem(mesh, **parts | {"steps": 6, "strain": "large"} | given)
+
+
+def test_own_materials_have_true_stresses_and_energies_at_large_strain(tmp_path):
+    """Of the logarithmic strain ``e``: the stress that does work on it, over the stretched area,
+    and what the material stores, whatever it calls E and nu."""
+    run = archord.solve(stretched(), tmp_path / "run")
+    e = np.log(1.3)
+    working = 10 * e * (1 + e**2)
+    assert run.columns["pull force"][-1] == pytest.approx(working / 1.3, rel=1e-9)
+    np.testing.assert_allclose(run.fields().stress[:, 0], working / 1.3, rtol=1e-9)
+    stored = 2 * 10 * e**2 * (1 + 0.5 * e**2) / 2
+    assert run.columns["elastic_energy"][-1] == pytest.approx(stored, rel=1e-9)
+
+
+def test_own_materials_in_plane_stress_do_not_tell_their_thickness():
+    said = 'body "bar": true stresses at large strain need the thickness'
+    with pytest.raises(archord.InputError, match=said):
+        stretched(kinematics="plane stress")
+
+
 def test_arrays_of_parts_may_be_changed_after_their_use():
     """Parts that were made of them keep their numbers."""
     table = np.array([[0.0, 200.0], [0.1, 300.0]])

@@ -27,7 +27,7 @@ def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
         known = ", ".join(edges) or "none"
         raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {known}.")
     nodes, s, radius = _along(fields, edge)
-    tangent, joined = _tangents(fields.coordinates[nodes], nodes)
+    tangent, joined = _tangents(run, fields, nodes)
     stresses = {}
     if fields.stress is not None:
         stress = fields.stress[nodes]
@@ -59,7 +59,7 @@ def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> Along:
 
     nodes = meeting(fields, edge)
     s = Curve(fields.coordinates, 2, nodes).arc_length(_NODES)
-    tangent, joined = _tangents(fields.coordinates[nodes], nodes)
+    tangent, joined = _tangents(run, fields, nodes)
     stresses = {}
     if fields.stress is not None:
         xx, yy, zz, xy, yz, zx = np.moveaxis(fields.stress[nodes], -1, 0)
@@ -118,19 +118,27 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     return nodes, s, radius
 
 
-def _tangents(x: Array, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
-    """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet
-    without a corner their mean; and which facets ``(k,)`` are so followed by the next."""
-    by_ends = [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]]  # of the parabola, at its nodes
-    slopes = np.einsum("qa,fai->fqi", by_ends, x)
-    tangent = unit(slopes)
+def _tangents(run: Probed, fields: Fields, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Unit tangents ``(k, 3, d)`` at the ``nodes`` ``(k, 3)`` of facets, where two meet without a
+    corner their mean; and which facets ``(k,)`` are so followed by the next. At large strain they
+    are tangents of the deformed edge, on which true stresses act."""
+    undeformed = _slopes(fields.coordinates[nodes])
     here, after = np.nonzero(nodes[:, 2:] == nodes[:, 0])
-    cosine = (tangent[here, 2] * tangent[after, 0]).sum(axis=1)
+    cosine = (undeformed[here, 2] * undeformed[after, 0]).sum(axis=1)
     smooth = cosine > _SMOOTH
     here = here[smooth]
     after = after[smooth]
+    tangent = undeformed
+    if run.scene.analysis.strain == "large":
+        tangent = _slopes(fields.deformed[nodes])
     mean = unit(tangent[here, 2] + tangent[after, 0])
     tangent[here, 2] = mean
     tangent[after, 0] = mean
     followed = here[after == here + 1]
     return tangent, np.isin(np.arange(len(nodes)), followed)
+
+
+def _slopes(x: Array) -> Array:
+    """Unit tangents ``(k, 3, d)`` at the nodes ``x`` ``(k, 3, d)`` of each facet alone."""
+    by_ends = [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]]  # of the parabola, at its nodes
+    return unit(np.einsum("qa,fai->fqi", by_ends, x))

@@ -16,6 +16,7 @@ from tests.postprocess.vtk_reader import VtkFile
 # Hoop stress at the hole's edge over P/(40 - 20): at 90 degrees and the largest, of two codes, one
 # of them CalculiX 2.20 (elements of order two), each refined until the digits stood.
 REFERENCE = {0.1: (3.424, 3.78), 0.3: (3.072, 3.190)}
+BAR_ENDS = [("left", 0.0), ("right", 10.0)]
 
 
 def solved(folder, size, displacement, analysis=None, lug=None, **shape):
@@ -460,3 +461,28 @@ def test_a_closed_edge_in_space_runs_round_once(tmp_path):
     np.testing.assert_allclose(edge.values, -0.01)
     assert edge.s[-1] == pytest.approx(6.0, rel=1e-9)
     assert len(np.unique(edge.x.round(6), axis=0)) == 24  # of 12 facets
+
+
+def test_stress_along_an_edge_that_has_turned_is_along_it(tmp_path):
+    """At large strain, of a bar that is stretched and turned by half a radian: the free sides carry
+    no traction, and the stress along them is the principal one. By the undeformed tangent it was
+    a quarter less."""
+    angle = 0.5
+    x, y = 10.5 * np.array([np.cos(angle), np.sin(angle)]) - [10.0, 0.0]
+    ends = [archord.Coupling(end, f"bar {end}", (at, 0.5)) for end, at in BAR_ENDS]
+    moved = {"left x": 0.0, "left y": 0.0, "right x": x, "right y": y}
+    moved |= {"left rotation": angle, "right rotation": angle}
+    loads = [archord.Load(name, *name.split(), displacement=value) for name, value in moved.items()]
+    problem = archord.Problem(
+        archord.rectangles({"bar": (0, 0, 10, 1)}, size=1.0),
+        [archord.Body("bar", archord.Elastic(1000.0, 0.3))],
+        loads=loads,
+        couplings=ends,
+        strain="large",
+        steps=4,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    along, normal, largest = (run.probe("bar top", name) for name in ("hoop", "normal", "p1"))
+    middle = np.abs(along.x[:, 0] - 5) < 1
+    assert along.values[middle] == pytest.approx(largest.values[middle], rel=1e-4)
+    assert np.abs(normal.values[middle]).max() < 1e-3 * along.values[middle].max()
