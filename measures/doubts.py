@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from mpi4py import MPI
+
+from archord.materials.elasticity import Elastic
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt
@@ -21,6 +24,7 @@ LARGE = 'analysis.strain = "large" is for that'
 _PLASTIC = 0.5  # PEEQ over the strain, from which on bodies strain by yielding
 _OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
 _INCOMPRESSIBLE = 100.0  # modulus of uniaxial strain over shear modulus: nu = 0.495
+_COERCIVE = 0.25  # gamma_factor over the stiffness, below which contact may be too soft
 _LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
 _FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
 _BALANCED = 1e-8  # force that is left, or residual, over the largest force
@@ -126,6 +130,25 @@ def _turning_pairs(system: System, angle: float) -> list[str]:
     text = f"elements turn by {angle:.2g} rad in space, where bodies are tied or rub"
     inexact = "forces of surfaces that press while both bodies turn are not exact then"
     return [Doubt(f"{text}: {inexact}", angle)]
+
+
+def gamma_doubts(system: System) -> list[str]:
+    """A warning of a material of one's own that got so stiff in contact that gamma, which is made
+    of its elastic tangent, no longer keeps the contact's form coercive: see
+    `solver.contact.interaction`. Collective."""
+    for interface in system.contact.interfaces:
+        factor = interface.interaction.gamma_factor
+        for pair in interface.pairs:
+            material = pair.surface.material
+            if isinstance(material, Elastic) or material.finite or not material.yields:
+                continue
+            ratio = system.comm.allreduce(pair.stiffening(), MPI.MAX)
+            if ratio > factor / _COERCIVE:
+                body = system.problem.body_of(pair.surface.name).name
+                text = f"{body!r} is {ratio:.2g} times as stiff in contact as its elastic_tangent"
+                cure = f"gamma_factor = {ratio:.0f} of {interface.interaction.name!r} is for that"
+                return [Doubt(f"{text}, so that forces may be some per cent off; {cure}", ratio)]
+    return []
 
 
 def round_off_doubts(state: Accepted, tolerance: float) -> list[str]:

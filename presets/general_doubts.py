@@ -12,6 +12,7 @@ from archord.measures.doubts import (
     balance_doubts,
     distortion_doubts,
     few_facets,
+    gamma_doubts,
     round_off_doubts,
     told_of_facets,
 )
@@ -79,7 +80,10 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
             yield from round_off_doubts(state, scene.analysis.tolerance)
         yield from balance_doubts(m, _UNBALANCED, scene.analysis.tolerance)
 
-    return [surfaces, strains, angles, balances, _spring_doubts]
+    def stiffness(state: Accepted, m: Record) -> Iterator[str]:
+        yield from gamma_doubts(system)
+
+    return [surfaces, strains, angles, balances, stiffness, _spring_doubts]
 
 
 def _facet_doubts(state: Accepted, m: Record, surface: str, pressure: str) -> list[str]:

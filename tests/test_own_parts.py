@@ -135,11 +135,12 @@ def test_own_classes_may_write_into_the_history_that_they_get(run, tmp_path):
 
 @dataclass(frozen=True)
 class Fibres(archord.Material):
-    """Two families of fibres along x and y, stiffer the further they are stretched, whose ``E`` and
-    ``nu`` are no isotropic solid's."""
+    """Two families of fibres along x and y, stiffer the further they are stretched, twice at the
+    ``limit``, whose ``E`` and ``nu`` are no isotropic solid's."""
 
     E: float = 10.0
     nu: float = 0.3
+    limit: float = 1.0
     yields = True
 
     @property
@@ -147,13 +148,13 @@ class Fibres(archord.Material):
         return self.E * np.diag([1.0, 2.0, 0.5])
 
     def update(self, strain, state):
-        growth = strain**2 * [1, 1, 0]
+        growth = (strain / self.limit) ** 2 * [1, 1, 0]
         working = strain @ self.elastic_tangent * (1 + growth)
         tangent = self.elastic_tangent * (1 + 3 * growth)[:, None, :]
         return np.insert(working, 2, 0.0, axis=1), tangent, state
 
     def stored(self, strain, stress, state):
-        growth = strain**2 * [0.5, 0.5, 0]
+        growth = (strain / self.limit) ** 2 * [0.5, 0.5, 0]
         return (strain**2 @ self.elastic_tangent * (1 + growth)).sum(axis=1) / 2
 
 
@@ -187,6 +188,27 @@ def test_own_materials_in_plane_stress_do_not_tell_their_thickness():
     said = 'body "bar": true stresses at large strain need the thickness'
     with pytest.raises(archord.InputError, match=said):
         stretched(kinematics="plane stress")
+
+
+@pytest.mark.parametrize("factor", [0.5, 40.0])
+def test_a_material_that_stiffens_in_contact_is_warned_of(tmp_path, factor):
+    """Its force on a punch was a third too small with a gamma of its elastic tangent."""
+    mesh = archord.rectangles({"low": (-2, -1, 4, 1), "up": (-1, 0, 2, 1)}, size=1.0)
+    bodies = [
+        archord.Body("low", Fibres(limit=0.005)),
+        archord.Body("up", archord.Elastic(1e5, 0.3)),
+    ]
+    surfaces = ("up bottom", "low top")
+    problem = archord.Problem(
+        mesh,
+        bodies,
+        [archord.Interaction("contact", surfaces, gamma_factor=factor)],
+        [archord.Support("low bottom"), archord.Support("up top", fixed="x")],
+        [archord.Load("press", on="up top", direction="y", displacement=-0.02)],
+        steps=1,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    assert any("times as stiff in contact" in said for said in run.warnings) == (factor < 1)
 
 
 def test_arrays_of_parts_may_be_changed_after_their_use():

@@ -101,6 +101,22 @@ class Pair:
         points_per_facet = surface.weight.shape[1]
         self.gamma = factor * self.share * np.repeat(of_facets, points_per_facet, axis=0)
 
+    def stiffening(self) -> float:
+        """How many times as stiff as its elastic tangent, of which gamma is made, the own body is
+        along the normal: the largest of this rank's points that carry their trial pressure, 0
+        without any."""
+        carry = self.active & (self.by_trial[:, 0, 0] != 0)
+        if not carry.any():
+            return 0.0
+        surface = self.surface
+        n = self._outward[carry]
+        by_axis = np.column_stack([n, np.zeros(len(n))])  # none of what is over the radius
+        along = n[:, surface.terms[:, 0]] * by_axis[:, surface.terms[:, 1]]
+        stiffness = np.einsum("mi,mig,mg->m", n, self.moduli[carry], along)
+        cut = np.einsum("mi,mik->mk", n, surface.kinematics.traction(n))
+        elastic = np.einsum("mk,kl,ml->m", cut, surface.material.elastic_tangent, cut)
+        return float((stiffness / elastic).max())
+
     def use_own_normals(self) -> None:
         """Measure the gap along this surface's normals, reversed, for good."""
         self.projection = replace(self.projection, normal=-self._outward)
