@@ -218,17 +218,21 @@ def surface_profiles(system: System) -> dict[str, Any]:
 def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> dict[str, Array]:
     """The arrays ``(n, q)`` and ``(n, q, d)`` of a profile at all facets of the ``side``.
     Collective."""
+    from archord.solver.contact.laws.coulomb import Coulomb
+
     displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
     # the frame's tangent runs along the opposite surface, which this one meets the other way round
     shear = 0.0 - pair.shear
-    strength = getattr(pair.law, "friction", 0.0) * pair.pressure
+    sticks = pair.law.has_friction & pair.sticks.reshape(shear.shape)
+    if isinstance(pair.law, Coulomb):  # branches of points on the cone depend on round-off
+        sticks = np.abs(shear) < (1 - _ON_CONE) * pair.law.friction * pair.pressure
     here = {
         "weight": side.weight,
         "raw_pressure": pair.pressure,
         "gap": pair.distance,
         "slip": pair.slip,
         "shear": shear,
-        "sticks": np.abs(shear) < (1 - _ON_CONE) * strength,
+        "sticks": sticks,
         "coordinates": displaced,
         "X": side.point,
     }

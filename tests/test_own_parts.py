@@ -211,6 +211,36 @@ def test_a_material_that_stiffens_in_contact_is_warned_of(tmp_path, factor):
     assert any("times as stiff in contact" in said for said in run.warnings) == (factor < 1)
 
 
+class OwnFriction(archord.ContactLaw):
+    """Coulomb's friction, in a class without its coefficient."""
+
+    has_friction = counts_slip = unilateral = True
+
+    def __init__(self, k):
+        self.coulomb = archord.Coulomb(k)
+
+    def state(self, n):
+        return self.coulomb.state(n)
+
+    def respond(self, opening, trial, gamma, state, dt):
+        return self.coulomb.respond(opening, trial, gamma, state, dt)
+
+    def dissipation(self, state):
+        return self.coulomb.dissipation(state)
+
+
+def test_what_sticks_is_told_of_own_friction_too(tmp_path):
+    """By the branches of the law: without a coefficient nothing stuck in contact.h5."""
+    runs = [
+        archord.solve(sliding(MPI.COMM_SELF, k=0.3, law=law, steps=[1, 1]), tmp_path / law.__name__)
+        for law in (archord.Coulomb, OwnFriction)
+    ]
+    for step in (1, 2):
+        named, own = (run.contact(step)["lower top"].sticks for run in runs)
+        np.testing.assert_array_equal(own, named)
+    assert 0 < runs[0].contact(1)["lower top"].sticks.sum() < own.size
+
+
 def test_arrays_of_parts_may_be_changed_after_their_use():
     """Parts that were made of them keep their numbers."""
     table = np.array([[0.0, 200.0], [0.1, 300.0]])
