@@ -14,6 +14,7 @@ from archord.materials.finite import LargeStrain
 from archord.materials.hardening import Hardening, LinearHardening, TabularHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
+from archord.materials.material import Material
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.contact import CONTACT_LAWS
@@ -46,6 +47,8 @@ def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str,
                 f"archord.solve: a problem with a {kind} has no run folder; state it by Support, "
                 "Load and Coupling, or solve it by System."
             )
+    if fields:
+        _require_true_stresses(problem)
     dimension = 3 if _plane(problem) == "space" else 2
     return {
         "units": dict(zip(("length", "stress"), problem.units, strict=True)),
@@ -60,6 +63,18 @@ def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str,
         "stepping": dict(problem.stepping),
         "output": {"fields": fields},
     }
+
+
+def _require_true_stresses(problem: Problem) -> None:
+    """Raise `InputError` for a material of one's own at large strain that tells nominal stresses
+    alone: their components are others."""
+    for body in problem.bodies:
+        material = body.material
+        if material.finite and type(material).true_stress is Material.true_stress:
+            raise InputError(
+                f'archord.solve: body "{body.name}".material must define true_stress, as fields '
+                "have Cauchy's stress, and its update gives nominal ones; or give fields=False."
+            )
 
 
 def _mesh(mesh: Any, file: str) -> dict[str, Any]:

@@ -184,6 +184,21 @@ def test_own_materials_have_true_stresses_and_energies_at_large_strain(tmp_path)
     assert run.columns["elastic_energy"][-1] == pytest.approx(stored, rel=1e-9)
 
 
+class Nominal(archord.LargeStrain):
+    """A material at large strain that tells nominal stresses alone."""
+
+    true_stress = archord.Material.true_stress
+
+
+def test_fields_need_true_stresses(tmp_path):
+    """Nominal stresses have as many components in a plane, but others."""
+    problem = stretched(bodies=[archord.Body("bar", Nominal(archord.Elastic(10.0, 0.3)))], steps=1)
+    with pytest.raises(archord.InputError, match="must define true_stress, as fields"):
+        archord.solve(problem, tmp_path / "run")
+    run = archord.solve(problem, tmp_path / "run", fields=False)
+    assert run.columns["pull force"][-1] > 0
+
+
 def test_own_materials_in_plane_stress_do_not_tell_their_thickness():
     said = 'body "bar": true stresses at large strain need the thickness'
     with pytest.raises(archord.InputError, match=said):
