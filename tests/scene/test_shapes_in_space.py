@@ -73,7 +73,7 @@ def test_faults_are_said_in_one_sentence(place, value, said):
     assert len(str(error.value).splitlines()) == 1
 
 
-CLEVIS_IN_SPACE = changed(CLEVIS, "clevis.element_size", 3.5) | {
+CLEVIS_IN_SPACE = changed(CLEVIS, "clevis.element_size", 4.5) | {
     "space": {"gap": 0.5, "overhang": 1.0, "rim_ratio": 1.0},
     "load": {"force": 20000.0, "steps": 1},
 }

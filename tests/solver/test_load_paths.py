@@ -150,7 +150,7 @@ def test_a_force_beyond_the_limit_load_ends_at_it():
     held, close below the one that did not."""
     coarse = {"element_size": 0.2, "growth": 1.0}
     with pytest.raises(StepFailure) as failure:
-        solve(by_force(0.04, 4, yield_stress=0.002, joint=coarse, stepping={"minimum": 0.01}))
+        solve(by_force(0.04, 4, yield_stress=0.002, joint=coarse, stepping={"minimum": 0.02}))
     numbers = [float(n) for n in re.findall(r"P = ([0-9.e-]+[0-9])", str(failure.value))]
     assert 0.0067 < numbers[1] < numbers[0] < 1.02 * numbers[1] < 0.03
 

@@ -144,7 +144,7 @@ def test_a_sweep_in_space_varies_the_thickness(tmp_path, capsys):
 [grid]
 space.thickness = [4.0, 8.0]
 [base]
-joint = { radius = 10.0, clearance = 0.05, relative_element_size = 0.5 }
+joint = { radius = 10.0, clearance = 0.05, block_size = 50.0, relative_element_size = 0.5 }
 pin = { E = 210000.0, nu = 0.3 }
 block = { E = 210000.0, nu = 0.3 }
 space = { thickness = 4.0, rim_ratio = 1.0 }
@@ -159,7 +159,12 @@ load = { displacement = 1.0, steps = 1 }
     assert "press force [N]" in capsys.readouterr().out
     steel = {"E": 210e3, "nu": 0.3}
     words = {
-        "joint": {"radius": 10.0, "clearance": 0.05, "relative_element_size": 0.5},
+        "joint": {
+            "radius": 10.0,
+            "clearance": 0.05,
+            "block_size": 50.0,
+            "relative_element_size": 0.5,
+        },
         "pin": steel,
         "block": steel,
         "space": {"thickness": 4.0, "rim_ratio": 1.0},

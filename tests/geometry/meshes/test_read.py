@@ -1,5 +1,6 @@
 """Meshes from files: one disc in a plate in every format, with the same areas, lengths and sets."""
 
+import basix.cell
 import basix.ufl
 import gmsh
 import numpy as np
@@ -12,15 +13,18 @@ from dolfinx.mesh import (
     create_submesh,
     create_unit_cube,
     create_unit_square,
+    entities_to_geometry,
     exterior_facet_indices,
     locate_entities,
     meshtags,
 )
 from mpi4py import MPI
 
+from archord.geometry.basis import tabulate
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.formats.read import read_mesh, tagged
 from archord.geometry.meshes.refine import Circle
+from archord.kernels.compat import cell_degree, cell_nodes
 
 CIRCLES = [Circle("arc", (0.0, 0.0), 1.0), Circle("hole", (0.0, 0.0), 1.01)]
 
@@ -66,30 +70,33 @@ def module():
 def content(mesh):
     """Kind and order, and of every set the number of its entities and their measure; over all
     ranks."""
-    dolfinx_mesh = mesh.mesh
-    comm = mesh.mesh.comm
-    found = {}
-
-    def total(measure):
-        return comm.allreduce(
-            fem.assemble_scalar(fem.form(fem.Constant(dolfinx_mesh, 1.0) * measure))
-        )
-
     d = mesh.dimension
-    n = dolfinx_mesh.topology.index_map(d).size_local
-    for name in mesh.cell_sets:
-        cells = mesh.cells_in(name)[mesh.cells_in(name) < n]
-        dx = ufl.Measure(
-            "dx", dolfinx_mesh, subdomain_data=[(1, cells)], metadata={"quadrature_degree": 8}
-        )
-        found["cells", name] = comm.allreduce(len(cells)), total(dx(1))
-    for name in mesh.facet_sets:
-        facets = np.sort(mesh.facets_in(name))
-        tags = meshtags(dolfinx_mesh, d - 1, facets, np.ones(len(facets), dtype=np.int32))
-        ds = ufl.Measure("ds", dolfinx_mesh, subdomain_data=tags, metadata={"quadrature_degree": 8})
-        owned = facets < dolfinx_mesh.topology.index_map(d - 1).size_local
-        found["facets", name] = comm.allreduce(int(owned.sum())), total(ds(1))
-    return dolfinx_mesh.topology.cell_name(), dolfinx_mesh.geometry.cmap.degree, found
+    cells = {
+        ("cells", name): measured(mesh.mesh, d, mesh.cells_in(name)) for name in mesh.cell_sets
+    }
+    facets = {
+        ("facets", name): measured(mesh.mesh, d - 1, mesh.facets_in(name))
+        for name in mesh.facet_sets
+    }
+    return mesh.mesh.topology.cell_name(), cell_degree(mesh.mesh), cells | facets
+
+
+def measured(mesh, dim, entities):
+    """How many ``entities`` of the dimension ``dim`` there are, and their volume, area or length;
+    over all ranks."""
+    topology = mesh.topology
+    owned = np.unique(entities[entities < topology.index_map(dim).size_local])
+    if dim == topology.dim:
+        nodes = cell_nodes(mesh)[owned]
+    else:
+        topology.create_connectivity(dim, topology.dim)
+        nodes = entities_to_geometry(mesh, dim, owned)
+    kind = basix.cell.subentity_types(mesh.basix_cell())[dim][0]
+    X, w = basix.make_quadrature(kind, 8)
+    slopes = tabulate(kind, cell_degree(mesh), X)[1:]
+    J = np.einsum("jqa,nai->nqji", slopes, mesh.geometry.x[nodes])
+    size = np.sqrt(np.linalg.det(J @ J.swapaxes(2, 3)))
+    return mesh.comm.allreduce(len(owned)), mesh.comm.allreduce(float((size @ w).sum()))
 
 
 def like(measures):

@@ -47,11 +47,15 @@ def said(found):
     return "\n".join(doubts(found))
 
 
+def begin_at_the_scene(patch):
+    """Let fits begin with the values of the scene, without a search for a beginning, which takes
+    most of the time."""
+    patch.setattr(identification, "_begun", lambda model: np.zeros(len(model.unknowns)))
+
+
 @pytest.fixture
 def _begun_at_the_scene(monkeypatch):
-    """Fits begin with the values of the scene, without a search for a beginning, which takes most
-    of the time."""
-    monkeypatch.setattr(identification, "_begun", lambda model: np.zeros(len(model.unknowns)))
+    begin_at_the_scene(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +64,9 @@ def steel():
     beside offset and machine."""
     changes = {"joint.clearance": 0.06, "block.yield_stress": 260.0, "pin.yield_stress": 260.0}
     curve = measured(STEEL, changes, seed=4)
-    return identify(archord.load_scene(STEEL), curve, ["joint.clearance", BOTH])
+    with pytest.MonkeyPatch.context() as patch:
+        begin_at_the_scene(patch)
+        return identify(archord.load_scene(STEEL), curve, ["joint.clearance", BOTH])
 
 
 def test_clearance_and_yield_stress_come_back_from_a_noisy_curve(steel):
