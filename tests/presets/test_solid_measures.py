@@ -103,7 +103,7 @@ def test_the_pin_of_a_clevis_bends_as_a_beam(tmp_path):
     plate = STEEL | {"width": 40.0, "length": 40.0}
     made = last_of(
         {
-            "clevis": {"radius": 10.0, "clearance": 0.02, "element_size": 4.0, "growth": 0.5},
+            "clevis": {"radius": 10.0, "clearance": 0.02, "element_size": 5.0, "growth": 0.5},
             "space": {"gap": 2.0, "rim_ratio": 1.0},
             "inner": plate | {"thickness": 16.0},
             "outer": plate | {"thickness": 10.0},

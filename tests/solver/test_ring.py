@@ -170,7 +170,7 @@ def test_the_work_of_an_interference_fit_counts_from_its_first_step_on():
     alone it is none."""
     balances = []
     for steps in (8, 16):
-        done = solve(persson_joint(-0.2, 0.08, steps)).steps
+        done = solve(persson_joint(-0.2, 0.16, steps)).steps
         balances.append(energy_balance(done, 1))
         assert energy_balance(done) > 0.2
     assert balances[1] < 0.6 * balances[0] < 0.05

@@ -499,11 +499,11 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_forces_of_joints_that_harden_do_not_jump(plane: str) -> None:
-    """P of 60 joints at 600 displacements: its slope in logarithms changes by less than 0.15 from
+    """P of 60 joints at 400 displacements: its slope in logarithms changes by less than 0.1 from
     one to the next, which takes a jump of P by less than 0.1 %."""
     random = np.random.default_rng(5)
     clearance = 0.005
-    x = np.geomspace(0.1, 3.0, 600)
+    x = np.geomspace(0.1, 3.0, 400)
     tried = 0
     while tried < 60:
         first = np.exp(random.uniform(np.log(0.15), np.log(0.8), 2))
@@ -519,4 +519,4 @@ def test_forces_of_joints_that_harden_do_not_jump(plane: str) -> None:
         tried += 1
         force = hardened_loss(numbers, flows, x).force
         slope = np.diff(force) / np.diff(np.log(x))
-        assert np.abs(np.diff(slope)).max() < 0.15, numbers
+        assert np.abs(np.diff(slope)).max() < 0.1, numbers
