@@ -84,19 +84,24 @@ def content(mesh):
 def measured(mesh, dim, entities):
     """How many ``entities`` of the dimension ``dim`` there are, and their volume, area or length;
     over all ranks."""
-    topology = mesh.topology
-    owned = np.unique(entities[entities < topology.index_map(dim).size_local])
-    if dim == topology.dim:
+    owned = np.unique(entities[entities < mesh.topology.index_map(dim).size_local])
+    size = size_of(mesh, dim, owned) if len(owned) else 0.0
+    return mesh.comm.allreduce(len(owned)), mesh.comm.allreduce(size)
+
+
+def size_of(mesh, dim, owned):
+    """The volume, area or length of entities that this rank has."""
+    if dim == mesh.topology.dim:
         nodes = cell_nodes(mesh)[owned]
     else:
-        topology.create_connectivity(dim, topology.dim)
+        mesh.topology.create_connectivity(dim, mesh.topology.dim)
         nodes = entities_to_geometry(mesh, dim, owned)
     kind = basix.cell.subentity_types(mesh.basix_cell())[dim][0]
     X, w = basix.make_quadrature(kind, 8)
     slopes = tabulate(kind, cell_degree(mesh), X)[1:]
     J = np.einsum("jqa,nai->nqji", slopes, mesh.geometry.x[nodes])
-    size = np.sqrt(np.linalg.det(J @ J.swapaxes(2, 3)))
-    return mesh.comm.allreduce(len(owned)), mesh.comm.allreduce(float((size @ w).sum()))
+    stretch = np.sqrt(np.linalg.det(J @ J.swapaxes(2, 3)))
+    return float((stretch @ w).sum())
 
 
 def like(measures):
