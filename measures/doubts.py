@@ -27,6 +27,7 @@ _INCOMPRESSIBLE = 100.0  # modulus of uniaxial strain over shear modulus: nu = 0
 _COERCIVE = 0.25  # gamma_factor over the stiffness, below which contact may be too soft
 _LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
 _FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
+_MIXED_TURN = 0.02  # angle at which 2 % of a gap is seen as slip
 _BALANCED = 1e-8  # force that is left, or residual, over the largest force
 
 
@@ -106,7 +107,7 @@ def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
         text = f"{cells} turned inside out: stresses and forces mean nothing"
         said.append(Doubt(text, inside_out))
     if not small:
-        return said + _turning_pairs(system, angle)
+        return said + _turning_pairs(system, angle) + _kept_normals(system, angle)
     if strain > LARGE_STRAIN and peeq < _PLASTIC * strain:
         name = next(body.name for body in system.problem.bodies if system.problem.tag(body) == tag)
         off = f"which makes stresses and forces wrong by about {100 * strain:.2g} %"
@@ -132,6 +133,21 @@ def _turning_pairs(system: System, angle: float) -> list[str]:
     return [Doubt(f"{text}: {inexact}", angle)]
 
 
+def _kept_normals(system: System, angle: float) -> list[str]:
+    """A warning where cells turn by an ``angle`` and a law that keeps its partners, as a glue of
+    one's own does, keeps the undeformed normals, too."""
+    keeps = [
+        interface.interaction.name
+        for interface in system.contact.interfaces
+        for pair in interface.pairs
+        if not (pair.law.slides or isinstance(pair.law, Tied))
+    ]
+    if not keeps or angle <= _MIXED_TURN:
+        return []
+    text = f"elements turn by {angle:.2g} rad, but the law of {keeps[0]!r} keeps the normals of the"
+    return [Doubt(f"{text} undeformed surfaces: where these turn, it takes gaps for slips", angle)]
+
+
 def gamma_doubts(system: System) -> list[str]:
     """A warning of a material of one's own that got so stiff in contact that gamma, which is made
     of its elastic tangent, no longer keeps the contact's form coercive: see
@@ -146,7 +162,7 @@ def gamma_doubts(system: System) -> list[str]:
             if ratio > factor / _COERCIVE:
                 body = system.problem.body_of(pair.surface.name).name
                 text = f"{body!r} is {ratio:.2g} times as stiff in contact as its elastic_tangent"
-                cure = f"gamma_factor = {ratio:.0f} of {interface.interaction.name!r} is for that"
+                cure = f"gamma_factor = {ratio:.0f} of the interactions is for that"
                 return [Doubt(f"{text}, so that forces may be some per cent off; {cure}", ratio)]
     return []
 

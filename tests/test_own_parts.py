@@ -256,6 +256,35 @@ def test_what_sticks_is_told_of_own_friction_too(tmp_path):
     assert 0 < runs[0].contact(1)["lower top"].sticks.sum() < own.size
 
 
+class Glue(archord.ContactLaw):
+    """Springs between points of undeformed surfaces."""
+
+    slides = False
+
+    def respond(self, opening, trial, gamma, state, dt):
+        stiffness = np.array([1e5, 200.0])
+        by_opening = np.tile(-np.diag(stiffness), (len(trial), 1, 1))
+        branch = np.full(len(trial), 2)
+        return archord.Response(-stiffness * opening, 0 * by_opening, by_opening, branch, state)
+
+
+@pytest.mark.parametrize("strain", ["small", "large"])
+def test_a_glue_whose_surfaces_turn_is_warned_of(tmp_path, strain):
+    """Its normals do not turn: a beam that is bent has slips where it has gaps."""
+    rubber = archord.Elastic(1000.0, 0.0)
+    problem = archord.Problem(
+        archord.rectangles({"beam": (0, 0, 4, 1), "end": (4, 0, 1, 1)}, size=1.0),
+        [archord.Body("beam", rubber), archord.Body("end", rubber)],
+        [archord.Interaction("glue", ("end left", "beam right"), law=Glue())],
+        [archord.Support("beam left")],
+        [archord.Load("lift", on="end right", direction="y", displacement=0.4)],
+        steps=1,
+        strain=strain,
+    )
+    warnings = archord.solve(problem, tmp_path / "run").warnings
+    assert any("'glue' keeps the normals" in said for said in warnings) == (strain == "large")
+
+
 def test_arrays_of_parts_may_be_changed_after_their_use():
     """Parts that were made of them keep their numbers."""
     table = np.array([[0.0, 200.0], [0.1, 300.0]])
