@@ -41,9 +41,9 @@ CLEARANCES = (1e-3, 0.02)
 RATIOS = (1 / 3, 10.0)
 SMALLEST_S = {"strain": 0.15, "stress": 0.2}
 _LAST_DIGITS = 1e-3  # of the bounds, and of moduli that a scene has rounded
-# of P, relative, which 9 in 10 joints keep: of what is elastic of joints that yield and of small x;
-# and else of elastic joints with p m up to the first of these, and from the second on
-ELASTIC_ERROR = 1e-3
+# of P, relative, which 9 in 10 joints keep: of small x; and else of what is elastic, with p m up to
+# the first of these, and from the second on
+_EARLY_ERROR = 1e-3
 _SMALL = 0.1
 _CORNER = (0.45, 0.55)
 _CORNER_ERRORS = (4e-4, 8e-4)
@@ -279,13 +279,12 @@ def reduce_joint(
     dy = dback
     peak = base.peak
     angle = base.angle
-    error = np.full_like(y, ELASTIC_ERROR)
+    error = np.full_like(y, _EARLY_ERROR)
     ratio = np.ones_like(y)
     toe = np.zeros_like(y)
     back_error: Array = np.zeros(len(NODES))
-    if lost is None:
-        error[x >= _SMALL] = np.interp(joint.p * joint.m, _CORNER, _CORNER_ERRORS)
-    else:
+    error[x >= _SMALL] = elastic_error(joint)
+    if lost is not None:
         y = base.y * np.exp(lost.force)
         dy = (base.slope / base.y + lost.slope) * y
         y, dy = _rising(x, y, dy)
@@ -327,6 +326,11 @@ def reduce_joint(
         error=_from(error[0], error),
         back_error=back_error,
     )
+
+
+def elastic_error(joint: Elastic) -> float:
+    """The expected error of P of what is elastic of ``joint``, relative, but for small x."""
+    return float(np.interp(joint.p * joint.m, _CORNER, _CORNER_ERRORS))
 
 
 def _raised(x: Array, y: Array, dy: Array, added: Gain) -> tuple[Array, Array]:

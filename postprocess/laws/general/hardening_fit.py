@@ -20,7 +20,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
-from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
+from archord.postprocess.laws.general.general_law import elastic_error, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
     BODIES,
     TABLE,
@@ -31,6 +31,7 @@ from archord.postprocess.laws.general.hardening_model import (
     Strains,
     begins_of,
     curve_at,
+    felt,
     flows,
     kind,
     mean_flows,
@@ -41,7 +42,13 @@ from archord.postprocess.laws.general.hardening_model import (
     unsure,
 )
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.postprocess.laws.general.law_fit import NodeRun, by_joint, first_loading, rms_largest
+from archord.postprocess.laws.general.law_fit import (
+    WITHIN,
+    NodeRun,
+    by_joint,
+    first_loading,
+    rms_largest,
+)
 from archord.postprocess.laws.general.yield_model import (
     Loss,
     Yielding,
@@ -65,7 +72,6 @@ _AGAIN = 2  # of a fit that begins with another one
 _SMALL = 1e-2  # of a difference quotient
 _STEEPEST = 0.7  # slope of ln(eps_rep) by itself through s_eff
 _LITTLE = 1e-3  # change of P below which yielding does not matter
-_WITHIN = 0.93  # share of errors that the expected error is to contain
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,11 @@ class Hardened:
     def state(self, model: Model) -> tuple[Strains, Loss]:
         """What the law says at x."""
         found = representative(model, self.numbers, self.given, self.x)
-        return found, loss(self.numbers, Yielding(*found.s), self.x)
+        return found, self.lost(found.s, rises_of(self.given, found))
+
+    def lost(self, s: Array, rises: Array) -> Loss:
+        """What yielding by ``s`` does where the curves have these ``rises``, each ``(2, k)``."""
+        return loss(self.numbers, felt(self.numbers, s, rises), self.x)
 
     def off(self, model: Model) -> Array:
         """The errors of ln P."""
@@ -120,13 +130,14 @@ class Hardened:
         columns = np.zeros((2, len(TERMS), len(self.x)))
         means = mean_flows(self.given)
         begins = begins_of(self.numbers)
+        rises = rises_of(self.given, found)
         for i, mean in means.items():
             if np.isinf(self.numbers[5 + i]):
                 continue
             body = BODIES[i]
             higher: Array = found.s.copy()
             higher[i] *= 1 + _SMALL
-            of_higher = loss(self.numbers, Yielding(*higher), self.x)
+            of_higher = self.lost(higher, rises)
             of_s = (of_higher.force - lost.force) / _SMALL
             strain = found.strain[i]
             at = At(self.x, curve_at(mean, strain), found.s[1 - i], begins)
@@ -212,9 +223,10 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
     for joint, model in zip(joints, models, strict=True):
         found, lost = joint.state(model)
         usual = (joint.x >= _USUAL[0]) & (joint.x <= _USUAL[1])
+        of_elastic = elastic_error(Elastic(*joint.numbers[1:5]))
         told = [
             lost.force - joint.force,
-            lost.deviation,
+            np.hypot(lost.deviation, of_elastic),
             unsure(rises_of(joint.given, found), lost),
         ]
         by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])
@@ -222,9 +234,9 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
     table = Table("yields", "joints", "P 0.1 to 2 dR", "inside", left=1)
     for name, parts in sorted(by_kind.items()):
         off, deviation, rise = np.concatenate(parts, axis=1)
-        deviation = np.hypot(deviation, ELASTIC_ERROR)
         left = np.sqrt(np.maximum(off**2 - deviation**2, 0.0)) / np.maximum(rise, _LITTLE)
-        factors[name] = float(f"{np.quantile(left, _WITHIN):.3g}")
+        factor = np.quantile(left, WITHIN["force"])
+        factors[name] = float(f"{factor:.3g}")
         inside = np.abs(off) <= np.hypot(deviation, factors[name] * rise)
         table.add(name, len(parts), rms_largest(100 * off), f"{inside.mean():.0%}")
     return factors, table

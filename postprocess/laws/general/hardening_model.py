@@ -8,7 +8,8 @@ P_pp is the law of yield_model.py. ``ln(eps_rep R/dR)`` is a polynomial of ln x 
 what the two bodies are, of how the curve s(PEEQ) rises and bends, and of how near first yield by
 s_eff is: the first points that yield strain less than those later. hardening_model.json has its
 coefficients by plane and body, and factors of the expected error: hardening_fit.py makes it. p0,
-eps and the way back follow the same s_eff, and p0 the rise of the curve, too.
+eps and the way back follow the same s_eff, and p0 the rise of the curve, too. In plane strain a
+stronger block yields earlier, by the rise of the pin's curve (`felt`).
 """
 
 from __future__ import annotations
@@ -25,7 +26,13 @@ from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
-from archord.postprocess.laws.general.yield_model import Loss, Yielding, loss, yield_places
+from archord.postprocess.laws.general.yield_model import (
+    Loss,
+    Yielding,
+    loss,
+    share_of_pin,
+    yield_places,
+)
 
 TABLE = Path(__file__).parent / "hardening_model.json"
 BODIES = ("pin", "block")
@@ -36,6 +43,9 @@ TERMS = (
     *("s onset", "gain onset", "share onset", "x share", "s share", "x soft", "x weaker"),
     *("weaker weaker", "rise rise", "gain gain", "x bend", "apart bend"),
     *("x x x", "onset onset onset", "sharp", "x sharp"),
+    *("x onset", "x x onset", "sharp onset", "soft apart sharp", "sharp sharp sharp"),
+    *("x x sharp", "s sharp rise", "x bend bend", "share share clearance"),
+    *("weaker gain", "share gain", "apart rise"),
 )
 INPUTS = (
     *("1", "x", "s", "share", "soft", "weaker", "apart", "sharp", "clearance"),
@@ -61,6 +71,7 @@ _EARLIEST = 1.2  # x of first yield by s_eff over x, above which nothing has yie
 _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is weaker
 _SHARP = 0.12  # the same, within which the strain passes from one body to the other
 _NEARLY_ALIKE = 0.15  # the same, beyond which the curve of the weaker body alone tells of p0
+_TAKEN = 0.1  # of the rise of the pin's curve: ln of what it takes from the s of a stronger block
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
 _YIELDED = 0.02  # of P
 _PEAK_YIELDED = 0.1  # of p0
@@ -248,10 +259,10 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
             f"archord: the law finds no representative strain at {at:g} dR, as the curves rise in "
             "steep steps; solve this joint instead."
         )
-    lost = loss(numbers, Yielding(*found.s), x)
+    rises = rises_of(given, found)
+    lost = loss(numbers, felt(numbers, found.s, rises), x)
     slope = spline_slopes(np.log(x), lost.force) / x
     plane = kind(numbers).split()[0]
-    rises = rises_of(given, found)
     peak = lost.peak + table["peak"][plane] * peak_rise(found, rises, lost)
     wrong = table["error"][kind(numbers)] * unsure(rises, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
@@ -275,6 +286,16 @@ def rises_of(given: Flows, found: Strains) -> Array:
     for i, mean in mean_flows(given).items():
         rises[i] = curve_at(mean, found.strain[i]).rise
     return rises
+
+
+def felt(numbers: Sequence[float], s: Array, rises: Array) -> Yielding:
+    """The ``s`` ``(2, k)`` with which pin and block act on the joint with these ``numbers``. A pin
+    that hardens presses more in its middle than a perfectly plastic one does, so that in plane
+    strain a stronger block yields earlier. ``rises`` ``(2, k)`` is what `rises_of` tells."""
+    pin, block = s
+    if numbers[0]:
+        block = block * np.exp(-_TAKEN * rises[0] * share_of_pin(pin, block))
+    return Yielding(pin, block)
 
 
 def unsure(rises: Array, lost: Loss) -> Array:

@@ -247,7 +247,7 @@ def loss(numbers: Sequence[float], yielding: Yielding, x: Array) -> Loss:
     strain, *of_bodies = numbers[:5]
     joint = Elastic(*of_bodies)
     pin, block, _ = np.broadcast_arrays(*yielding, x)
-    pins = _share_of_pin(pin, block)
+    pins = share_of_pin(pin, block)
     if strain:
         pin_weaker = PIN_ALONE if np.isinf(block).all() else PIN_WEAKER
         shares = {"strain block": 1 - pins, pin_weaker: pins}
@@ -263,7 +263,7 @@ def loss(numbers: Sequence[float], yielding: Yielding, x: Array) -> Loss:
     return Loss(*found)
 
 
-def _share_of_pin(pin: Array, block: Array) -> Array:
+def share_of_pin(pin: Array, block: Array) -> Array:
     """The share of the process of joints with the weaker pin in what is told of joints with these s
     ``(k,)``: 0 where the bodies are alike or the block is weaker, 1 where the pin is weaker by
     `_BLENDED` and more."""

@@ -467,6 +467,7 @@ const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on
 const EARLIEST = 1.2; // x of first yield by s_eff over x, above which nothing has yielded
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
 const SHARP = 0.12; // the same, within which the strain passes from one body to the other
+const OF_STRONGER = 0.1; // of the rise of the pin's curve: ln of what it takes from the s of a stronger block
 const NEARLY_ALIKE = 0.15; // the same, beyond which the curve of the weaker body alone tells of p0
 
 /** The mean s by a strain, of strains about it. */
@@ -565,19 +566,23 @@ function hardenedLoss(data, strain, elastic, begin, given, x) {
     for (const body of BODIES) flows[body] = given[body] && meanFlow(given[body], data.hardening);
     const found = representative(data.hardening, strain, elastic, begin, flows, x);
     requireGain(data.range.gain, found[found.length - 1], begin, flows);
-    const lost = lossOf(data, strain, elastic, found, x);
+    const rises = found.map(({ strain: own }) => BODIES.map((body) => (flows[body] ? curveAt(flows[body], own[body]).rise : 0)));
+    const felt = found.map(({ pin, block }, i) => {
+        const taken = strain ? OF_STRONGER * rises[i][0] * shareOfPin({ pin, block }) : 0;
+        return { pin, block: block * Math.exp(-taken) };
+    });
+    const lost = lossOf(data, strain, elastic, felt, x);
     const logs = x.map(Math.log);
     const slopes = splineSlopes(logs, lost.map((state) => state.force), false);
     const alone = BODIES.filter((body) => Number.isFinite(begin[body]));
     const plane = strain ? "strain" : "stress";
     const kind = `${plane} ${alone.length > 1 ? "both" : alone[0]}`;
     return lost.map((state, i) => {
-        const { pin, block, strain: strains } = found[i];
-        const rises = BODIES.map((body) => (flows[body] ? curveAt(flows[body], strains[body]).rise : 0));
-        const across = rises.map((rise) => 2 * Math.log(WIDE) * rise);
+        const { pin, block } = found[i];
+        const across = rises[i].map((rise) => 2 * Math.log(WIDE) * rise);
         const wrong = data.hardening.error[kind] * Math.hypot(0.5, ...across) * yielded(state.force, 0.02);
         const ofPin = smoothStep(0.5 + Math.log(block / pin) / (2 * NEARLY_ALIKE));
-        const rise = ofPin * rises[0] + (1 - ofPin) * rises[1];
+        const rise = ofPin * rises[i][0] + (1 - ofPin) * rises[i][1];
         const peak = state.peak + data.hardening.peak[plane] * rise * yielded(state.peak, 0.1);
         const deviation = Math.hypot(state.deviation, wrong);
         const wayError = Math.hypot(state.wayError, wrong);
@@ -591,9 +596,8 @@ const yielded = (loss, felt) => clip((1 - Math.exp(loss)) / felt, 0, 1);
 // --- the law of one joint
 
 const NODES = [0, ...geomspace(0.02, 3, 60)]; // x = delta/dR
-// Of P, relative: of what is elastic of joints that yield and of small x; and else of elastic joints with p m up to
-// the first of these, and from the second on.
-const ELASTIC_ERROR = 1e-3;
+// Of P, relative: of small x; and else of what is elastic, with p m up to the first of these, and from the second on.
+const EARLY_ERROR = 1e-3;
 const SMALL_X = 0.1;
 const CORNER = [0.45, 0.55];
 const CORNER_ERRORS = [4e-4, 8e-4];
@@ -728,7 +732,7 @@ function reduced(elastic, lost, added, ofElastic) {
     let peak = base.map((state) => state.peak);
     let angle = base.map((state) => state.angle);
     const corner = straight(elastic.p * elastic.m, CORNER, CORNER_ERRORS);
-    let error = x.map((place) => (lost || place < SMALL_X ? ELASTIC_ERROR : corner));
+    let error = x.map((place) => (place < SMALL_X ? EARLY_ERROR : corner));
     let ratio = x.map(() => 1);
     let toe = x.map(() => 0);
     let backError = x.map(() => 0);

@@ -216,6 +216,17 @@ def test_yielding_beyond_the_range_is_none(pin: LawJoint, s: float) -> None:
         )
 
 
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_before_first_yield_an_elastic_joint_is_expected_to_be_as_wrong(plane: str) -> None:
+    """The error of what is elastic does not know that the joint yields later."""
+    nus = (0.3, 0.3)
+    yields = general_law(joint(plane, 1.0, nus, 0.005, 0.9, "both"))
+    elastic = general_law(joint(plane, 1.0, nus, 0.005, 0.9))
+    delta = 0.005 * np.array([0.05, 0.15, 0.3, 0.5])
+    np.testing.assert_array_equal(yields.at(delta).error, elastic.at(delta).error)
+    assert yields.at(0.01).error > 2 * elastic.at(0.01).error
+
+
 @given(joints(yields=("none",)))
 @settings(max_examples=40, deadline=None)
 def test_first_touch_is_line_contact(pin: LawJoint) -> None:
@@ -351,6 +362,9 @@ def test_every_named_metal_has_a_law(name: str, plane: str) -> None:
             "S275",
             {0.6218: 0.557374, 1.251: 1.3469, 1.491: 1.62174, 1.775: 1.88593},
         ),
+        ("strain", "CuSn12-C", "S235", {0.6218: 0.557374, 1.251: 1.30212, 1.775: 1.76574}),
+        ("stress", "S275", "S235", {0.6415: 0.607521, 1.273: 0.885514, 1.794: 0.990213}),
+        ("stress", "S355", "S275", {0.6462: 0.637631, 1.278: 1.02262, 1.798: 1.16014}),
     ],
 )
 def test_pairs_of_named_metals_are_within_a_part_in_70(
@@ -472,8 +486,8 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
     plane: str, share: float, hardens: str
 ) -> None:
     """One body hardens until it is the stronger one. All that yielding does is smooth in x: what it
-    changes by from one of 300 points to the next changes by less than 0.2 %, of the travel by less
-    than 1 %."""
+    changes by from one of 1 000 points to the next changes by less than 0.15 %, of the travel by
+    less than 1 %."""
     clearance = 0.005
     first = 0.17
     second = {"strain": 1.17, "stress": 1.4}[plane] * first
@@ -487,13 +501,13 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
     flows = (line, flat) if hardens == "pin" else (flat, line)
     stresses = (first, second) if hardens == "pin" else (second, first)
     numbers = (float(plane == "strain"), share, 0.45, 0.5, clearance, *stresses)
-    x = np.geomspace(0.3, 3.0, 300)
+    x = np.geomspace(0.3, 3.0, 1000)
     pin, block = representative(hardening_model()["strain"], numbers, flows, x).s
     assert (pin[0] < block[0]) != (pin[-1] < block[-1])
     lost = hardened_loss(numbers, flows, x)
     for name in ("force", "peak", "angle", "deviation"):
         bends = np.diff(getattr(lost, name), 2)
-        assert np.abs(bends).max() < 2e-3, name
+        assert np.abs(bends).max() < 1.5e-3, name
     assert np.abs(np.diff(lost.travel, 2)).max() < 1e-2
 
 
