@@ -81,9 +81,12 @@ def test_clearance_and_yield_stress_come_back_from_a_noisy_curve(steel):
 
 
 @pytest.mark.parametrize(
-    ("clearance", "strength", "soft"), [(0.05, 230.0, 2e-6), (0.0375, 70.0, 0.0)]
+    ("clearance", "strength", "soft", "too_wide", "too_strong"),
+    [(0.05, 230.0, 2e-6, 2.5, 1.2), (0.0375, 70.0, 0.0, 1.8, 2.5)],
 )
-def test_a_fit_does_not_end_at_the_curve_of_another_joint(clearance, strength, soft):
+def test_a_fit_does_not_end_at_the_curve_of_another_joint(
+    clearance, strength, soft, too_wide, too_strong
+):
     """Clearances were 3 and 4 times too large, with a compliance that the fit did not begin with,
     and with a yield stress that a larger clearance made up for."""
     changes = {
@@ -92,8 +95,8 @@ def test_a_fit_does_not_end_at_the_curve_of_another_joint(clearance, strength, s
         "pin.yield_stress": strength,
     }
     curve = measured(STEEL, changes, 0, turns=(-0.3, 1.9, 0.0), n=100, noise=0.0, soft=soft)
-    factors = {"joint.clearance": 1.8, "block.yield_stress": 1.2, "pin.yield_stress": 1.2}
-    begun = {key: value * factors[key] for key, value in changes.items()}
+    factors = {"joint.clearance": too_wide}
+    begun = {key: value * factors.get(key, too_strong) for key, value in changes.items()}
     found = identify(archord.load_scene(STEEL, begun), curve, ["joint.clearance", BOTH])
     values = [one.value for one in found.estimates[:2]]
     assert values == pytest.approx([clearance, strength], rel=0.01)

@@ -81,7 +81,7 @@ def test_nearly_incompressible_joints_in_space_take_few_iterations():
     scene = parse_any(
         {
             "joint": {"radius": 10.0, "clearance": 0.05, "block_size": 30.0}
-            | {"relative_element_size": 0.12},
+            | {"relative_element_size": 0.16},
             "pin": body,
             "block": body,
             "space": {"thickness": 6.66, "rim_ratio": 1.0},
