@@ -53,7 +53,7 @@ def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str,
     return {
         "units": dict(zip(("length", "stress"), problem.units, strict=True)),
         "mesh": _mesh(problem.mesh, mesh_file),
-        "body": [_body(body) for body in problem.bodies],
+        "body": [_body(body, _plane(problem)) for body in problem.bodies],
         "interaction": [_interaction(part) for part in problem.interactions],
         "coupling": [_coupling(coupling, dimension) for coupling in problem.couplings],
         "support": [_support(support, dimension) for support in problem.supports],
@@ -90,16 +90,16 @@ def _mesh(mesh: Any, file: str) -> dict[str, Any]:
     return {"file": file, "circle": circles} | changes
 
 
-def _body(body: Body) -> dict[str, Any]:
-    return {"name": body.name, "cells": body.cells} | material_words(body.material)
+def _body(body: Body, plane: str) -> dict[str, Any]:
+    return {"name": body.name, "cells": body.cells} | material_words(body.material, plane)
 
 
-def material_words(material: Any) -> dict[str, Any]:
-    """The keys of a body's section for ``material``: a scene's, or a description of a class
-    of one's own, with E and nu of its elastic moduli."""
+def material_words(material: Any, plane: str) -> dict[str, Any]:
+    """The keys of a body's section for ``material`` in a problem of these kinematics: a scene's, or
+    a description of a class of one's own, with E and nu of its elastic moduli."""
     kind = type(material)
     if kind is LargeStrain:
-        return material_words(material.inner)
+        return material_words(material.inner, plane)
     elastic = {"E": getattr(material, "E", 0.0), "nu": getattr(material, "nu", 0.0)}
     if kind is Elastic:
         return elastic
@@ -108,7 +108,7 @@ def material_words(material: Any) -> dict[str, Any]:
         if hardening is not None:
             back = getattr(material, "back_stresses", None)
             return elastic | hardening | {"back_stresses": back and [list(pair) for pair in back]}
-    return _moduli(material) | {"own": _own(material) | {"plastic": bool(material.yields)}}
+    return _moduli(material, plane) | {"own": _own(material) | {"plastic": bool(material.yields)}}
 
 
 def _hardening(law: Hardening) -> dict[str, Any] | None:
@@ -126,12 +126,12 @@ def _hardening(law: Hardening) -> dict[str, Any] | None:
     return {"yield_stress": yield_stress, "hardening": parameters}
 
 
-def _moduli(material: Any) -> dict[str, float]:
-    """E and nu of the elastic moduli of ``material``, as if it were isotropic."""
+def _moduli(material: Any, plane: str) -> dict[str, float]:
+    """E and nu of the elastic moduli of ``material`` in a ``plane``, as if it were isotropic."""
     tangent = material.elastic_tangent
     along = float(tangent[0, 0])
     across = float(tangent[0, 1])
-    is_thin = getattr(material, "plane", "strain") == "stress"
+    is_thin = plane == "stress"
     nu = across / along if is_thin else across / (along + across)
     nu = min(max(nu, 0.0), _LARGEST_NU)
     if is_thin:

@@ -17,6 +17,7 @@ from archord.materials.kinematics import Kinematics
 from archord.materials.material import Points
 from archord.output import run as run_module
 from archord.postprocess.laws.run_steps import read_steps
+from archord.presets.words import words_of
 
 Worn = make_dataclass("Worn", ["depth"])
 
@@ -283,6 +284,18 @@ def test_a_glue_whose_surfaces_turn_is_warned_of(tmp_path, strain):
     )
     warnings = archord.solve(problem, tmp_path / "run").warnings
     assert any("'glue' keeps the normals" in said for said in warnings) == (strain == "large")
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_a_run_folder_tells_the_moduli_of_own_materials(plane):
+    """As if they were isotropic, in plane stress, too, where E was 5 % too small."""
+
+    class Steel(Soft):
+        elastic_tangent = archord.Elastic(1000.0, 0.3, plane).elastic_tangent
+
+    bodies = [archord.Body("slab", Steel())]
+    words = words_of(slab(bodies=bodies, kinematics=f"plane {plane}"), "mesh.npz")
+    assert (words.body[0].E, words.body[0].nu) == pytest.approx((1000.0, 0.3), rel=1e-12)
 
 
 def test_arrays_of_parts_may_be_changed_after_their_use():
