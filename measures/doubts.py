@@ -156,14 +156,16 @@ def gamma_doubts(system: System) -> list[str]:
         factor = interface.interaction.gamma_factor
         for pair in interface.pairs:
             material = pair.surface.material
-            if isinstance(material, Elastic) or material.finite or not material.yields:
+            of_small_strain = getattr(material, "inner", material)
+            is_known = isinstance(of_small_strain, Elastic) or of_small_strain.finite
+            if is_known or not material.yields:
                 continue
             ratio = system.comm.allreduce(pair.stiffening(), MPI.MAX)
             if ratio > factor / _COERCIVE:
                 body = system.problem.body_of(pair.surface.name).name
                 text = f"{body!r} is {ratio:.2g} times as stiff in contact as its elastic_tangent"
                 cure = f"gamma_factor = {ratio:.0f} of the interactions is for that"
-                return [Doubt(f"{text}, so that forces may be some per cent off; {cure}", ratio)]
+                return [Doubt(f"{text}, so that forces may be far too small; {cure}", ratio)]
     return []
 
 
