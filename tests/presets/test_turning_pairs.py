@@ -19,9 +19,10 @@ from archord.solver.contact.laws.named import Tied
     ],
 )
 def test_turning_pairs_are_warned_of(dimension, slips, law, angle, warned):
+    pair = SimpleNamespace(counts_slip=slips, law=law)
     system = SimpleNamespace(
         problem=SimpleNamespace(kinematics=SimpleNamespace(dimension=dimension)),
-        contact=SimpleNamespace(pairs=[SimpleNamespace(counts_slip=slips, law=law)]),
+        contact=SimpleNamespace(pairs=[pair], interfaces=[]),
         distortion=lambda: (0.3, 1, angle, 0),
     )
     said = distortion_doubts(system, 0.0, small=False)
