@@ -20,7 +20,8 @@ from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from archord.solver.contact.quadrature import points_by
 from tests.output.run_files import accepted_steps, same_run
-from tests.solver.solving import SEVERAL, scene
+from tests.solver.solving import SEVERAL
+from tests.solver.solving import small_scene as scene
 
 PLASTIC = {"yield_stress": 0.002}
 UP_DOWN_UP = {"displacement": [1.5, 0.9, 1.8], "steps": [3, 3, 3]}

@@ -12,7 +12,7 @@ from archord.postprocess.run import Run
 from archord.solver.path.newton import NewtonSolver
 from tests.output.run_files import solved as solved_runs
 from tests.solver.parts import partition
-from tests.solver.solving import SEVERAL, E, scene, solve
+from tests.solver.solving import SEVERAL, E, scene, small_scene, solve
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "quarter_joint.json").read_text())
 AWAY = {"displacement": [2.0, 0.0], "steps": [2, 1]}
@@ -71,7 +71,7 @@ VARIANTS = {
 def test_forces_balance(variant):
     """Pin reaction, block reaction and the integral of the contact pressure agree to 1e-8 of P in
     each step."""
-    solution = solve(scene(0.2, 2, **VARIANTS[variant]))
+    solution = solve(small_scene(0.2, 2, **VARIANTS[variant]))
     for m, profiles in zip(solution.steps, solution.profiles, strict=True):
         assert m["P"] > 0
         assert m.force_balance < 1e-8
@@ -115,7 +115,7 @@ EXTREMES = {
 def test_extreme_joints_are_solved_to_round_off(extreme):
     """Where rounding of positions of size R, or of a stiff body's stresses, limits the residual, it
     is what remains, and the forces balance."""
-    solution = solve(scene(0.08, steps=2, **EXTREMES[extreme]))
+    solution = solve(small_scene(0.08, steps=2, **EXTREMES[extreme]))
     noise = solution.joint.equilibrium.evaluation.noise
     limit = max(1e-10, 2 * noise / solution.steps[-1]["P"])
     assert all(m.force_balance < max(1e-8, limit) for m in solution.steps)
@@ -135,7 +135,7 @@ def test_energy_is_kept_within_the_step_error():
     """Work = stored + dissipated; what is missing falls at least with the step, to below 0.1 %."""
     missing = []
     for steps in (5, 10, 20):
-        m = solve(scene(0.2, steps, yield_stress=0.002)).steps[-1]
+        m = solve(small_scene(0.2, steps, yield_stress=0.002)).steps[-1]
         missing.append(abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work)
     assert missing[1] < 0.6 * missing[0]
     assert missing[2] < 0.6 * missing[1]
@@ -160,8 +160,8 @@ def test_a_whole_pin_is_a_little_stiffer_than_its_half():
 
 def test_like_bodies_share_pin_and_hole_swapped():
     """An elastic body with a yield stress out of reach is elastic."""
-    elastic = solve(scene(0.08, 2)).steps[-1]
-    plastic = solve(scene(0.08, 2, yield_stress=1e3)).steps[-1]
+    elastic = solve(small_scene(0.08, 2)).steps[-1]
+    plastic = solve(small_scene(0.08, 2, yield_stress=1e3)).steps[-1]
     assert pytest.approx(elastic["P"], rel=1e-9) == plastic["P"]
     assert plastic.elastic_energy == pytest.approx(elastic.elastic_energy, rel=1e-9)
     assert plastic["peeq_max"] == 0
@@ -192,7 +192,7 @@ def test_results_do_not_depend_on_the_units(sigma_y):
             {"yield_stress": sigma_y * stress} if sigma_y else {}
         )
         sized = {"radius": length, "clearance": 0.005 * length, "element_size": 0.08 * length}
-        solution = solve(scene(steps=4, joint=sized, pin=solid, block=solid))
+        solution = solve(small_scene(0.08, 4, joint=sized, pin=solid, block=solid))
         m = solution.steps[-1]
         force = stress * length
         energies = (m.elastic_energy, m.plastic_dissipation, m.work)
@@ -243,7 +243,7 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
         if variant.endswith("force")
         else {}
     )
-    problem = scene(0.1, 4, **VARIANTS[variant.removesuffix(" by force")], **load)
+    problem = small_scene(0.1, 4, **VARIANTS[variant.removesuffix(" by force")], **load)
     together = solve(problem, MPI.COMM_WORLD, partitioner)
     alone = solve(problem)
     assert together.joint.n_dofs == alone.joint.n_dofs
@@ -259,7 +259,7 @@ def test_peeq_is_told_by_body_and_near_the_contact(tmp_path):
     within R/2 of the arc up to the largest contact angle so far, also when the pin is gone. The
     peak at the held corner is no contact."""
     [folder] = solved_runs(
-        {"run": scene(0.1, 3, 0.002, load=AWAY, output={"points": True})}, tmp_path
+        {"run": small_scene(0.1, 3, 0.002, load=AWAY, output={"points": True})}, tmp_path
     ).values()
     run = Run(folder)
     for step in (1, 2, 3):

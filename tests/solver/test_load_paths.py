@@ -13,7 +13,8 @@ from archord.solver.conditions import DeadLoad
 from archord.solver.expansion import expanded
 from archord.solver.path.stepping import StepFailure
 from archord.solver.path.system import System
-from tests.solver.solving import scene, solve
+from tests.solver.solving import small_scene as scene
+from tests.solver.solving import solve
 
 H = 0.16
 RIGID = {"rigid": True}

@@ -8,7 +8,7 @@ from petsc4py import PETSc
 from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose, lagged
 from archord.solver.linear.bordered import Bordered
-from tests.solver.solving import solve
+from tests.solver.solving import small_scene, solve
 
 FORCE = {"load": {"displacement": None, "relative_force": 0.012}}
 RING = {"joint": {"model": "ring"}, "load": {"displacement": None, "relative_force": 0.05}}
@@ -27,7 +27,7 @@ def small_is_large(monkeypatch):
 def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
     """To the tolerance of the residual, with fewer factorisations than iterations; on two ranks as
     on one."""
-    scene = paper_joint(0.15, 2, **kind)
+    scene = small_scene(0.15, 2, **kind)
     iterative = solve(scene, MPI.COMM_WORLD)
     monkeypatch.setattr(lagged, "_MANY_DOFS", 10**9)
     direct = solve(scene)
@@ -41,7 +41,7 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
 
 
 def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
-    scene = paper_joint(0.15, 2)
+    scene = small_scene(0.15, 2)
     usual = solve(scene)
     monkeypatch.setattr(lagged, "_MANY_SOLVES", 1)
     often = solve(scene)

@@ -4,23 +4,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.case import paper_joint
 from archord.presets.problem import general_problem
 from archord.scene.file import parse_any
 from archord.solver.linear import choose, lagged, look_ahead
 from archord.solver.path.stepping import march
 from archord.solver.path.system import System
-from tests.solver.solving import SEVERAL, solve
+from tests.solver.solving import SEVERAL, small_scene, solve
 
 FORCE = {"displacement": None, "relative_force": 0.01}
 SCENES = {
-    "friction": paper_joint(0.08, 4, 0.002, analysis={"friction": 0.3}),
-    "late yield": paper_joint(0.08, 4, 0.004),
-    "large strain": paper_joint(0.08, 4, analysis={"strain": "large"}),
-    "rigid pin": paper_joint(0.08, 4, 0.002, pin={"rigid": True}, analysis={"friction": 0.3}),
-    "by force": paper_joint(0.08, 4, load=FORCE),
-    "rigid pin by force": paper_joint(0.08, 4, pin={"rigid": True}, load=FORCE),
-    "released": paper_joint(
+    "friction": small_scene(0.08, 4, 0.002, analysis={"friction": 0.3}),
+    "late yield": small_scene(0.08, 4, 0.004),
+    "large strain": small_scene(0.08, 4, analysis={"strain": "large"}),
+    "rigid pin": small_scene(0.08, 4, 0.002, pin={"rigid": True}, analysis={"friction": 0.3}),
+    "by force": small_scene(0.08, 4, load=FORCE),
+    "rigid pin by force": small_scene(0.08, 4, pin={"rigid": True}, load=FORCE),
+    "released": small_scene(
         0.1, 1, 0.002, load={"displacement": [1.5, 1.0, 0.2]}, analysis={"friction": 0.3}
     ),
 }
@@ -52,7 +51,7 @@ def test_what_is_linear_but_for_the_contact_takes_one_iteration(pin, load, monke
     monkeypatch.setattr(look_ahead, "_TOLERANCE", 1e-12)
     monkeypatch.setattr(look_ahead, "_MOST_SOLVES", 200)
     steps = solve(
-        paper_joint(0.08, 3, pin=pin, load=load, analysis={"kinematics": "reference"})
+        small_scene(0.08, 3, pin=pin, load=load, analysis={"kinematics": "reference"})
     ).steps
     assert [m.iterations for m in steps] == [1, 1, 1]
 
@@ -66,7 +65,7 @@ def test_large_strain_takes_few_more_iterations_than_small(nu):
         sum(
             m.iterations
             for m in solve(
-                paper_joint(0.06, 4, pin=body, block=body, analysis={"strain": strain})
+                small_scene(0.06, 4, pin=body, block=body, analysis={"strain": strain})
             ).steps
         )
         for strain in ("small", "large")
@@ -97,7 +96,7 @@ def test_nearly_incompressible_joints_in_space_take_few_iterations():
 def test_an_old_factorisation_preconditions_as_well(monkeypatch):
     """Large elastic joints keep the first factorisation of a step."""
     monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
-    scene = paper_joint(0.1, 3)
+    scene = small_scene(0.1, 3)
     usual = solve(scene)
     monkeypatch.setattr(lagged, "_MANY_DOFS", 0)
     kept = solve(scene)
@@ -111,7 +110,7 @@ def test_an_old_factorisation_preconditions_as_well(monkeypatch):
 
 def test_a_scene_gives_the_same_digits_wherever_memory_lies():
     """FGMRES adds up in an order of its own."""
-    scene = paper_joint(0.1, 2, 0.002, analysis={"friction": 0.3})
+    scene = small_scene(0.1, 2, 0.002, analysis={"friction": 0.3})
     last = []
     held = []
     for size in (1, 1001, 17, 4099):
