@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose, look_ahead
 from archord.solver.linear.condensed import Condensed
-from tests.solver.solving import joint_system, solve
+from tests.solver.solving import joint_system, small_scene, solve
 
 
 def stiffness(n, rng):
@@ -84,7 +84,7 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
     """As with the whole matrix factorised each time, in far fewer iterations: each finds the points
     that open or close. With fixed partners nothing else is nonlinear: where all of them are found,
     the first iteration is the last."""
-    scene = paper_joint(0.08, 3, pin=pin, analysis={"kinematics": kinematics})
+    scene = small_scene(0.08, 3, pin=pin, analysis={"kinematics": kinematics})
     short = solve(scene)
     monkeypatch.setattr(look_ahead, "MOST_REVISIONS", 20)
     patient = solve(scene)
@@ -107,7 +107,7 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
 @pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
 def test_the_ranks_take_the_same_way(comm, pin):
     """Iterations, factorisations and points, on ranks without facets or cells, too."""
-    scene = paper_joint(0.1, 3, pin=pin)
+    scene = small_scene(0.1, 3, pin=pin)
     many = solve(scene, comm)
     one = solve(scene, MPI.COMM_SELF)
     assert many.joint.equilibrium.linear.tangent.condensed is not None
@@ -124,7 +124,7 @@ def test_the_ranks_take_the_same_way(comm, pin):
 @pytest.mark.mpi
 def test_joints_that_yield_are_condensed_until_then(comm, monkeypatch):
     """The first steps take one factorisation, the next ones as many as without, on every rank."""
-    scene = paper_joint(0.08, 8, 0.002)
+    scene = small_scene(0.08, 8, 0.002)
     condensed = solve(scene, comm)
     linear = condensed.joint.equilibrium.linear
     assert linear.choice.uses("look_ahead")
@@ -143,7 +143,7 @@ def test_joints_that_yield_are_condensed_until_then(comm, monkeypatch):
 
 def test_a_joint_that_goes_on_after_it_has_yielded_is_not_condensed():
     """So that its last digits are the digits of a run without a halt, also where it unloads."""
-    scene = paper_joint(0.1, 1, 0.002, load={"displacement": [1.0, 0.8]})
+    scene = small_scene(0.1, 1, 0.002, load={"displacement": [1.0, 0.8]})
     yielded = solve(scene, MPI.COMM_SELF).joint
     for points in yielded.equilibrium.evaluation.plastic_points():
         points.commit()
@@ -158,7 +158,7 @@ def test_a_joint_that_goes_on_after_it_has_yielded_is_not_condensed():
 
 
 def test_a_joint_that_never_yields_takes_one_factorisation():
-    strong = solve(paper_joint(0.1, 3, 1.0), MPI.COMM_SELF)
+    strong = solve(small_scene(0.1, 3, 1.0), MPI.COMM_SELF)
     linear = strong.joint.equilibrium.linear
     assert linear.tangent.condensed is not None
     assert linear.tangent.factorisations == 1
