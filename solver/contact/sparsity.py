@@ -10,7 +10,9 @@ from mpi4py import MPI
 
 from archord.solver.contact.pair import Pair
 
-_MARGIN = 2  # rings of opposite facets kept in the pattern around those that are paired
+# rings of opposite facets kept in the pattern around those that are paired, by the components of a
+# displacement: in space rings are large, and the matrix of the contact is quickly made again
+_MARGIN = {2: 2, 3: 0}
 _WIDEST = 16  # the same where pairs are expected to slide further
 
 
@@ -35,7 +37,8 @@ class Reach:
         self._comm = pair.surface.comm
         self._n_opposite = pair.opposite.n_facets
         length = pair.surface.facet_lengths().sum() / self._n_opposite
-        self._rings = min(_MARGIN + int(slide / length), _WIDEST)
+        margin = _MARGIN[pair.opposite.curve.X.shape[1]]
+        self._rings = min(margin + int(slide / length), _WIDEST)
         self.keys = np.zeros(0, dtype=np.int64)
         self._last = self.keys  # of the points at the last call
         self.extend()

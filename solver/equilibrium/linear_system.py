@@ -13,6 +13,7 @@ from archord.solver.equilibrium.evaluation import Evaluation
 from archord.solver.equilibrium.tangent import TangentMatrix
 from archord.solver.linear.bordered import Border, Bordered
 from archord.solver.linear.choose import choose
+from archord.solver.linear.multigrid import Multigrid
 from archord.solver.linear.strategy import Facts, Strategy
 
 
@@ -41,7 +42,8 @@ class LinearSystem:
             if self.unknowns.n_levels:
                 stiffness = self.unknowns.drives.stiffness
                 n = self.unknowns.n_levels
-                self.border = Bordered(self.tangent.A, n, stiffness, self._solver_of)
+                product = self.tangent.product
+                self.border = Bordered(product, n, stiffness, lambda _: self._solver())
             self.strategy = self._strategy()
 
     def _facts(self) -> Facts:
@@ -64,17 +66,23 @@ class LinearSystem:
 
     def _tangent(self) -> TangentMatrix:
         condense = self._revise_condensed if self.choice.uses("condensed") else None
-        return TangentMatrix(self.evaluation, self.timer, condense)
+        degree = self.unknowns.V.element.basix_element.degree
+        in_space = self.unknowns.dimension == 3
+        beside = self.choice.uses("multigrid") and in_space and degree > 1
+        return TangentMatrix(self.evaluation, self.timer, condense, beside=beside)
 
     def _strategy(self) -> Strategy:
         if self.border:
             return self.border
-        return self.tangent.condensed or self._solver_of(self.tangent.A)
+        return self.tangent.condensed or self._solver()
 
-    def _solver_of(self, A: PETSc.Mat) -> Strategy:
+    def _solver(self) -> Strategy:
         """The strategy for the matrix of the displacements."""
-        strategy = self.choice.factoriser(self.unknowns.V, self.unknowns.fixed, A)
+        terms = self.tangent.terms()
+        strategy = self.choice.factoriser(self.unknowns.V, self.unknowns.fixed, terms)
         strategy.product = self.tangent.product
+        if isinstance(strategy, Multigrid):
+            self._multigrid = strategy
         return strategy
 
     def update(self, *, factorise: bool = True) -> None:
@@ -94,6 +102,9 @@ class LinearSystem:
         if not self.evaluation.pattern_grew:
             return False
         self.tangent.renew()
+        if self.tangent.of_contact is not None:
+            self._multigrid.renew(self.tangent.terms())
+            return True
         self.renew_factorisation()
         self.strategy = self._strategy()
         return True
@@ -109,7 +120,7 @@ class LinearSystem:
     def renew_factorisation(self) -> None:
         """Take note that the tangent is another matrix, or has to be factorised once more."""
         if self.border:
-            self.border.replace(self.tangent.A)
+            self.border.replace(self.tangent.product)
 
     def revise(self, increment: Array) -> tuple[PETSc.Mat, Array] | None:
         """Let contact points go over to the branches to which an ``increment`` of this rank's

@@ -17,7 +17,7 @@ from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.assembly import assemble, matrix
 from archord.solver.contact.tangent import Filled
 from archord.solver.equilibrium.evaluation import Evaluation
-from archord.solver.linear.block_product import quick_product
+from archord.solver.linear.block_product import BlockProduct, quick_product
 from archord.solver.linear.condensed import Condensed
 from archord.solver.linear.strategy import Sum
 
@@ -46,13 +46,21 @@ class TangentMatrix:
     """The tangent of the last ``evaluation``, assembled by `update`. Collective.
 
     A : matrix of all displacements
-    product : multiplies as ``A`` does, quicker in space
+    of_contact : the matrix of the contact where that is ``beside`` A, not in it; else None
+    product : multiplies as the tangent does, quicker in space
     condensed : where ``revise`` is given (see `Condensed`), for elastic bodies which their
         supports hold: the contact, which ``A`` lacks then; else None
     factorisations : number of factorisations of sparse matrices that `update` asked for
     """
 
-    def __init__(self, evaluation: Evaluation, timer: Timer, revise: Revise | None) -> None:
+    def __init__(
+        self,
+        evaluation: Evaluation,
+        timer: Timer,
+        revise: Revise | None = None,
+        *,
+        beside: bool = False,
+    ) -> None:
         unknowns = evaluation.unknowns
         index_map = unknowns.V.dofmap.index_map
         self.V = unknowns.V
@@ -71,6 +79,7 @@ class TangentMatrix:
         self._bcs = [self._held(axis) for axis in range(self.dimension)]
         self._prescribed, self._rates = self._prescribed_rates()
         self.A = PETSc.Mat()
+        self.of_contact: PETSc.Mat | None = None
         self.product = PETSc.Mat()
         # the constant part, with room for all; in space none of elastic joints, as it is large
         self._elastic = PETSc.Mat()
@@ -78,7 +87,18 @@ class TangentMatrix:
         if revise is not None:
             with timer(BEFORE_SOLVING):
                 self.condensed = self._condense(revise)
+        self._both: BlockProduct | None = None
+        if beside:
+            self.A = self._allocated(self.bulk.elastic_forms)
+            self.A.assemble()
+            self._keep_elastic()
+            self._both = BlockProduct(self.A)
+            self.product = self._both.matrix()
         self.renew()
+
+    def terms(self) -> list[PETSc.Mat]:
+        """The matrices whose sum is the tangent."""
+        return [self.A] if self.of_contact is None else [self.A, self.of_contact]
 
     def _held(self, axis: int) -> fem.DirichletBC:
         """The prescribed displacements along an ``axis``."""
@@ -103,47 +123,59 @@ class TangentMatrix:
         return np.concatenate(dofs), np.concatenate(rates)
 
     def _condense(self, revise: Revise) -> Condensed:
-        self.A = self._allocated()
+        self.A = self._allocated(self.bulk.elastic_forms)
         self.A.assemble()
         self.A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
         nodes = [surface.curve_dofs for surface in self.contact.surfaces]
         in_contact = np.unique(np.concatenate(nodes))
         return Condensed(self.A, in_contact, self.dimension, revise)
 
-    def _allocated(self, *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
-        """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this
-        rank."""
-        A = matrix(self.V, self.bulk.elastic_forms, *slots)
-        assemble(A, self.bulk.elastic_forms, self._bcs)
+    def _allocated(self, forms: list[fem.Form], *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
+        """The matrix of bilinear ``forms``, with room for block ``slots`` in rows of this rank."""
+        A = matrix(self.V, forms, *slots)
+        assemble(A, forms, self._bcs)
         return A
 
     def renew(self) -> None:
-        """Allocate every slot that bulk and contact may fill; in a condensed matrix, slots of
-        contact alone."""
+        """Allocate every slot that the contact may fill, in the matrix of the bulk or beside it; in
+        a condensed matrix, slots of contact alone."""
         tangent = self.contact.tangent
         nothing: Array = np.zeros((0, self.dimension, self.dimension))
-        self._of_contact = Filled(np.zeros(0, dtype=np.int64), nothing)
+        self._filled = Filled(np.zeros(0, dtype=np.int64), nothing)
         self._slots = self._slots_of(tangent.rows, tangent.columns)
         if self.condensed is not None:
             inside = self._slots.in_matrix
             self.condensed.occupy(tangent.rows[inside], tangent.columns[inside])
             return
-        if self.A:
-            # its entries go now: solvers keep the matrix itself until they get the next one
-            self.A.setPreallocationNNZ(0)
-        self.A.destroy()
+        if self._both is not None:
+            self.of_contact = self._renewed(self.of_contact, [])
+            self._both.replace(*self.terms())
+            return
         self._elastic.destroy()
+        self.A = self._renewed(self.A, self.bulk.elastic_forms)
+        self._keep_elastic()
+        self.product = quick_product(self.A)
+
+    def _renewed(self, A: PETSc.Mat | None, forms: list[fem.Form]) -> PETSc.Mat:
+        """In the place of ``A`` a matrix of the bilinear ``forms``, with room for the contact."""
+        if A:
+            # its entries go now: solvers keep the matrix itself until they get the next one
+            A.setPreallocationNNZ(0)
+            A.destroy()
         rows, columns = self.contact.pattern()
-        self.A = self._allocated((rows, columns))
+        A = self._allocated(forms, (rows, columns))
         # zeros into every other slot: what is not written before the first assembly is given back
         zeros = np.zeros((len(rows), self.dimension, self.dimension))
-        add_blocks(self.A, rows, columns, zeros)
-        self.A.assemble()
-        self.A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+        add_blocks(A, rows, columns, zeros)
+        A.assemble()
+        A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+        return A
+
+    def _keep_elastic(self) -> None:
+        """Keep a copy of the constant part, where it changes."""
         changes = self.bulk.plastic or self.bulk.finite or self.springs
         if changes or self.dimension < _WITHOUT_COPY:
             self._elastic = self.A.copy()
-        self.product = quick_product(self.A)
 
     def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
         in_matrix = (rows < self._size) & (columns < self._size)
@@ -179,15 +211,20 @@ class TangentMatrix:
         with self.timer("assemble bulk"):
             if self._elastic:
                 self._elastic.copy(self.A, _SAME)
-            else:
-                at, values = self._of_contact
+            elif self.of_contact is None:
+                at, values = self._filled
                 self._add_contact(self.A, Filled(at, -values))
             if self.springs:
                 self.A.axpy(1.0, self.springs.of_free, _SUBSET)
             self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
-            self._of_contact = self.contact.tangent.filled()
-            self._add_contact(self.A, self._of_contact)
+            self._filled = self.contact.tangent.filled()
+            if self.of_contact is None:
+                self._add_contact(self.A, self._filled)
+                return
+            self.of_contact.zeroEntries()
+            self._add_contact(self.of_contact, self._filled)
+            self.A.stateIncrease()  # what solves with it has to be set up again
 
     def _update_condensed(self, condensed: Condensed) -> None:
         self.factorisations = 1
@@ -206,7 +243,7 @@ class TangentMatrix:
             change.setType("aij")
             change.setUp()
             self._add_contact(change, changes)
-        return Sum(self.product, change).matrix(), [self._of_contact, changes]
+        return Sum(self.product, change).matrix(), [self._filled, changes]
 
     def border(self, of_contact: list[Filled] | None = None) -> tuple[Array, Array, Array]:
         """The border of the matrix, of the ``m`` unknown levels: derivatives ``B`` ``(n_owned dofs,
@@ -217,7 +254,7 @@ class TangentMatrix:
         of B and C is the same where its tangent is symmetric, as of all materials without recovery
         of back stresses.
         """
-        parts = of_contact or [self._of_contact]
+        parts = of_contact or [self._filled]
         at = np.concatenate([part.at for part in parts])
         blocks = np.concatenate([part.values for part in parts])
         tangent = self.contact.tangent

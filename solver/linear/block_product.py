@@ -1,7 +1,7 @@
-"""The product of a block matrix and a vector, without the blocks that are zero.
+"""The product of a sum of block matrices and a vector, without the blocks that are zero.
 
-In space a large part of the matrix is room for contact, most of it empty at any moment: PETSc
-would read and multiply it in every iteration of GMRES.
+In space the contact has a matrix of its own. A part of it is room that is empty at any moment:
+PETSc would read and multiply it in every iteration of GMRES.
 """
 
 from __future__ import annotations
@@ -49,35 +49,52 @@ class _Part:
         library(_SOURCE).add_products(self._n, *map(pointer, arrays))
 
 
-class BlockProduct:
-    """Python context of a matrix that multiplies as ``A`` does, a matrix in space, whatever its
-    values are by then. Collective."""
+class _Term:
+    """A ``matrix`` in space as a term of the product. Collective."""
 
-    def __init__(self, A: PETSc.Mat) -> None:
-        self._A = A
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        self.matrix = matrix
         self._state = -1  # of the matrix whose blocks are known
         self._parts: list[_Part] = []  # in the rank's own columns, and in those of ghosts
-        self._exchange, self._ghosts = ghost_exchange(A, blocks_of(A)[2])
-
-    def matrix(self) -> PETSc.Mat:
-        """The matrix."""
-        found = PETSc.Mat().createPython(self._A.getSizes(), context=self, comm=self._A.comm)
-        found.setUp()
-        return found
+        self._exchange, self._ghosts = ghost_exchange(matrix, blocks_of(matrix)[2])
 
     def _update(self) -> None:
         """Find the blocks of the matrix as it is now."""
-        self._parts = [_Part(blocks) for blocks in blocks_of(self._A)[:2]]
-        self._state = self._A.stateGet()
+        self._parts = [_Part(blocks) for blocks in blocks_of(self.matrix)[:2]]
+        self._state = self.matrix.stateGet()
 
-    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """``y = A x``, called by PETSc."""
-        if self._A.stateGet() != self._state:
+    def add(self, x: PETSc.Vec, product: Array) -> None:
+        """Add the matrix times ``x`` to the ``product`` of this rank's rows."""
+        if self.matrix.stateGet() != self._state:
             self._update()
         own, others = self._parts
-        product = np.zeros(y.getLocalSize())
         self._exchange.begin(x, self._ghosts)
         own.add(x.array_r, product)
         self._exchange.end(x, self._ghosts)
         others.add(self._ghosts.array_r, product)
+
+
+class BlockProduct:
+    """Python context of a matrix that multiplies as the sum of ``matrices`` in space does, whatever
+    their values are by then. Collective."""
+
+    def __init__(self, *matrices: PETSc.Mat) -> None:
+        self.replace(*matrices)
+
+    def replace(self, *matrices: PETSc.Mat) -> None:
+        """Multiply as the sum of these ``matrices``, whose patterns may be other ones."""
+        self._terms = [_Term(A) for A in matrices]
+
+    def matrix(self) -> PETSc.Mat:
+        """The matrix."""
+        A = self._terms[0].matrix
+        found = PETSc.Mat().createPython(A.getSizes(), context=self, comm=A.comm)
+        found.setUp()
+        return found
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y`` is the sum times ``x``, called by PETSc."""
+        product = np.zeros(y.getLocalSize())
+        for term in self._terms:
+            term.add(x, product)
         y.array[:] = product

@@ -16,9 +16,19 @@ typedef struct {
     float *inverse; /* (n d d) of the diagonal blocks, by columns */
 } BlockRows;
 
-/* Fill A from blocks in double precision, but those that are zero: in the rank's own columns, and in others (ghosts). */
-void pack_blocks(BlockRows *A, const int32_t *offsets, const int32_t *columns, const double *values,
-                 const int32_t *other_offsets, const int32_t *other_columns, const double *other_values);
+/* Blocks of a matrix in double precision, and another matrix that is added to it: in the rank's own columns, and in columns
+ * of ghosts, of which its first one is the column first_ghost of the rows. */
+typedef struct BlockTerm {
+    const struct BlockTerm *before; /* NULL without */
+    int32_t first_ghost;
+    const int32_t *offsets, *columns; /* (n + 1), (k) */
+    const double *values;             /* (k d d) each by columns */
+    const int32_t *ghost_offsets, *ghost_columns;
+    const double *ghost_values;
+} BlockTerm;
+
+/* Fill A with the blocks of the terms, but those that are zero. */
+void pack_blocks(BlockRows *A, const BlockTerm *last);
 
 /* Smooth A x = b from x = 0 by a forward and a backward sweep; residual is what is left without the ghosts' part. work (n d). */
 void smooth_from_zero(const BlockRows *A, const double *b, float *x, float *work, double *residual);

@@ -8,8 +8,11 @@ by then. Ranks smooth their own nodes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import cffi
 import numpy as np
 from petsc4py import PETSc
 
@@ -21,40 +24,59 @@ _SOURCE = Path(__file__).with_suffix(".c")
 
 
 class BlockSmoother:
-    """Smooths systems of the matrix ``A`` with ``d`` displacements a node, as it is when `update`
-    is called. Collective.
+    """Smooths systems of a sum of block ``matrices`` with ``d`` displacements a node, as they are
+    when `update` is called. Collective.
 
-    ghosts : (m,) nodes of other ranks that this rank's rows refer to
+    ghosts : (m,) nodes of other ranks that this rank's rows refer to, those of each matrix
     x : (n + m, d) the solution, of this rank's nodes and of the ghosts
     """
 
-    def __init__(self, A: PETSc.Mat) -> None:
-        self.matrix = A
-        self._d = A.getBlockSize()
-        self._n = A.getLocalSize()[0] // self._d
+    def __init__(self, *matrices: PETSc.Mat) -> None:
+        self._matrices = matrices
+        self._comm = matrices[0].comm
+        self._d = matrices[0].getBlockSize()
+        self._n = matrices[0].getLocalSize()[0] // self._d
         self.ghosts: np.ndarray = np.zeros(0, dtype=np.int32)
         self.x: np.ndarray = np.zeros((0, self._d), dtype=np.float32)
         self._n_blocks = -1
 
-    def update(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
-        """Take the values of the matrix, in the rank's ``own`` columns and those of ``ghosts``."""
-        n_blocks = len(own.columns) + len(others.columns)
+    def update(self) -> None:
+        """Take the values of the matrices."""
+        terms = [blocks_of(A) for A in self._matrices]
+        n_blocks = sum(len(own.columns) + len(others.columns) for own, others, _ in terms)
         if n_blocks != self._n_blocks:
-            self._allocate(own, others, ghosts)
+            self._allocate(terms)
             self._n_blocks = n_blocks
-        arrays = [pointer(array) for part in (own, others) for array in part]
-        library(_SOURCE).pack_blocks(self._rows, *arrays)
+        chain: list[Any] = []  # each refers to the one before
+        first_ghost = self._n
+        for own, others, ghosts in terms:
+            members = {
+                "before": chain[-1] if chain else cffi.FFI.NULL,
+                "first_ghost": first_ghost,
+                "offsets": own.offsets,
+                "columns": own.columns,
+                "values": own.values,
+                "ghost_offsets": others.offsets,
+                "ghost_columns": others.columns,
+                "ghost_values": others.values,
+            }
+            chain.append(structure(_SOURCE, "BlockTerm", members))
+            first_ghost += len(ghosts)
+        library(_SOURCE).pack_blocks(self._rows, chain[-1])
 
-    def _allocate(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
+    def _allocate(self, terms: Sequence[tuple[Blocks, Blocks, np.ndarray]]) -> None:
         d = self._d
         n = self._n
-        self.ghosts = ghosts
+        self.ghosts = np.concatenate([ghosts for _, _, ghosts in terms])
         self.x = np.zeros((n + len(self.ghosts), d), dtype=np.float32)
         self._work = np.zeros((n, d), dtype=np.float32)
-        row = np.repeat(np.arange(n, dtype=np.int32), np.diff(own.offsets))
-        n_lower = int((own.columns < row).sum())
-        n_upper = int((own.columns > row).sum())
-        self._parts = [self._part(k) for k in (n_lower, n_upper, len(others.columns))]
+        sizes = np.zeros(3, dtype=int)  # of the parts left and right of the diagonal, and of ghosts
+        for own, others, _ in terms:
+            row = np.repeat(np.arange(n, dtype=np.int32), np.diff(own.offsets))
+            is_lower = own.columns < row
+            is_upper = own.columns > row
+            sizes += [is_lower.sum(), is_upper.sum(), len(others.columns)]
+        self._parts = [self._part(int(k)) for k in sizes]
         lower, upper, beyond = (structure(_SOURCE, "BlockPart", part) for part in self._parts)
         self._members = {
             "n": n,
@@ -66,8 +88,9 @@ class BlockSmoother:
             "inverse": np.zeros(n * d**2 + 1, dtype=np.float32),
         }
         self._rows = structure(_SOURCE, "BlockRows", self._members)
-        self._whole = self.matrix.createVecRight()
-        self._exchange, self._ghosted = ghost_exchange(self.matrix, ghosts)
+        first = self._matrices[0]
+        self._whole = first.createVecRight()
+        self._exchange, self._ghosted = ghost_exchange(first, self.ghosts)
 
     def _part(self, k: int) -> dict[str, np.ndarray]:
         """Room for ``k`` blocks."""
@@ -87,14 +110,14 @@ class BlockSmoother:
         residual = np.empty_like(b)
         arrays = np.ascontiguousarray(b), self.x, self._work, residual
         library(_SOURCE).smooth_from_zero(self._rows, *map(pointer, arrays))
-        if self.matrix.comm.size > 1:
+        if self._comm.size > 1:
             self._take_ghosts(self.own.ravel())
             library(_SOURCE).subtract_ghosts(self._rows, pointer(self.x), pointer(residual))
         return residual
 
     def again(self, b: Array, correction: Array) -> Array:
         """Smooth on after a ``correction`` ``(n d,)`` of the solution; returns the solution."""
-        if self.matrix.comm.size > 1:
+        if self._comm.size > 1:
             self._take_ghosts(self.own.ravel() + correction)
         arrays = np.ascontiguousarray(b), np.ascontiguousarray(correction), self.x, self._work
         library(_SOURCE).smooth(self._rows, *map(pointer, arrays))
@@ -111,13 +134,16 @@ class Sweeps:
     ``A``, as it is when `update` is called. Collective."""
 
     def __init__(self, A: PETSc.Mat, many: int) -> None:
-        self._A = A
         self._many = many
+        self.replace(A)
+
+    def replace(self, A: PETSc.Mat) -> None:
+        """Smooth systems of another matrix."""
         self._smoother = BlockSmoother(A)
 
     def update(self) -> None:
         """Take the values of the matrix."""
-        self._smoother.update(*blocks_of(self._A))
+        self._smoother.update()
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x`` is nearly the solution for ``b``, called by PETSc."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,16 @@ class Choice:
         """Whether the strategy ``name`` is used."""
         return self.why_not[name] is None
 
-    def factoriser(self, V: fem.FunctionSpace, fixed: np.ndarray, A: PETSc.Mat) -> Strategy:
-        """The strategy that solves with ``A``, of the displacements ``V``, of which some are
-        ``fixed`` ``(n_local, d)``. Collective."""
+    def factoriser(
+        self, V: fem.FunctionSpace, fixed: np.ndarray, terms: Sequence[PETSc.Mat]
+    ) -> Strategy:
+        """The strategy that solves with the sum of ``terms``, which only multigrid takes more than
+        one of, of the displacements ``V``, of which some are ``fixed`` ``(n_local, d)``.
+        Collective."""
         if self.uses("multigrid"):
             accuracy = {"tolerance": multigrid.ACCURATE} if self.uses("bordered") else {}
-            return multigrid.Multigrid(A, V, fixed, **accuracy)
+            return multigrid.Multigrid(terms, V, fixed, **accuracy)
+        [A] = terms
         if self.uses("substructured"):
             parts = substructured.substructures(A, V)
             if not isinstance(parts, str):

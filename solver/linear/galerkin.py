@@ -6,6 +6,7 @@ matrix itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.kernels.blocks import Blocks, add_blocks
+from archord.kernels.blocks import Blocks, add_blocks, blocks_of
 from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_suffix(".c")
@@ -29,15 +30,17 @@ class _Weights(NamedTuple):
 
 
 class Galerkin:
-    """The ``matrix`` of the product with the interpolation ``P``, of a matrix whose rows refer to
-    the nodes ``ghosts`` ``(m,)`` of other ranks. Collective."""
+    """The ``matrix`` of the product with the interpolation ``P``, of a sum of ``terms``.
+    Collective."""
 
-    def __init__(self, P: PETSc.Mat, ghosts: np.ndarray) -> None:
+    def __init__(self, P: PETSc.Mat, terms: Sequence[PETSc.Mat]) -> None:
         self._d = P.getBlockSizes()[0]
         self._P = P
+        self._terms = terms
         own = self._by_nodes(P)
-        elsewhere = self._by_nodes(self._rows_of(ghosts))
-        self._nodes = np.unique(np.concatenate([own.coarse, elsewhere.coarse]))
+        ghosts = [blocks_of(A)[2] for A in terms]
+        elsewhere = [self._by_nodes(self._rows_of(of_term)) for of_term in ghosts]
+        self._nodes = np.unique(np.concatenate([part.coarse for part in (own, *elsewhere)]))
         coarse = np.searchsorted(self._nodes, own.coarse)
         order = np.argsort(coarse, kind="stable")
         self._left = {
@@ -47,8 +50,11 @@ class Galerkin:
             "row": own.fine[order].astype(np.int32),
             "row_weight": own.weight[order],
         }
-        n = P.getLocalSize()[0] // self._d
-        self._right = self._columns(own, n), self._columns(elsewhere, len(ghosts))
+        self._right = self._columns(own, P.getLocalSize()[0] // self._d)
+        self._right_of_ghosts = [
+            self._columns(weights, len(of_term))
+            for weights, of_term in zip(elsewhere, ghosts, strict=True)
+        ]
         size = P.getLocalSize()[1], None
         self.matrix = PETSc.Mat().create(P.comm)
         self.matrix.setSizes((size, size), bsize=self._d)
@@ -84,14 +90,16 @@ class Galerkin:
             "weight": weights.weight,
         }
 
-    def update(self, own: Blocks, others: Blocks) -> None:
-        """Take the values of a matrix, in the rank's ``own`` columns and in ``others``."""
+    def update(self) -> None:
+        """Take the values of the terms."""
         is_first = not self.matrix.isAssembled()
         if not is_first:
             self.matrix.zeroEntries()
-        for A, right in zip((own, others), self._right, strict=True):
-            rows, columns, blocks = self._product(A, right, is_first)
-            add_blocks(self.matrix, self._nodes[rows], self._nodes[columns], blocks)
+        for term, right_of_ghosts in zip(self._terms, self._right_of_ghosts, strict=True):
+            own, others, _ = blocks_of(term)
+            for A, right in ((own, self._right), (others, right_of_ghosts)):
+                rows, columns, blocks = self._product(A, right, is_first)
+                add_blocks(self.matrix, self._nodes[rows], self._nodes[columns], blocks)
         self.matrix.assemble()
 
     def _product(

@@ -13,7 +13,7 @@ but for the linear displacement at the same node. So the product has unit rows t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import basix.ufl
@@ -22,7 +22,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, lagrange_element
-from archord.kernels.blocks import Blocks, blocks_of, without_zeros
+from archord.kernels.blocks import without_zeros
 from archord.materials.kinematics import kinematics
 from archord.solver.linear.block_product import quick_product
 from archord.solver.linear.block_smoother import BlockSmoother, Sweeps
@@ -56,9 +56,9 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Multigrid(Strategy):
-    """Python context of the preconditioner of ``A``, a matrix of the displacements ``V``, of which
-    those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix; it solves to the
-    ``tolerance``. Collective.
+    """Python context of the preconditioner of a sum of ``terms``, matrices of the displacements
+    ``V``, of which those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix; it
+    solves to the ``tolerance``. Linear displacements have one term. Collective.
 
     interpolation : matrix that takes linear displacements to the own ones; None where those are
         linear
@@ -67,9 +67,14 @@ class Multigrid(Strategy):
     """
 
     def __init__(
-        self, A: PETSc.Mat, V: fem.FunctionSpace, fixed: np.ndarray, tolerance: float = LOOSEST
+        self,
+        terms: Sequence[PETSc.Mat],
+        V: fem.FunctionSpace,
+        fixed: np.ndarray,
+        tolerance: float = LOOSEST,
     ) -> None:
-        self.matrix = A
+        self.matrix = A = terms[0]
+        self._terms = terms
         self._tolerance = tolerance
         self.interpolation: PETSc.Mat | None = None
         self.linear = A
@@ -83,9 +88,15 @@ class Multigrid(Strategy):
         self._product: Galerkin | None = None
         self._diagonal: Array = np.zeros(1)  # of `linear` when the levels below were made
         self._below = PETSc.PC().create(A.comm)
-        self._smoother = BlockSmoother(A)
+        self._smoother = BlockSmoother(*terms)
         self._right_side = 0.0
         self._is_ready = False
+
+    def renew(self, terms: Sequence[PETSc.Mat]) -> None:
+        """Solve with ``terms`` of other patterns from the next update on, in space."""
+        self._terms = terms
+        self._smoother = BlockSmoother(*terms)
+        self._product = None
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` iterate."""
@@ -109,7 +120,7 @@ class Multigrid(Strategy):
     def setUp(self, pc: PETSc.PC) -> None:
         """Make the levels of the matrix as it is now, called by PETSc."""
         if self.interpolation is not None:
-            self._update(*blocks_of(self.matrix))
+            self._update(self.interpolation)
         if not self._is_ready:
             self._sweeps = Sweeps(self.linear, _SWEEPS)
             self._product_of_linear = quick_product(self.linear)
@@ -140,16 +151,19 @@ class Multigrid(Strategy):
         smoothers = [self._below.getMGSmoother(level) for level in levels]
         return [smoother.getOperators()[0].getSize()[0] for smoother in reversed(smoothers)]
 
-    def _update(self, own: Blocks, others: Blocks, ghosts: np.ndarray) -> None:
+    def _update(self, interpolation: PETSc.Mat) -> None:
         """Take the values of the matrix to the smoother and to the level below."""
-        assert self.interpolation is not None
+        is_other = self._product is None
         if self._product is None:
-            self._product = Galerkin(self.interpolation, ghosts)
+            self._product = Galerkin(interpolation, self._terms)
             self.linear = self._product.matrix
-            self._residual = self.interpolation.createVecLeft()
+            self._residual = interpolation.createVecLeft()
             self._correction = self._residual.duplicate()
-        self._product.update(own, others)
-        self._smoother.update(own, others, ghosts)
+        self._product.update()
+        self._smoother.update()
+        if is_other and self._is_ready:
+            self._sweeps.replace(self.linear)
+            self._product_of_linear.getPythonContext().replace(self.linear)
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """One cycle, called by PETSc."""

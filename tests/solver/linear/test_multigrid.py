@@ -58,7 +58,7 @@ def elastic_cube(n, cell=CellType.tetrahedron, degree=2, comm=MPI.COMM_WORLD, sk
 
 def solver(A, V, fixed, rtol=1e-8):
     ksp = PETSc.KSP().create(A.comm)
-    Multigrid(A, V, fixed).attach(ksp)
+    Multigrid([A], V, fixed).attach(ksp)
     ksp.setTolerances(rtol=rtol)
     return ksp
 
