@@ -206,7 +206,7 @@ class Surface:
         normal = _normal(tangents)
         length = np.linalg.norm(normal, axis=-1)
         self.outward = normal / length[..., None]
-        self.shape = np.ascontiguousarray(basis.shape)
+        self.shape = basis.shape.copy()  # of an array that has the derivatives, too
         self.point = basis.point
         if cell_nodes(self.V.mesh).shape[1] > self.shape.shape[-1]:
             self.point = self.shape @ self._nodes[self.cell_dofs]  # on the curve

@@ -218,13 +218,15 @@ class TangentMatrix:
                 self.A.axpy(1.0, self.springs.of_free, _SUBSET)
             self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
-            self._filled = self.contact.tangent.filled()
+            filled = self.contact.tangent.filled()
             if self.of_contact is None:
-                self._add_contact(self.A, self._filled)
-                return
-            self.of_contact.zeroEntries()
-            self._add_contact(self.of_contact, self._filled)
-            self.A.stateIncrease()  # what solves with it has to be set up again
+                self._add_contact(self.A, filled)
+            else:
+                self.of_contact.zeroEntries()
+                self._add_contact(self.of_contact, filled)
+                self.A.stateIncrease()  # what solves with it has to be set up again
+            if self.of_contact is None or len(self.drives.unknown):
+                self._filled = filled  # to be subtracted, or for the border
 
     def _update_condensed(self, condensed: Condensed) -> None:
         self.factorisations = 1
@@ -234,8 +236,8 @@ class TangentMatrix:
             condensed.update(blocks[inside] * self._slots.is_free[inside])
 
     def revised(self) -> tuple[PETSc.Mat, list[Filled]]:
-        """``A`` for the branches that contact points are on now, valid until the next `update`; and
-        what the contact fills, in parts."""
+        """The tangent for the branches that contact points are on now, valid until the next
+        `update`; and what the contact fills, in parts, for the `border`."""
         with self.timer("assemble contact"):
             changes = self.contact.tangent.filled(by_changes=True)
             change = PETSc.Mat().create(self.A.comm)

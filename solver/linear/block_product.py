@@ -50,28 +50,20 @@ class _Part:
 
 
 class _Term:
-    """A ``matrix`` in space as a term of the product. Collective."""
+    """A ``matrix`` in space as a term of the product."""
 
     def __init__(self, matrix: PETSc.Mat) -> None:
         self.matrix = matrix
         self._state = -1  # of the matrix whose blocks are known
-        self._parts: list[_Part] = []  # in the rank's own columns, and in those of ghosts
-        self._exchange, self._ghosts = ghost_exchange(matrix, blocks_of(matrix)[2])
+        self._parts: list[_Part] = []
 
-    def _update(self) -> None:
-        """Find the blocks of the matrix as it is now."""
-        self._parts = [_Part(blocks) for blocks in blocks_of(self.matrix)[:2]]
-        self._state = self.matrix.stateGet()
-
-    def add(self, x: PETSc.Vec, product: Array) -> None:
-        """Add the matrix times ``x`` to the ``product`` of this rank's rows."""
+    def parts(self) -> list[_Part]:
+        """The blocks of the matrix as it is now: in the rank's own columns, and in those of
+        ghosts."""
         if self.matrix.stateGet() != self._state:
-            self._update()
-        own, others = self._parts
-        self._exchange.begin(x, self._ghosts)
-        own.add(x.array_r, product)
-        self._exchange.end(x, self._ghosts)
-        others.add(self._ghosts.array_r, product)
+            self._parts = [_Part(blocks) for blocks in blocks_of(self.matrix)[:2]]
+            self._state = self.matrix.stateGet()
+        return self._parts
 
 
 class BlockProduct:
@@ -84,6 +76,9 @@ class BlockProduct:
     def replace(self, *matrices: PETSc.Mat) -> None:
         """Multiply as the sum of these ``matrices``, whose patterns may be other ones."""
         self._terms = [_Term(A) for A in matrices]
+        ghosts = [blocks_of(A)[2] for A in matrices]
+        self._exchange, self._ghosts = ghost_exchange(matrices[0], np.concatenate(ghosts))
+        self._ends = _COMPONENTS * np.cumsum([len(of_term) for of_term in ghosts])
 
     def matrix(self) -> PETSc.Mat:
         """The matrix."""
@@ -94,7 +89,13 @@ class BlockProduct:
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y`` is the sum times ``x``, called by PETSc."""
+        parts = [term.parts() for term in self._terms]
         product = np.zeros(y.getLocalSize())
-        for term in self._terms:
-            term.add(x, product)
+        self._exchange.begin(x, self._ghosts)
+        for own, _ in parts:
+            own.add(x.array_r, product)
+        self._exchange.end(x, self._ghosts)
+        of_ghosts = np.split(self._ghosts.array_r, self._ends[:-1])
+        for (_, others), values in zip(parts, of_ghosts, strict=True):
+            others.add(values, product)
         y.array[:] = product

@@ -1,4 +1,4 @@
-"""A tangent with the contact beside the matrix of the bulk is the same as with the contact in it."""
+"""A tangent with the contact beside the matrix of the bulk is the one with the contact in it."""
 
 import numpy as np
 import pytest
