@@ -13,7 +13,7 @@ from archord.solver.equilibrium.evaluation import Evaluation
 from archord.solver.equilibrium.tangent import TangentMatrix
 from archord.solver.linear.bordered import Border, Bordered
 from archord.solver.linear.choose import choose
-from archord.solver.linear.multigrid import Multigrid
+from archord.solver.linear.multigrid import Multigrid, takes_a_sum
 from archord.solver.linear.strategy import Facts, Strategy
 
 
@@ -37,6 +37,7 @@ class LinearSystem:
         if while_elastic.uses("condensed"):
             self.choice = while_elastic
         self.tangent = self._tangent()
+        self._multigrid: Multigrid | None = None  # the last one that was made
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
             if self.unknowns.n_levels:
@@ -66,10 +67,8 @@ class LinearSystem:
 
     def _tangent(self) -> TangentMatrix:
         condense = self._revise_condensed if self.choice.uses("condensed") else None
-        degree = self.unknowns.V.element.basix_element.degree
-        in_space = self.unknowns.dimension == 3
-        beside = self.choice.uses("multigrid") and in_space and degree > 1
-        return TangentMatrix(self.evaluation, self.timer, condense, beside=beside)
+        takes_sums = self.choice.uses("multigrid") and takes_a_sum(self.unknowns.V)
+        return TangentMatrix(self.evaluation, self.timer, condense, beside=takes_sums)
 
     def _strategy(self) -> Strategy:
         if self.border:
@@ -102,7 +101,7 @@ class LinearSystem:
         if not self.evaluation.pattern_grew:
             return False
         self.tangent.renew()
-        if self.tangent.of_contact is not None:
+        if self.tangent.of_contact is not None and self._multigrid is not None:
             self._multigrid.renew(self.tangent.terms())
             return True
         self.renew_factorisation()

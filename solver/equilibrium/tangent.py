@@ -22,7 +22,6 @@ from archord.solver.linear.condensed import Condensed
 from archord.solver.linear.strategy import Sum
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
-_WITHOUT_COPY = 3  # dimension from which on elastic joints have no copy of their matrix
 _SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
 Revise = Callable[[Array], Array | None]
 
@@ -81,8 +80,7 @@ class TangentMatrix:
         self.A = PETSc.Mat()
         self.of_contact: PETSc.Mat | None = None
         self.product = PETSc.Mat()
-        # the constant part, with room for all; in space none of elastic joints, as it is large
-        self._elastic = PETSc.Mat()
+        self._elastic = PETSc.Mat()  # the constant part, where the matrix has more
         self.condensed: Condensed | None = None
         if revise is not None:
             with timer(BEFORE_SOLVING):
@@ -91,8 +89,8 @@ class TangentMatrix:
         if beside:
             self.A = self._allocated(self.bulk.elastic_forms)
             self.A.assemble()
-            self._keep_elastic()
             self._both = BlockProduct(self.A)
+            self._keep_elastic()
             self.product = self._both.matrix()
         self.renew()
 
@@ -172,17 +170,21 @@ class TangentMatrix:
         return A
 
     def _keep_elastic(self) -> None:
-        """Keep a copy of the constant part, where it changes."""
-        changes = self.bulk.plastic or self.bulk.finite or self.springs
-        if changes or self.dimension < _WITHOUT_COPY:
+        """Keep a copy of the constant part, where the matrix has more."""
+        if self._both is None or self.bulk.plastic or self.bulk.finite or self.springs:
             self._elastic = self.A.copy()
 
     def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
         in_matrix = (rows < self._size) & (columns < self._size)
-        row_is_free, row_rate = self._at(rows)
-        column_is_free, column_rate = self._at(columns)
-        is_free = row_is_free[:, :, None] * column_is_free[:, None, :]
-        return _Slots(in_matrix, is_free, row_rate, column_rate)
+        is_met = np.zeros(1 + max(rows.max(initial=0), columns.max(initial=0)), dtype=bool)
+        is_met[rows] = True
+        is_met[columns] = True
+        node_is_free, rate = self._at(np.flatnonzero(is_met))
+        place = np.cumsum(is_met) - 1
+        row = place[rows]
+        column = place[columns]
+        is_free = node_is_free[row][:, :, None] * node_is_free[column][:, None, :]
+        return _Slots(in_matrix, is_free, rate[row], rate[column])
 
     def _at(self, nodes: np.ndarray) -> tuple[np.ndarray, Array]:
         """Which displacements of block dofs ``nodes`` ``(k,)`` are free ``(k, d)``; the others'
@@ -211,9 +213,6 @@ class TangentMatrix:
         with self.timer("assemble bulk"):
             if self._elastic:
                 self._elastic.copy(self.A, _SAME)
-            elif self.of_contact is None:
-                at, values = self._filled
-                self._add_contact(self.A, Filled(at, -values))
             if self.springs:
                 self.A.axpy(1.0, self.springs.of_free, _SUBSET)
             self.bulk.assemble_correction(self.A, self._bcs)
@@ -225,8 +224,8 @@ class TangentMatrix:
                 self.of_contact.zeroEntries()
                 self._add_contact(self.of_contact, filled)
                 self.A.stateIncrease()  # what solves with it has to be set up again
-            if self.of_contact is None or len(self.drives.unknown):
-                self._filled = filled  # to be subtracted, or for the border
+            if len(self.drives.unknown):
+                self._filled = filled  # for the border
 
     def _update_condensed(self, condensed: Condensed) -> None:
         self.factorisations = 1

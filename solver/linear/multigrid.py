@@ -55,10 +55,16 @@ def why_not(facts: Facts) -> str | None:
     return None
 
 
+def takes_a_sum(V: fem.FunctionSpace) -> bool:
+    """Whether `Multigrid` takes more than one term, in space: linear displacements are no level
+    below others."""
+    return V.dofmap.bs == 3 and V.element.basix_element.degree > 1
+
+
 class Multigrid(Strategy):
     """Python context of the preconditioner of a sum of ``terms``, matrices of the displacements
     ``V``, of which those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix; it
-    solves to the ``tolerance``. Linear displacements have one term. Collective.
+    solves to the ``tolerance``. Collective.
 
     interpolation : matrix that takes linear displacements to the own ones; None where those are
         linear
