@@ -195,11 +195,13 @@ class TangentMatrix:
         return is_free, np.where(is_free[..., None], 0.0, self._rates[at])
 
     def _add_contact(self, A: PETSc.Mat, of_contact: Filled) -> None:
-        """Add what the contact fills to ``A``."""
+        """Add what the contact fills to ``A``. Its values are large, and change in place."""
         tangent = self.contact.tangent
-        inside = self._slots.in_matrix[of_contact.at]
-        at = of_contact.at[inside]
-        values = of_contact.values[inside]
+        at, values = of_contact
+        inside = self._slots.in_matrix[at]
+        if not inside.all():
+            at = at[inside]
+            values = values[inside]
         values *= self._slots.is_free[at]
         add_blocks(A, tangent.rows[at], tangent.columns[at], values)
         A.assemble()
@@ -218,14 +220,19 @@ class TangentMatrix:
             self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
             filled = self.contact.tangent.filled()
+            self._filled = self._for_border(filled)
             if self.of_contact is None:
                 self._add_contact(self.A, filled)
-            else:
-                self.of_contact.zeroEntries()
-                self._add_contact(self.of_contact, filled)
-                self.A.stateIncrease()  # what solves with it has to be set up again
-            if len(self.drives.unknown):
-                self._filled = filled  # for the border
+                return
+            self.of_contact.zeroEntries()
+            self._add_contact(self.of_contact, filled)
+            self.A.stateIncrease()  # what solves with it has to be set up again
+
+    def _for_border(self, filled: Filled) -> Filled:
+        """What the `border` needs of what the contact has ``filled``: without unknown levels
+        nothing."""
+        n = len(filled.at) if len(self.drives.unknown) else 0
+        return Filled(filled.at[:n], filled.values[:n].copy())
 
     def _update_condensed(self, condensed: Condensed) -> None:
         self.factorisations = 1
@@ -239,12 +246,13 @@ class TangentMatrix:
         `update`; and what the contact fills, in parts, for the `border`."""
         with self.timer("assemble contact"):
             changes = self.contact.tangent.filled(by_changes=True)
+            parts = [self._filled, self._for_border(changes)]
             change = PETSc.Mat().create(self.A.comm)
             change.setSizes(self.A.getSizes(), bsize=self.dimension)
             change.setType("aij")
             change.setUp()
             self._add_contact(change, changes)
-        return Sum(self.product, change).matrix(), [self._filled, changes]
+        return Sum(self.product, change).matrix(), parts
 
     def border(self, of_contact: list[Filled] | None = None) -> tuple[Array, Array, Array]:
         """The border of the matrix, of the ``m`` unknown levels: derivatives ``B`` ``(n_owned dofs,
