@@ -87,7 +87,7 @@ static void linearise(const Side *s, int32_t i, int with_opening, Rates *d)
         }
 }
 
-void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, double *values)
+void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, const int32_t *number, double *values)
 {
     const int32_t a = s->a, k = s->k, o = s->o, columns = a + o, rows = k + o;
     for (int32_t i = 0; i < s->n * s->q; i++) {
@@ -116,7 +116,7 @@ void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, 
             double slid[D]; /* what the force on the row changes as its partner moves along the facet */
             for (int l = X; l <= Y; l++) slid[l] = slope * (pressure * n[l] + shear * unit[l]);
             for (int c = 0; c < columns; c++) {
-                double *block = values + D * D * (int64_t)slot[r * columns + c];
+                double *block = values + D * D * (int64_t)number[slot[r * columns + c]];
                 for (int l = X; l <= Y; l++)
                     for (int j = X; j <= Y; j++) block[D * l + j] += v * force[c][l][j] - slid[l] * d.xi[c][j];
             }

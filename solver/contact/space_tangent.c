@@ -195,7 +195,7 @@ static void add_point(const Side *s, int64_t i, double *blocks)
     }
 }
 
-void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, double *values)
+void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, const int32_t *number, double *values)
 {
     static _Thread_local double blocks[ROWS * COLUMNS * D * D];
     const int32_t size = (s->k + s->o) * (s->a + s->o), m = s->n * s->q;
@@ -209,7 +209,7 @@ void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, 
             add_point(s, i, blocks);
         }
         for (int32_t b = 0; n_active && b < size; b++)
-            for (int n = 0; n < D * D; n++) values[D * D * (int64_t)slot[b] + n] += blocks[D * D * b + n];
+            for (int n = 0; n < D * D; n++) values[D * D * (int64_t)number[slot[b]] + n] += blocks[D * D * b + n];
     }
 }
 

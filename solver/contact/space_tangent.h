@@ -33,8 +33,8 @@ typedef struct {
 
 /* Add the derivative of the residual to values. Nodes are counted: own cell's (columns) or own facet's (rows) first, then
  * the opposite's. slots (pairs, k + o, a + o) are the places of the blocks of a facet and an opposite facet, place (n q)
- * the pairs that the points belong to. */
-void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, double *values);
+ * the pairs that the points belong to, and number has for each place where in values its block is. */
+void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, const int32_t *number, double *values);
 
 /* What displacements of the own cells' nodes (n, a, 3) and of the opposite's nodes at each point (n q, o, 3) add to the
  * trial tractions and to gap and slips, (n q, 3) each. */

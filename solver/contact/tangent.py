@@ -53,10 +53,10 @@ class ContactTangent:
     def blocks(self) -> Array:
         """Derivative ``(n, d, d)`` of the residual at the last evaluation."""
         values = np.zeros((len(self.rows), self._block_size, self._block_size))
+        every = np.arange(len(self.rows), dtype=np.int32)
         for reach, keys, slots in zip(self._reaches, self._keys, self._slots, strict=True):
             place = np.searchsorted(keys, reach.point_keys()).astype(np.int32)
-            side = _side(reach.pair, reach.pair.answers())
-            self._kernels.contact_tangent(side, *map(pointer, (place, slots, values)))
+            self._add(reach.pair, reach.pair.answers(), place, slots, every, values)
         return values
 
     def filled(self, *, by_changes: bool = False) -> Filled:
@@ -66,21 +66,23 @@ class ContactTangent:
         met = []
         for reach, keys, slots in zip(self._reaches, self._keys, self._slots, strict=True):
             answers = reach.pair.changes_of_answers() if by_changes else reach.pair.answers()
-            place = np.searchsorted(keys, reach.point_keys())
-            used = np.unique(place[answers.active])
-            slots_of_used = slots.reshape(len(keys), -1)[used] if len(used) else slots[:0]
-            is_filled[slots_of_used] = True
             # points that carry nothing may have any place
-            place = np.searchsorted(used, place).clip(max=max(len(used) - 1, 0)).astype(np.int32)
-            met.append((reach.pair, answers, place, slots_of_used))
+            place = np.searchsorted(keys, reach.point_keys()).astype(np.int32)
+            used = np.unique(place[answers.active])
+            if len(used):
+                is_filled[slots.reshape(len(keys), -1)[used]] = True
+            met.append((reach.pair, answers, place, slots))
         at = np.flatnonzero(is_filled)
         number = np.zeros(len(self.rows), dtype=np.int32)
         number[at] = np.arange(len(at))
         values = np.zeros((len(at), self._block_size, self._block_size))
         for pair, answers, place, slots in met:
-            side = _side(pair, answers)
-            self._kernels.contact_tangent(side, *map(pointer, (place, number[slots], values)))
+            self._add(pair, answers, place, slots, number, values)
         return Filled(at, values)
+
+    def _add(self, pair: Pair, answers: Answers, *arrays: np.ndarray) -> None:
+        """Add the derivative at the points of a ``pair``: see the kernel for the ``arrays``."""
+        self._kernels.contact_tangent(_side(pair, answers), *map(pointer, arrays))
 
 
 def _numbered(
