@@ -43,7 +43,7 @@ class LinearSystem:
             if self.unknowns.n_levels:
                 stiffness = self.unknowns.drives.stiffness
                 n = self.unknowns.n_levels
-                product = self.tangent.product
+                product = self.tangent.product  # of matrices that the solver knows
                 self.border = Bordered(product, n, stiffness, lambda _: self._solver())
             self.strategy = self._strategy()
 

@@ -16,12 +16,12 @@ from archord.kernels.blocks import Blocks, blocks_of, ghost_exchange
 from archord.kernels.compiled import library, pointer
 
 _SOURCE = Path(__file__).with_suffix(".c")
-_COMPONENTS = 3  # of a displacement; in a plane hardly any room is empty
+COMPONENTS = 3  # of a displacement in space; in a plane hardly any room is empty
 
 
 def quick_product(A: PETSc.Mat) -> PETSc.Mat:
     """What multiplies as the block matrix ``A`` does: itself in a plane. Collective."""
-    return BlockProduct(A).matrix() if A.getBlockSize() == _COMPONENTS else A
+    return BlockProduct(A).matrix() if A.getBlockSize() == COMPONENTS else A
 
 
 class _Part:
@@ -78,7 +78,7 @@ class BlockProduct:
         self._terms = [_Term(A) for A in matrices]
         ghosts = [blocks_of(A)[2] for A in matrices]
         self._exchange, self._ghosts = ghost_exchange(matrices[0], np.concatenate(ghosts))
-        self._ends = _COMPONENTS * np.cumsum([len(of_term) for of_term in ghosts])
+        self._ends = COMPONENTS * np.cumsum([len(of_term) for of_term in ghosts])
 
     def matrix(self) -> PETSc.Mat:
         """The matrix."""

@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array, lagrange_element
 from archord.kernels.blocks import without_zeros
 from archord.materials.kinematics import kinematics
-from archord.solver.linear.block_product import quick_product
+from archord.solver.linear.block_product import COMPONENTS, quick_product
 from archord.solver.linear.block_smoother import BlockSmoother, Sweeps
 from archord.solver.linear.forcing import LOOSEST
 from archord.solver.linear.galerkin import Galerkin
@@ -56,9 +56,9 @@ def why_not(facts: Facts) -> str | None:
 
 
 def takes_a_sum(V: fem.FunctionSpace) -> bool:
-    """Whether `Multigrid` takes more than one term, in space: linear displacements are no level
-    below others."""
-    return V.dofmap.bs == 3 and V.element.basix_element.degree > 1
+    """Whether `Multigrid` takes more than one term: in space, unless displacements are linear,
+    whose only level is the matrix itself."""
+    return V.dofmap.bs == COMPONENTS and V.element.basix_element.degree > 1
 
 
 class Multigrid(Strategy):
@@ -79,7 +79,8 @@ class Multigrid(Strategy):
         fixed: np.ndarray,
         tolerance: float = LOOSEST,
     ) -> None:
-        self.matrix = A = terms[0]
+        A = terms[0]
+        self.matrix = A
         self._terms = terms
         self._tolerance = tolerance
         self.interpolation: PETSc.Mat | None = None
