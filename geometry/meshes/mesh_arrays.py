@@ -271,6 +271,8 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
             [parts] = of_type.values()
             nodes = np.concatenate(parts).reshape(-1, n_nodes)
         name = gmsh.model.getPhysicalName(dim, tag) or str(tag)
+        if name in groups:
+            raise ValueError(f"two physical groups of dimension {dim} are called {name!r}")
         groups[name] = _Group(tag, set(of_type), nodes)
     return groups
 

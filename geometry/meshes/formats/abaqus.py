@@ -151,13 +151,18 @@ class _Model:
 
     def _set(self, scope: Scope, kind: str, options: Options, rows: Rows) -> None:
         if "GENERATE" in options:
-            there = chain(self.nodes) if kind == "NSET" else chain(*self.elements.values())
+            there = self.nodes if kind == "NSET" else list(chain(*self.elements.values()))
             chosen = []
             for first, last, *step in rows:
                 a = scope.key(first)
                 b = scope.key(last)
+                if a > b:
+                    raise ValueError(f"a *{kind} is to generate {first} to {last}, backward")
                 every = max(int(*step), 1) if step else 1
                 chosen += [n for n in there if a <= n <= b and (n - a) % every == 0]
+        elif kind == "NSET" and "ELSET" in options:
+            of_elements = self._chosen(scope, "ELSET", [options["ELSET"]])
+            chosen = [node for key in of_elements for node in self._nodes_of(key)]
         else:
             chosen = self._chosen(scope, kind, chain(*rows))
         owner = Scope() if "INSTANCE" in options else scope
@@ -178,6 +183,9 @@ class _Model:
             elements = self._chosen(scope, "ELSET", [item])
             face = "".join(words).upper()
             self.surfaces[surface].append((elements, face))
+
+    def _nodes_of(self, element: int) -> list[int]:
+        return next((of[element] for of in self.elements.values() if element in of), [])
 
     def _add(self, scope: Scope, kind: str, name: str | None, keys: list[int]) -> None:
         if not name:

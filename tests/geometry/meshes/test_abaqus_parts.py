@@ -142,3 +142,17 @@ def test_what_contradicts_itself_is_refused(tmp_path, old, new, said):
     assert old in text
     with pytest.raises(ValueError, match=said):
         read(tmp_path, text.replace(old, new))
+
+
+def test_a_generated_set_has_all_of_its_rows(tmp_path):
+    rows = "*Nset, nset=ends, generate\n1, 1\n4, 4\n2, 3, 1\n"
+    mesh = read(tmp_path, PART.replace("*Solid", rows + "*Solid"))
+    assert ends(mesh, "ends") == [(0, 0), (0, 1), (2, 0), (2, 1)]
+    backward = rows.replace("2, 3, 1", "3, 2, 1")
+    with pytest.raises(ValueError, match="NSET is to generate 3 to 2, backward"):
+        read(tmp_path, PART.replace("*Solid", backward + "*Solid"))
+
+
+def test_a_node_set_of_an_element_set_has_its_nodes(tmp_path):
+    text = PART.replace("*Solid", "*Nset, nset=whole, elset=all\n*Solid")
+    assert ends(read(tmp_path, text), "whole") == [(0, 0), (0, 1), (2, 0), (2, 1)]

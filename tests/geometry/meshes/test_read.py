@@ -318,6 +318,15 @@ def test_lines_say_what_they_are(module, tmp_path, comm):
         read_mesh(tmp_path / "line.msh", comm)
 
 
+def test_two_groups_of_one_name_are_refused(module, comm):
+    draw(1)
+    groups = gmsh.model.getPhysicalGroups(2)
+    gmsh.model.addPhysicalGroup(2, gmsh.model.getEntitiesForPhysicalGroup(*groups[0]), 77)
+    gmsh.model.addPhysicalGroup(2, gmsh.model.getEntitiesForPhysicalGroup(*groups[-1]), name="77")
+    with pytest.raises(ValueError, match="two physical groups of dimension 2 are called '77'"):
+        read_mesh(gmsh, comm)
+
+
 def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
     (tmp_path / "mesh.stl").touch()
     for path, said in (
