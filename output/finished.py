@@ -6,9 +6,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from archord.output.files.seal import faults_of, sha256_of
+from archord.output.files.seal import faults_of
 from archord.output.history import fault_of_history, read_history
 from archord.scene.file import AnyScene, load_scene, resolved
+from archord.scene.mesh_digests import digests
 from archord.scene.problem import ProblemScene
 
 
@@ -31,16 +32,19 @@ def fault_of_mesh(scene: AnyScene, report: dict[str, Any]) -> str:
     """What happened to the mesh file of ``scene`` since the run with this ``report`` read it, in
     words; nothing where it is the same or gone, or nothing tells."""
     file = scene.mesh.file if isinstance(scene, ProblemScene) else None
-    read = report.get("mesh", {}).get("sha256")
-    if not file or not read:
+    mesh = report.get("mesh", {})
+    if not file or "sha256" not in mesh:
         return ""
+    read = {"": mesh["sha256"]} | mesh.get("beside", {})
     try:
-        is_same = sha256_of(Path(file)) == read
+        now = digests(Path(file))
     except OSError:
         return ""
-    if is_same:
+    changed = [name for name in read if name in now and now[name] != read[name]]
+    if not changed:
         return ""
-    return f"mesh {file} was changed after the run: its sha256 is not the one in run.json"
+    names = f" with {changed[0]}" * bool(changed[0])
+    return f"mesh {file}{names} was changed after the run: its sha256 is not the one in run.json"
 
 
 def history_fault(folder: Path, report: dict[str, Any]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from hashlib import sha256
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from archord.presets.problem import (
 from archord.presets.solid_measures import solid_measures
 from archord.report.timer import Timer
 from archord.scene.columns import supporting
+from archord.scene.mesh_digests import digests
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.analysis import friction_doubts
 from archord.solver.contact.laws.law import ContactLaw
@@ -162,9 +162,12 @@ def _facts(
     scene: ProblemScene, system: System, mirrors: Sequence[Mirror], file: str | None
 ) -> dict[str, Any]:
     """Sizes of the mesh, which is in a ``file``, if any, and what was made of the scene."""
-    source = {"file": scene.mesh.file} if scene.mesh.file else {}
+    source: dict[str, Any] = {"file": scene.mesh.file} if scene.mesh.file else {}
     if file:
-        source["sha256"] = sha256(Path(file).read_bytes()).hexdigest()
+        beside = digests(Path(file))
+        source["sha256"] = beside.pop("")
+        if beside:
+            source["beside"] = beside
     mesh = system.problem.mesh
     shares = {
         interface.interaction.name: [pair.share for pair in interface.pairs]

@@ -10,6 +10,7 @@ from archord.cli import run
 from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.stored import store_mesh
 from archord.output.restart import plan_restart
+from archord.scene.mesh_digests import digests
 from archord.studies.cases import read_sweep
 from tests.studies.parts import sweep, table
 
@@ -197,3 +198,39 @@ def test_a_case_of_a_changed_mesh_file_is_solved_again(tmp_path, capsys):
     store_block(mesh, 1.0)
     with pytest.raises(archord.InputError, match="was changed after the run"):
         plan_restart(case)
+
+
+DECK = """*INCLUDE, INPUT=nodes.txt
+*ELEMENT, TYPE=CPE4, ELSET=block
+1, 1, 2, 3, 4
+*SURFACE, NAME=block bottom
+1, S1
+*SURFACE, NAME=block top
+1, S3
+"""
+
+
+def test_a_case_whose_mesh_file_includes_a_changed_one_is_solved_again(tmp_path, capsys):
+    mesh = tmp_path / "block.inp"
+    mesh.write_text(DECK)
+    file = tmp_path / "block.sweep.toml"
+    file.write_text(BLOCK.format(mesh=mesh))
+    forces = []
+    for width in (1.0, 2.0):
+        nodes = f"1, 0, 0\n2, {width}, 0\n3, {width}, 1\n4, 0, 1\n"
+        (tmp_path / "nodes.txt").write_text(f"*NODE\n{nodes}")
+        assert sweep(file, "-o", tmp_path / "sweep", "-q") == 0
+        (row,) = table(tmp_path / "sweep" / "cases.csv")
+        forces.append(float(row["press force [N/mm]"]))
+    assert abs(forces[1]) > 1.5 * abs(forces[0])
+    assert "block.inp with nodes.txt was changed after the run" in capsys.readouterr().err
+
+
+def test_the_h5_of_an_xdmf_is_known(tmp_path):
+    mesh = tmp_path / "block.xdmf"
+    mesh.write_text('<DataItem Format="HDF">block.h5:/Mesh/geometry</DataItem>')
+    (tmp_path / "block.h5").write_bytes(b"1")
+    before = digests(mesh)
+    (tmp_path / "block.h5").write_bytes(b"23")
+    after = digests(mesh)
+    assert [name for name in after if after[name] != before[name]] == ["block.h5"]
