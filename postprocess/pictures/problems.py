@@ -124,10 +124,11 @@ def draw_field(
     """
     values, label, usual = field_values(run, fields, field)
     of_cells = len(values) == len(fields.cells)
-    in_cells = values if of_cells else values[fields.cells].mean(axis=1)
+    in_cells = values if of_cells else values[fields.cells]
     triangles = fields.triangles[shown]
     flat = triangles.reshape(-1, 3)
-    known = in_cells[ranged & np.isfinite(in_cells)]
+    known = in_cells[ranged]
+    known = known[np.isfinite(known)]
     said = _without_colours(known)
     if said:
         axes.tripcolor(*x.T, flat, facecolors=np.zeros(len(flat)), cmap=_plain())

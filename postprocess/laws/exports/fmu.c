@@ -171,7 +171,7 @@ static fmi2Status accept_step(Instance *joint) {
     for (i = 0; i < SETTABLE; i++)
         if (!isfinite(now->value[i])) return say(joint, fmi2Error, "an input is not a finite number");
     LAW(advance)(&now->memory, now->value[DELTA]);
-    outside = now->memory.outside;
+    outside = now->memory.outside || !LAW(in_range)(now->memory.deepest);
 #if WITH_ELEMENT
     LAW(advance_element)(&now->memory_in_plane, now->value[EX], now->value[EY]);
     outside = outside || now->memory_in_plane.outside;

@@ -88,6 +88,9 @@ static int along_a_line(void) {
     FINE(fmi2Reset(joint));
     FINE(fmi2GetReal(joint, out, 1, value));
     NEED(value[0] == 0.0);
+    start[3] = 2 * LAW(RANGE);
+    FINE(fmi2SetReal(joint, in, 4, start));
+    NEED(fmi2ExitInitializationMode(joint) == fmi2Warning);
     fmi2FreeInstance(joint);
     return 0;
 }
