@@ -12,6 +12,7 @@ multigrid where that solves.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -22,7 +23,7 @@ from archord.geometry.basis import Array
 from archord.solver.linear.strategy import Facts
 
 MOST_REVISIONS = 2  # of the points in one solve: more cost as much as the iterations they save
-_DIMENSION_WHERE_BODIES_YIELD = 3  # from which on it pays there without friction
+_DIMENSION_OF_ONE_UPDATE = 3  # while any point yields: from which on
 _TOLERANCE = 1e-3  # residual of a system over its right-hand side
 # preconditioned solves for one revision, with a factorisation or with multigrid: nearly
 # incompressible bodies need most
@@ -42,11 +43,17 @@ def why_not(facts: Facts) -> str | None:
     return None
 
 
-def rests_while_bodies_yield(facts: Facts) -> bool:
-    """Whether the active set waits for the next iteration while any point yields: without friction
-    in a plane an update would take as long as the iterations that it saves."""
-    in_plane = facts.dimension < _DIMENSION_WHERE_BODIES_YIELD
-    return facts.yields and not facts.friction and in_plane
+def iterations_while_bodies_yield(facts: Facts) -> float:
+    """After how many first iterations of a solve the active set is updated while any point yields.
+
+    In space the first update brings nearly all points to their branches, and the later ones take
+    more time than the iterations that they save. Without friction in a plane the first does, too.
+    """
+    if not facts.yields:
+        return math.inf
+    if facts.dimension >= _DIMENSION_OF_ONE_UPDATE:
+        return 1
+    return math.inf if facts.friction else 0
 
 
 def look_ahead(

@@ -18,7 +18,7 @@ from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.linear.forcing import AS_NEWTON, BELOW_NEWTON, forcing_term
 from archord.solver.linear.lagged import Lagged
-from archord.solver.linear.look_ahead import LookAhead, rests_while_bodies_yield
+from archord.solver.linear.look_ahead import LookAhead, iterations_while_bodies_yield
 from archord.solver.linear.strategy import krylov_iterations
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
@@ -94,7 +94,7 @@ class NewtonSolver:
         self._system = equilibrium.linear
         bulk = equilibrium.bulk
         self._has_linear_bulk = not (bulk.plastic or bulk.finite)
-        self._ahead_rests = rests_while_bodies_yield(self._system.facts)
+        self._updates_while_yielding = iterations_while_bodies_yield(self._system.facts)
         self._take_choice()
         for sums in _RANDOM_SUMS:
             PETSc.Options()[sums] = False
@@ -174,7 +174,8 @@ class NewtonSolver:
         self._result.krylov_iterations += krylov_iterations(ksp)
         if self._ahead is None or ksp.getConvergedReason() < 0 or self._is_singular():
             return
-        if self._ahead_rests and self.equilibrium.evaluation.yields():
+        rests = len(self._result.residuals) > self._updates_while_yielding
+        if rests and self.equilibrium.evaluation.yields():
             return
         tolerance = ksp.getTolerances()[0] if self._iterates else 0.0
         iterations = self._ahead.improve(b, x, self._strategy.matrix, tolerance)
