@@ -40,3 +40,18 @@ void strains(int32_t n, int32_t q, int32_t a, int32_t m, int32_t d, int32_t n_te
         }
     }
 }
+
+void add_forces(int32_t n, int32_t q, int32_t a, int32_t m, int32_t d, int32_t n_terms, int32_t k, const int32_t *terms,
+                const double *derivative, const int32_t *dofs, const double *stress, double *force)
+{
+    for (int64_t i = 0; i < (int64_t)n * q; i++) {
+        const int32_t *node = dofs + i / q * a;
+        const double *s = stress + i * k;
+        for (int t = 0; t < n_terms; t++) {
+            const int32_t *term = terms + 3 * t;
+            const double *g = derivative + i * a * m + term[1];
+            double *f = force + term[0];
+            for (int c = 0; c < a; c++) f[(int64_t)d * node[c]] += g[m * c] * s[term[2]];
+        }
+    }
+}

@@ -15,6 +15,13 @@ _SOURCE = Path(__file__).with_name("strain.c")
 _ON_AXIS = 1e-9  # radius over the largest one, below which a point lies on the axis
 
 
+def strain_terms(kinematics: Kinematics, *, large: bool = False) -> npt.NDArray[np.int32]:
+    """A component of the displacement, a derivative, and the component of the strain, or of the
+    gradient at ``large`` strain, that gets their product ``(t, 3)``."""
+    places = np.arange(len(kinematics.terms)) if large else kinematics.small.argmax(axis=0)
+    return np.column_stack([kinematics.terms, places]).astype(np.int32)
+
+
 class PointStrain:
     """The strain of ``n`` cells at ``q`` points each, or at ``large`` strain the displacement
     gradient: ``k`` components in the order of the ``kinematics``.
@@ -37,9 +44,7 @@ class PointStrain:
         self.dimension = kinematics.dimension
         self.dofs = np.ascontiguousarray(dofs)
         self.derivative = _derivative(kinematics, basis)
-        n_terms = len(kinematics.terms)
-        place = np.arange(n_terms) if large else kinematics.small.argmax(axis=0)
-        self.terms = np.column_stack([kinematics.terms, place]).astype(np.int32)
+        self.terms = strain_terms(kinematics, large=large)
 
     def __call__(self, u: Array) -> Array:
         """The strain ``(n, q, k)`` at the nodal displacements ``u`` ``(nodes, d)``."""
@@ -49,6 +54,14 @@ class PointStrain:
         arrays = self.terms, self.derivative, self.dofs, u, strain
         library(_SOURCE).strains(*sizes, *map(pointer, arrays))
         return strain
+
+    def add_forces(self, stress: Array, force: Array) -> None:
+        """Add to the forces ``(nodes, d)`` of all nodes what the stresses ``(n, q, k)``, times the
+        volumes of their points, do on the strain."""
+        n, q, a, m = self.derivative.shape
+        sizes = n, q, a, m, self.dimension, len(self.terms), self.k
+        arrays = self.terms, self.derivative, self.dofs, np.ascontiguousarray(stress), force
+        library(_SOURCE).add_forces(*sizes, *map(pointer, arrays))
 
     def matrix(self) -> Array:
         """``B`` ``(n, q, k, d a)``, which takes nodal displacements ``[ux0, uy0, ux1, ...]`` to the

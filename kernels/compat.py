@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import signal
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +16,7 @@ if find_spec("dolfinx_solver"):
 
 import dolfinx
 import numpy as np
+from dolfinx import fem
 from dolfinx.common import IndexMap
 from dolfinx.mesh import Geometry, Mesh
 from mpi4py import MPI
@@ -51,6 +53,8 @@ RESIDUAL_NOT_FINITE = _REASONS.get(
 )  # until PETSc 3.24
 _KINDS = hasattr(Geometry, "dofmaps")  # of cells; dolfinx from 0.11 on may have several in a mesh
 
+_ENTITY_MAPS = hasattr(dolfinx.mesh, "EntityMap")  # as objects, from 0.10 on
+
 # of Debian (gmsh needs it), of conda on Linux and macOS, and beside PyPI's dolfinx
 _FOLDERS = ("", f"{sys.prefix}/lib/", f"{Path(dolfinx.__file__).parents[1]}/dolfinx_solver/lib/")
 METIS = tuple(
@@ -75,6 +79,28 @@ def ghosted_vector(index_map: IndexMap, components: int) -> PETSc.Vec:
     sizes = components * index_map.size_local, components * index_map.size_global
     ghosts = index_map.ghosts.astype(PETSc.IntType)
     return PETSc.Vec().createGhost(ghosts, sizes, bsize=components, comm=index_map.comm)
+
+
+def cell_form(
+    V: fem.FunctionSpace,
+    kernel: int,
+    cells: np.ndarray,
+    functions: Sequence[fem.Function],
+    constants: Sequence[fem.Constant],
+) -> fem.Form:
+    """The bilinear form in ``V`` over ``cells`` of the C function at the address ``kernel``, of
+    ``functions`` and ``constants``."""
+    used = np.arange(len(functions), dtype=np.int8)
+    form = fem.form_cpp_class(np.float64)(
+        [V._cpp_object] * 2,
+        {fem.IntegralType.cell: [(0, kernel, cells.astype(np.int32), used)]},
+        [function._cpp_object for function in functions],
+        [constant._cpp_object for constant in constants],
+        False,
+        [] if _ENTITY_MAPS else {},
+        V.mesh._cpp_object,
+    )
+    return fem.Form(form)
 
 
 def versions() -> dict[str, str]:

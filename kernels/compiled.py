@@ -40,6 +40,12 @@ def library(source: Path, libraries: tuple[str, ...] = ()) -> Any:
     return _loaded(source, libraries)[1]
 
 
+def address(source: Path, name: str) -> int:
+    """Where the function of this ``name`` of the C file ``source`` lies. Raises `CompilerError`."""
+    ffi, functions = _loaded(source, ())
+    return int(ffi.cast("uintptr_t", getattr(functions, name)))
+
+
 def structure(source: Path, kind: str, members: Mapping[str, int | float | np.ndarray]) -> Any:
     """A pointer to a structure of the type ``kind``, declared in the header of ``source``, with
     numbers and pointers to arrays, which have to live as long as it is used. Raises

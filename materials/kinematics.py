@@ -171,7 +171,7 @@ class Kinematics:
 
     def measure(self, x: Any) -> Any:
         """What multiplies volumes, areas and lengths on the mesh at the positions ``x`` ``(...,
-        d)``, in numpy or UFL."""
+        d)``."""
         return 2 * math.pi * x[..., 0] if self.has_hoop else 1.0
 
     @property

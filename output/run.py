@@ -15,7 +15,6 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.quality import worst_cells
 from archord.kernels.interrupt import Interrupt, Interrupted
-from archord.kernels.stale_jit import without_stale_forms
 from archord.measures.account import Account
 from archord.measures.edge import EdgeProfile
 from archord.measures.energies import Work
@@ -103,7 +102,7 @@ def solve_scene(
         begun_by = comm.bcast(start.checkpoint.contact_points if start else None)
         if begun_by:
             stack.enter_context(points_by(begun_by))
-        account = without_stale_forms(lambda: account_of(scene, comm, timer, problem))
+        account = account_of(scene, comm, timer, problem)
         account.system.solver.newton.watch = on_iteration
         on_start(account.system)
         output = _Output(folder, account, begun, start, problem, own_fields)

@@ -3,7 +3,7 @@ dolfinx.
 
 Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies, and of all at
 large strain, carry history, a return map and a tangent that changes; without them nothing of it is
-compiled or stored.
+stored.
 """
 
 from __future__ import annotations
@@ -12,18 +12,19 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.cell_rules import CellRule, cell_rules
+from archord.geometry.strain import strain_terms
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.materials.material import Material, Points
 from archord.solver.assembly import assemble, matrix
 from archord.solver.body_points import BodyPoints, PointFields
 from archord.solver.distortion import DistortionMeter
-from archord.solver.point_forms import PointForms, integral, strain_of
+from archord.solver.point_forms import PointForms
+from archord.solver.stiffness import CellStiffness
 
 Index = npt.NDArray[np.integer]
 _NONE = np.zeros(0, dtype=np.int32)
@@ -102,12 +103,10 @@ class Bulk:
         """The stiffness of a body's elastic tangent in the cells that have the ``rule``."""
         material = self.materials[tag]
         _check_elastic_tangent(material, self.kinematics)
-        moduli = fem.Constant(self.V.mesh, np.array(material.elastic_tangent))
-        u = strain_of(self.V, self.kinematics, ufl.TrialFunction(self.V))
-        v = strain_of(self.V, self.kinematics, ufl.TestFunction(self.V))
-        work = ufl.inner(ufl.dot(moduli, u), v)
-        cells = rule.among(self.cells[tag])
-        return fem.form(integral(self.V, self.kinematics, work, cells, rule.degree))
+        terms = strain_terms(self.kinematics)
+        moduli = material.elastic_tangent
+        form = CellStiffness(self.V, self.kinematics, rule.degree, terms, moduli)
+        return form.over(rule.among(self.cells[tag]))
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
         """Cells ``(n,)`` of this rank and their ``n q`` points, of the bodies that are not linear:
@@ -131,8 +130,9 @@ class Bulk:
             self.stiffness.multAdd(u, force, force)
         if self._forms:
             with force.localForm() as local:
+                of_nodes = local.array.reshape(-1, self.kinematics.dimension)
                 for forms in self._forms:
-                    forms.add_force(local)
+                    forms.add_force(of_nodes)
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -85,14 +85,14 @@ class Turn:
 class DeadLoad:
     """A dead load on the cells or the facets of a set, times the value of the ``drive``.
 
-    ``force`` is the force over all symmetric parts of the problem. It is spread as ``density(x)``,
-    a UFL expression of the position, or evenly without one. ``pressure`` acts on facets, along the
+    ``force`` is the force over all symmetric parts of the problem. It is spread as ``density(x)``
+    of positions ``x`` ``(d, ...)``, or evenly without one. ``pressure`` acts on facets, along the
     undeformed normal into the body.
     """
 
     cells: str = ""
     force: Vector = (0.0, 0.0)
-    density: Callable[[Any], Any] | None = None
+    density: Callable[[Array], Array] | None = None
     facets: str = ""
     pressure: float = 0.0
     drive: str = ""

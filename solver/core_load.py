@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import basix
 import numpy as np
-import ufl
 
-from archord.geometry.basis import cell_basis
+from archord.geometry.basis import Array, cell_basis
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.solver.loads import LOAD_DEGREE
 
 _FEWEST = 6  # integration points in a core: half the points of a triangle
 
 
-def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]:
+def core_density(centre: Sequence[float], radius: float) -> Callable[[Array], Array]:
     """Density of a force, as `DeadLoad` takes it: a paraboloid within a circle."""
-    middle = ufl.as_vector(list(centre))
-    return lambda x: ufl.max_value(1 - ufl.dot(x - middle, x - middle) / radius**2, 0)
+
+    def density(x: Array) -> Array:
+        squares = sum((at - middle) ** 2 for at, middle in zip(x, centre, strict=True))
+        return np.maximum(1 - squares / radius**2, 0)
+
+    return density
 
 
 def require_core(

@@ -5,21 +5,49 @@ Around an axis they are integrals over the whole ring.
 
 from __future__ import annotations
 
-from itertools import combinations_with_replacement
+from dataclasses import dataclass
 from typing import Any
 
+import basix
 import numpy as np
-import ufl
 from dolfinx import fem
 from dolfinx.la import InsertMode
-from dolfinx.mesh import meshtags
+from mpi4py import MPI
 
-from archord.geometry.basis import Array
+from archord.geometry.basis import Array, cell_basis
 from archord.solver.conditions import DeadLoad, Mean
+from archord.solver.contact.facets import boundary_facets, facet_kind, facet_normals
 from archord.solver.problem import Problem
 
 LOAD_DEGREE = 6  # of the quadrature of distributed forces
 _OUT_OF_PLANE = 2  # the axis about which a plane turns
+
+
+@dataclass(frozen=True)
+class Region:
+    """The ``q`` integration points of ``n`` cells or facets of a set, whose cells this rank owns.
+
+    - ``nodes`` ``(n, a)``: of the cells
+    - ``shape`` ``(n, q, a)``: the basis of the displacements
+    - ``point`` ``(n, q, d)``: coordinates
+    - ``normal`` ``(n, q, d)``: outward, of unit length, of facets
+    - ``drawn`` ``(n, q)``: area or length in a plane, volume or area in space
+    - ``weight`` ``(n, q)``: the same, around an axis of the whole ring
+    - ``comm``: the ranks
+    """
+
+    nodes: np.ndarray
+    shape: Array
+    point: Array
+    normal: Array
+    drawn: Array
+    weight: Array
+    comm: MPI.Comm
+
+    def integral(self, values: Array | float = 1.0) -> Any:
+        """The integral of ``values`` ``(n, q, ...)`` over all ranks. Collective."""
+        values = np.broadcast_to(values, (*self.weight.shape, *np.shape(values)[2:]))
+        return self.comm.allreduce(np.einsum("nq,nq...->...", self.weight, values))
 
 
 class Loads:
@@ -31,98 +59,92 @@ class Loads:
         self.kinematics = problem.kinematics
         self.V = V
 
-    def measure(self, cells: str = "", facets: str = "") -> Any:
-        """The measure of a set of cells, or of facets, as drawn."""
-        mesh = self.V.mesh
-        sets = self.problem.mesh
-        named = sets.cells_in(cells) if cells else sets.facets_in(facets)
-        entities = np.unique(named).astype(np.int32)
-        dimension = mesh.topology.dim if cells else mesh.topology.dim - 1
-        tags = meshtags(mesh, dimension, entities, 1)
-        rule = {"quadrature_degree": LOAD_DEGREE}
-        kind = "dx" if cells else "ds"
-        measure = ufl.Measure(kind, mesh, subdomain_data=tags, metadata=rule)(1)
-        if not self._size(measure):
+    def region(self, cells: str = "", facets: str = "") -> Region:
+        """A set of cells, or of facets that bound a body. Raises ValueError where there are none
+        of these."""
+        found = self._of_facets(facets) if facets else self._of_cells(cells)
+        if not found.integral():
             raise ValueError(
                 f"the facet set {facets!r} is not on the boundary of a body: nothing can load it"
             )
-        return measure
+        return found
 
-    def swept(self, integrand: Any) -> Any:
-        """The ``integrand``, in UFL, times what areas and lengths stand for: around an axis for a
-        ring."""
-        return integrand * self.kinematics.measure(ufl.SpatialCoordinate(self.V.mesh))
+    def cells_of(self, name: str) -> np.ndarray:
+        """The cells ``(n,)`` of a set that this rank owns."""
+        topology = self.V.mesh.topology
+        cells = np.unique(self.problem.mesh.cells_in(name))
+        return cells[cells < topology.index_map(topology.dim).size_local]
 
-    def _size(self, measure: Any) -> float:
-        """The area, or the length, of what is measured."""
-        one = fem.Constant(self.V.mesh, 1.0)
-        return self.integral(self.swept(one) * measure)
+    def _of_cells(self, name: str) -> Region:
+        cells = self.cells_of(name)
+        X, w = basix.make_quadrature(self.V.mesh.basix_cell(), LOAD_DEGREE)
+        X = np.broadcast_to(X, (len(cells), *X.shape))
+        return self._at(cells, X, w, None)
 
-    def integral(self, form: Any) -> float:
-        """The ``form`` without arguments, over all ranks."""
-        return self._sum(fem.form(form))
+    def _of_facets(self, name: str) -> Region:
+        facets = np.unique(self.problem.mesh.facets_in(name))
+        found = boundary_facets(self.V, facets)
+        found = found.reordered(np.flatnonzero(~found.within))
+        xi, w = basix.make_quadrature(facet_kind(self.V.mesh.basix_cell()), LOAD_DEGREE)
+        return self._at(found.cells, found.origin[:, None] + xi @ found.axes, w, found.axes)
 
-    def _sum(self, compiled: fem.Form) -> float:
-        """The same of a ``compiled`` form, with what its constants are now."""
-        return self.V.mesh.comm.allreduce(fem.assemble_scalar(compiled))
+    def _at(self, cells: np.ndarray, X: Array, w: Array, axes: Array | None) -> Region:
+        """Points ``X`` ``(n, q, d)`` of ``cells`` with weights ``w`` ``(q,)``, of facets along
+        their ``axes`` ``(n, d - 1, d)``."""
+        mesh = self.V.mesh
+        basis = cell_basis(mesh, self.V.element.basix_element.degree, cells, X)
+        normal: Array = np.zeros_like(basis.point)
+        if axes is None:
+            drawn = basis.measure * w
+        else:
+            normal = facet_normals(basis.jacobian, axes)
+            size = np.linalg.norm(normal, axis=-1)
+            normal /= size[..., None]
+            drawn = size * w
+        weight = drawn * self.kinematics.measure(basis.point)
+        nodes = self.V.dofmap.list[cells]
+        return Region(nodes, basis.shape, basis.point, normal, drawn, weight, mesh.comm)
 
-    def _first_moments(self, x: Any, ds: Any) -> Array:
-        """Integrals ``(d,)`` of the components of ``x``."""
-        d = self.kinematics.dimension
-        along = fem.Constant(self.V.mesh, np.zeros(d))
-        moment = fem.form(ufl.inner(along, x) * ds)
-        moments = np.zeros(d)
-        for i in range(d):
-            along.value = np.eye(d)[i]
-            moments[i] = self._sum(moment)
-        return moments
-
-    def _vector(self, form: Any) -> Array:
-        """The linear ``form`` at the nodes ``(n_owned, d)``."""
-        vector = fem.assemble_vector(fem.form(form))
-        vector.scatter_reverse(InsertMode.add)
-        d = self.kinematics.dimension
+    def _spread(self, on: Region, density: Array) -> Array:
+        """The forces ``(n_owned, d)`` of a ``density`` ``(n, q, d)`` per area or volume."""
+        of_cells = np.einsum("nq,nqa,nqi->nai", on.weight, on.shape, density)
+        force = fem.Function(self.V).x
+        np.add.at(force.array.reshape(-1, density.shape[-1]), on.nodes, of_cells)
+        force.scatter_reverse(InsertMode.add)
         n_owned = self.V.dofmap.index_map.size_local
-        return vector.array[: d * n_owned].reshape(-1, d)
+        return force.array.reshape(-1, density.shape[-1])[:n_owned].copy()
 
     def forces(self, load: DeadLoad) -> Array:
         """Forces ``(n_owned, d)`` on the modelled part per unit of the drive."""
-        mesh = self.V.mesh
-        v = ufl.TestFunction(self.V)
-        measure = self.measure(load.cells, load.facets)
+        on = self.region(load.cells, load.facets)
         if load.pressure:
-            along_normal = ufl.inner(ufl.FacetNormal(mesh), v)
-            pressure = fem.Constant(mesh, load.pressure)
-            return self._vector(-pressure * self.swept(along_normal) * measure)
-        force = fem.Constant(mesh, np.array(load.force))
-        density = fem.Constant(mesh, 1.0)
+            return self._spread(on, -load.pressure * on.normal)
+        density: Array = np.ones(on.weight.shape)
         if load.density is not None:
-            density = load.density(ufl.SpatialCoordinate(mesh))
-        total = self.integral(self.swept(density) * measure)
-        forces = self._vector(self.swept(density) * ufl.inner(force, v) * measure)
+            density = load.density(np.moveaxis(on.point, -1, 0))
+        total = on.integral(density)
+        forces = self._spread(on, density[..., None] * np.array(load.force))
         return forces / (self.problem.whole * total)
 
     def mean_motion(self, mean: Mean) -> Array:
         """Derivative ``(n_owned, d)`` of the mean motion by the displacements of the nodes. Raises
         ValueError for a rotation of a ring."""
-        mesh = self.V.mesh
         d = self.kinematics.dimension
         turns = self.kinematics.turns
-        v = ufl.TestFunction(self.V)
-        ds = self.measure(facets=mean.facets)
-        length = self._size(ds)
+        on = self.region(facets=mean.facets)
+        length = on.integral()
+        axes = np.eye(d + len(turns))
         if not turns:
             if mean.axis >= d:
                 raise ValueError(f"the mean {mean.name!r} is a rotation, which no ring has")
-            return self._vector(self.swept(v[mean.axis]) * ds) / length
-        x = ufl.SpatialCoordinate(mesh)
-        centre = self._first_moments(x, ds) / length
+            return self._spread(on, np.broadcast_to(axes[mean.axis], on.point.shape)) / length
+        centre = on.integral(on.point) / length
         for axis, at in mean.mirrors:
             centre[axis] = at
-        arm = x - fem.Constant(mesh, centre)
+        arm = on.point - centre
         lever = np.zeros(d) if mean.point is None else np.array(mean.point) - centre
-        inertia = self._inertia(arm, ds)
-        along = np.eye(d + len(turns))[mean.axis, :d]
+        inertia = self._inertia(arm, on)
+        along = axes[mean.axis, :d]
         about = np.arange(len(turns)) if len(turns) > 1 else np.array([_OUT_OF_PLANE])
         for axis, _ in mean.mirrors:
             along[axis] = 0.0
@@ -131,29 +153,19 @@ class Loads:
         by_rotations = self._by_rotations(mean.axis, lever, inertia)
         for axis, _ in mean.mirrors:
             by_rotations[about != axis] = 0.0
-        density = ufl.inner(fem.Constant(mesh, along / length), v)
+        density = np.tile(along / length, (*arm.shape[:2], 1))
         for rotation, (i, j) in zip(by_rotations, turns, strict=True):
-            moment = arm[i] * v[j] - arm[j] * v[i]
-            density += fem.Constant(mesh, rotation) * moment
-        return self._vector(density * ds)
+            density[..., j] += rotation * arm[..., i]
+            density[..., i] -= rotation * arm[..., j]
+        return self._spread(on, density)
 
-    def _inertia(self, arm: Any, ds: Any) -> Array:
+    def _inertia(self, arm: Array, on: Region) -> Array:
         """Moments of inertia ``(t, t)`` of facets for the turns, by the arms to their centroid."""
-        turns = self.kinematics.turns
-        if len(turns) == 1:
-            return np.array([[self.integral(ufl.inner(arm, arm) * ds)]])
-        d = self.kinematics.dimension
-        one = fem.Constant(self.V.mesh, np.zeros(d))
-        other = fem.Constant(self.V.mesh, np.zeros(d))
-        moment = fem.form(ufl.inner(one, arm) * ufl.inner(other, arm) * ds)
-        second = np.zeros((d, d))
-        axes = np.eye(d)
-        for i, j in combinations_with_replacement(range(d), 2):
-            one.value = axes[i]
-            other.value = axes[j]
-            second[i, j] = second[j, i] = self._sum(moment)
-        polar = float(np.trace(second))
-        return polar * axes - second
+        second = on.integral(arm[..., :, None] * arm[..., None, :])
+        polar = np.trace(second)
+        if len(self.kinematics.turns) == 1:
+            return np.array([[polar]])
+        return polar * np.eye(len(second)) - second
 
     def _by_rotations(self, axis: int, lever: Array, inertia: Array) -> Array:
         """What a motion along or about an ``axis`` has of the moments ``(t,)``: of the mean

@@ -73,6 +73,16 @@ def boundary_facets(V: fem.FunctionSpace, facets: np.ndarray) -> BoundaryFacets:
     return BoundaryFacets(cells, number, trace, origin, axes, within)
 
 
+def facet_normals(jacobian: Array, axes: Array) -> Array:
+    """Outward normals ``(n, q, d)`` of facets along ``axes`` ``(n, d - 1, d)`` in cells with the
+    ``jacobian`` ``(n, q, d, d)``: as long as the first axis is in the mesh, or in space as large as
+    the area that both span."""
+    tangents = np.einsum("nqij,ntj->tnqi", jacobian, axes)
+    if len(tangents) == 1:
+        return np.stack([tangents[0, ..., 1], -tangents[0, ..., 0]], axis=-1)
+    return np.cross(tangents[0], tangents[1])
+
+
 def _given_number(mesh: Mesh) -> np.ndarray:
     """The numbers of this rank's cells in the mesh as it was given; of a submesh, which does not
     know them, in the mesh on all ranks."""

@@ -26,6 +26,7 @@ from archord.solver.contact.facets import (
     BoundaryFacets,
     boundary_facets,
     facet_kind,
+    facet_normals,
     refuse_all_but_a_boundary,
     refuse_branches,
 )
@@ -201,9 +202,7 @@ class Surface:
         on_facet = xi[self.piece].reshape(*w.shape, self._axes.shape[1])
         X = self._origin[:, None] + on_facet @ self._axes
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
-        axes = self._axes.swapaxes(0, 1)
-        tangents = [np.einsum("nqij,nj->nqi", basis.jacobian, axis) for axis in axes]
-        normal = _normal(tangents)
+        normal = facet_normals(basis.jacobian, self._axes)
         length = np.linalg.norm(normal, axis=-1)
         self.outward = normal / length[..., None]
         self.shape = basis.shape.copy()  # of an array that has the derivatives, too
@@ -321,15 +320,6 @@ def _facet_rule(kind: basix.CellType) -> tuple[Array, Array]:
     if kind == basix.CellType.triangle:
         degree -= 1
     return basix.make_quadrature(kind, degree)
-
-
-def _normal(tangents: list[Array]) -> Array:
-    """Outward normals ``(..., d)`` of the length of the one of the ``tangents``, or in space of the
-    area that both span."""
-    if len(tangents) == 1:
-        tangent = tangents[0]
-        return np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1)
-    return np.cross(tangents[0], tangents[1])
 
 
 class RigidSurface:

@@ -13,7 +13,6 @@ shear modulus: springs are weak for all that carries.
 from __future__ import annotations
 
 import numpy as np
-import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
@@ -22,7 +21,9 @@ from archord.solver.assembly import assemble, matrix
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.drives import Drives
 from archord.solver.equilibrium.rigid_motions import RigidMotions
+from archord.solver.loads import LOAD_DEGREE
 from archord.solver.problem import Body
+from archord.solver.stiffness import CellStiffness, value_terms
 
 WEAK = 1e-8  # without influence, but well above the round-off of a factorisation
 _STIFFER = 100.0  # most of M over the smallest shear modulus
@@ -155,11 +156,13 @@ class Springs:
 
 def _form(drives: Drives, body: Body, softest: float) -> fem.Form:
     """The bilinear form of the springs of a ``body``."""
-    V = drives.V
-    dx = drives.loads.measure(body.cells or body.name)
-    area = drives.loads.integral(fem.Constant(V.mesh, 1.0) * dx)
+    d = drives.dimension
+    name = body.cells or body.name
+    area = drives.comm.allreduce(drives.loads.region(name).drawn.sum())
     own = float(body.material.elastic_tangent[0, 0])
-    length = np.cbrt(area) if drives.dimension == 3 else 1.0
-    modulus = fem.Constant(V.mesh, WEAK * spring_modulus(own, softest) * length / area)
-    product = ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V))
-    return fem.form(modulus * drives.loads.swept(product) * dx)
+    length = np.cbrt(area) if d == 3 else 1.0
+    modulus = WEAK * spring_modulus(own, softest) * length / area
+    springs = CellStiffness(
+        drives.V, drives.problem.kinematics, LOAD_DEGREE, value_terms(d), modulus * np.eye(d)
+    )
+    return springs.over(drives.loads.cells_of(name))

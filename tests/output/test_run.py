@@ -1,8 +1,6 @@
 """What a run leaves on disk."""
 
 import json
-import os
-import time
 from pathlib import Path
 
 import h5py
@@ -12,7 +10,6 @@ import pytest
 from mpi4py import MPI
 
 from archord import cli
-from archord.kernels.stale_jit import without_stale_forms
 from archord.output.folder import APART, CHECKPOINT, FILES, PICTURE, claim_folder
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
@@ -327,31 +324,6 @@ def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
     assert said == [True, True, False, False]
     assert error[0] > 0.1
     assert error[2] < 0.01
-
-
-def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path):
-    """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's
-    work any more. Another error is raised."""
-    half = tmp_path / "libffcx_forms_0.c"
-    tried = []
-    half.touch()
-
-    def make():
-        tried.append(half.exists())
-        if half.exists():
-            raise TimeoutError(
-                f"JIT compilation timed out, probably ... (e.g. remove {half}) or increase timeout."
-            )
-        return "made"
-
-    with pytest.raises(TimeoutError, match="timed out"):
-        without_stale_forms(make)
-    assert tried == [True, True, True]
-    os.utime(half, (time.time() - 1000,) * 2)
-    assert without_stale_forms(make) == "made"
-    assert tried == [True, True, True, True, False]
-    with pytest.raises(TimeoutError, match="another"):
-        without_stale_forms(lambda: exec('raise TimeoutError("another")'))
 
 
 def test_memory_is_known_where_there_is_no_proc(monkeypatch):
