@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -261,10 +262,19 @@ def read_abaqus(path: Path) -> MeshArrays:
             facet_sets[name].append(nodes[places][:, faces[face]])
     boundary, _ = outer_sides(kind, cells)
     made = boundary >= len(node)  # in the middle of faces, where the file has no node
+    notes = []
     for name, keys in model.sets["NSET"].items():
-        if name in facet_sets or name in model.internal:
+        if name in model.internal:
             continue
         of_set = _places(node, sorted(set(keys)), f"node of the set {name!r}")
+        if name in facet_sets:
+            of_surface = np.concatenate(facet_sets[name])
+            beside = np.setdiff1d(np.intersect1d(of_set, nodes[:, : n_corners(kind)]), of_surface)
+            if len(beside) or not np.isin(of_surface, of_set).all():
+                notes.append(
+                    f"{name!r} is a surface and a node set of other nodes: the surface is taken"
+                )
+            continue
         within = boundary[(np.isin(boundary, of_set) | made).all(axis=1)]
         if len(within):
             facet_sets[name].append(within[:, :corners])
@@ -272,7 +282,8 @@ def read_abaqus(path: Path) -> MeshArrays:
         if len(rest):
             point_sets[name] = rest
     facets = {name: np.concatenate(of_parts) for name, of_parts in facet_sets.items()}
-    return MeshArrays.of_sets(kind, x, cells, cell_sets, facets, point_sets)
+    mesh = MeshArrays.of_sets(kind, x, cells, cell_sets, facets, point_sets)
+    return replace(mesh, notes=tuple(notes))
 
 
 def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarray:

@@ -156,3 +156,10 @@ def test_a_generated_set_has_all_of_its_rows(tmp_path):
 def test_a_node_set_of_an_element_set_has_its_nodes(tmp_path):
     text = PART.replace("*Solid", "*Nset, nset=whole, elset=all\n*Solid")
     assert ends(read(tmp_path, text), "whole") == [(0, 0), (0, 1), (2, 0), (2, 1)]
+
+
+@pytest.mark.parametrize(("rows", "warned"), [("3, 4", False), ("4", True), ("2, 3, 4", True)])
+def test_a_node_set_beside_a_surface_of_its_name_is_told(tmp_path, rows, warned):
+    mesh = read(tmp_path, PART.replace("*Solid", f"*Nset, nset=top\n{rows}\n*Solid"))
+    assert ends(mesh, "top") == [(0, 1), (2, 1)]
+    assert any("'top' is a surface and a node set" in note for note in mesh.notes) == warned
