@@ -228,7 +228,8 @@ class Case:
 
     def value(self, key: str) -> Any:
         """What the case's scene says for the dotted ``key``; None if nothing."""
-        found = self.scene.value(key, self.overrides.get(key))
+        given = self.overrides.get(key)
+        found = self.scene.value(key, None if given == ABSENT else given)
         return found.model_dump(exclude_none=True) if isinstance(found, BaseModel) else found
 
     def values(self, keys: Sequence[str]) -> Overrides:

@@ -234,3 +234,11 @@ def test_the_h5_of_an_xdmf_is_known(tmp_path):
     (tmp_path / "block.h5").write_bytes(b"23")
     after = digests(mesh)
     assert [name for name in after if after[name] != before[name]] == ["block.h5"]
+
+
+def test_a_key_that_a_case_drops_has_no_value(tmp_path):
+    """Of a preset, too: its field in tables is empty."""
+    path = tmp_path / "lug.sweep.toml"
+    path.write_text(LUG.replace("[grid]", '[grid]\nanalysis.thickness = ["none", 5.0]'))
+    thicknesses = {case.value("analysis.thickness") for case in read_sweep(path).cases}
+    assert thicknesses == {None, 5.0}
