@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes import mesh_cache
 
+gc.set_threshold(200_000, 20)  # imports and the rewriting of tests make no garbage
 settings.register_profile("same", derandomize=True)  # the same examples in each run
 settings.load_profile("same")
 
