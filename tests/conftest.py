@@ -20,7 +20,7 @@ _PASSED = pytest.StashKey[bool]()
 
 
 def pytest_addoption(parser):
-    parser.addoption("--kills", type=int, default=8, help="how often test_kill.py kills runs (8)")
+    parser.addoption("--kills", type=int, default=8, help="how often a test kills runs (8)")
     parser.addoption("--cases", type=int, default=12, help="how many scenes tests/fuzz solves (12)")
 
 

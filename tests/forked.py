@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -77,3 +78,34 @@ def _run(
     code = run(arguments)
     sys.stdout.flush()
     sys.exit(code)
+
+
+class Run:
+    """An ``archord solve`` in a process of its own; ``printed`` is the last step that it
+    reported."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.out = folder / "out"
+        self.err = folder / "err"
+        for file in (self.out, self.err):
+            file.write_text("")
+        self.process = start(["solve", *arguments], folder, self.out, self.err)
+        while self.process.is_alive() and not self.out.stat().st_size:
+            time.sleep(0.002)
+        self.begun = time.monotonic()
+
+    def end(self, after: float | None = None) -> int:
+        """Wait until it ends, or for ``after`` seconds and kill it; the exit code."""
+        self.process.join(after)
+        self.process.kill()
+        self.process.join()
+        code = self.process.exitcode
+        if code not in (0, -9):
+            raise AssertionError(self.err.read_text())
+        return code
+
+    @property
+    def printed(self) -> int:
+        lines = self.out.read_text().rpartition("\n")[0].splitlines()
+        first = [line.split()[0] for line in lines if line.strip() and "steps in" not in line]
+        return max((int(word) for word in first if word.isdigit()), default=0)

@@ -1,8 +1,12 @@
 """``archord solve --restart`` and ``--extend`` as a user runs them: exit codes, sentences, ranks;
-and a full disk."""
+and a full disk. Kills at random moments: whatever is on disk opens, and no accepted step is lost.
+
+``pytest tests/test_restart_command.py --kills 50`` kills more often.
+"""
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -14,10 +18,12 @@ import pytest
 from archord.output.folder import occupied
 from archord.output.history import read_history
 from archord.report.errors import InputError
+from tests.forked import Run
 from tests.output.run_files import accepted_steps, same_run
 from tests.test_cli import ENVIRONMENT, SCENE, archord, kill_after, run_on_two_ranks
 
 COARSE = ["--set", "joint.relative_element_size=0.25", "--set", "load.steps=8"]
+COARSEST = ["--set", "joint.relative_element_size=0.3", "--set", "load.steps=15"]
 
 
 def killed(folder, after: int, ranks: int = 0) -> int:
@@ -148,3 +154,41 @@ def test_a_full_disk_is_one_sentence_and_the_run_can_go_on(tmp_path, whole, rank
     assert again.stdout.splitlines()[0] == said
     tolerances = (1e-8, 3e-7) if ranks else (1e-12,)  # steps of two ranks are among them
     same_run(whole, tmp_path / "run", *tolerances)
+
+
+def test_a_run_survives_any_number_of_kills(tmp_path, request):
+    """Killed at random and restarted until the kills are used up; finished runs are compared, and
+    the next begins."""
+    kills = request.config.getoption("--kills")
+    chance = random.Random(1)
+    whole = Run(tmp_path, SCENE, *COARSEST, "-o", "whole")
+    assert whole.end() == 0
+    seconds = time.monotonic() - whole.begun
+    assert accepted_steps(tmp_path / "whole") == whole.printed == 15
+    finished = steps = 0
+    caught_at: list[int] = []
+    while len(caught_at) < kills or steps:
+        folder = tmp_path / f"run{finished}"
+        run = Run(
+            tmp_path,
+            SCENE,
+            *COARSEST,
+            "-o",
+            folder.name,
+            *(["--restart"] if folder.exists() else []),
+        )
+        code = run.end(chance.uniform(0, 0.7 * seconds) if len(caught_at) < kills else None)
+        before = steps
+        steps = accepted_steps(folder) if folder.exists() else 0
+        assert steps >= max(before, run.printed)
+        if code != 0:
+            caught_at.append(steps)
+            continue
+        assert steps == 15
+        same_run(tmp_path / "whole", folder, 1e-12)
+        finished = finished + 1
+        steps = 0
+    assert finished > 0
+    assert (
+        len(set(caught_at)) > min(kills, 10) / 3
+    )  # at steps all over the path, on a busy machine at fewer of them

@@ -24,11 +24,11 @@ from archord.postprocess.pictures.report import write_report
 from archord.postprocess.pictures.solids import skin_of
 from archord.postprocess.probes.located import located
 from tests import forked
+from tests.forked import Run
 from tests.output.run_files import accepted_steps
 from tests.postprocess.vtk_reader import VtkFile
 from tests.solver.contact.blocks_in_space import bodies, tagged
 from tests.solver.space import KINDS
-from tests.test_kill import Run
 
 STEEL = J2Material(210e3, 0.3, hardening=LinearHardening(300.0, 2100.0))
 SOFT = Elastic(70e3, 0.3)
