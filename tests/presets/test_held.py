@@ -28,7 +28,7 @@ def squares(tmp_path_factory):
             gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
     gmsh.option.setNumber("Mesh.MeshSizeMax", 5)
     gmsh.model.mesh.generate(2)
-    gmsh.model.mesh.setOrder(2)  # as archord's own meshes, whose forms are compiled already
+    gmsh.model.mesh.setOrder(2)  # as archord's own meshes
     gmsh.write(path)
     gmsh.finalize()
     return path

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import basix
-import basix.ufl
 import numpy as np
 import pytest
-import ufl
-from dolfinx.mesh import CellType, Mesh, create_box, locate_entities_boundary, meshtags
+from dolfinx.mesh import CellType, create_box, locate_entities_boundary, meshtags
 from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
@@ -40,15 +37,6 @@ every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MAT
 SIDES = ("x0", "x1", "y0", "y1", "z0", "z1")  # of a box, by the axis, at its beginning and its end
 
 
-def with_even_nodes(mesh: Mesh) -> Mesh:
-    """The ``mesh`` of first order with the coordinate element of all meshes that archord makes: the
-    cells are the same, and forms are not compiled twice."""
-    even = basix.LagrangeVariant.equispaced
-    shape = (mesh.geometry.dim,)
-    element = basix.ufl.element("P", mesh.basix_cell(), 1, even, shape=shape)
-    return Mesh(mesh._cpp_object, ufl.Mesh(element))
-
-
 def box(
     comm: MPI.Comm,
     cells: Sequence[int] = (2, 2, 2),
@@ -56,7 +44,7 @@ def box(
     kind: CellType = CellType.tetrahedron,
 ) -> TaggedMesh:
     """The body "box" of one ``size`` from the origin, in so many ``cells``, with its six sides."""
-    mesh = with_even_nodes(create_box(comm, [np.zeros(3), np.array(size)], list(cells), kind))
+    mesh = create_box(comm, [np.zeros(3), np.array(size)], list(cells), kind)
     topology = mesh.topology
     index_map = topology.index_map(3)
     every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)

@@ -28,7 +28,6 @@ from tests.solver.space import (
     box,
     every_material,
     small_and_large,
-    with_even_nodes,
 )
 
 SIZE = (1.0, 2.0, 1.5)
@@ -111,7 +110,7 @@ def test_a_box_is_stretched_to_double_length(kind, comm):
 def rectangle(comm, cells, size) -> TaggedMesh:
     """The body "box" of quadrilaterals from the origin, with its sides."""
     corners = [np.zeros(2), np.array(size)]
-    mesh = with_even_nodes(create_rectangle(comm, corners, cells, CellType.quadrilateral))
+    mesh = create_rectangle(comm, corners, cells, CellType.quadrilateral)
     index_map = mesh.topology.index_map(2)
     every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     sides = [

@@ -121,7 +121,7 @@ def bodies(comm, lower=LOWER, upper=UPPER, kind=CellType.tetrahedron, bend=flat)
         cells.append(node.reshape(nodes.shape[:2]) + sum(map(len, points)))
         points.append(places[first])
     straight = np.concatenate(points)
-    even = basix.LagrangeVariant.equispaced  # as all meshes of archord: forms are compiled once
+    even = basix.LagrangeVariant.equispaced  # as all meshes of archord
     element = basix.ufl.element("P", kind.name, 2, even, shape=(3,))
     chosen = slice(None) if comm.rank == 0 else slice(0, 0)
     mesh = create_mesh(comm, np.concatenate(cells)[chosen], straight[chosen], element)

@@ -1,25 +1,26 @@
 """Multigrid: solutions of the whole matrix, iterations that do not grow, and Newton's method as by
 a factorisation."""
 
-import basix.ufl
 import numpy as np
 import pytest
-import ufl
-from basix import LagrangeVariant
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 from dolfinx.mesh import CellType, create_unit_cube, create_unit_square
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.benchmarks.case import paper_joint
+from archord.geometry.strain import strain_terms
+from archord.materials.elasticity import Elastic
+from archord.materials.kinematics import PLANE_STRAIN, SPACE
+from archord.solver.assembly import assemble, matrix
 from archord.solver.linear import choose
 from archord.solver.linear import multigrid as module
 from archord.solver.linear.forcing import LOOSEST, forcing_term
 from archord.solver.linear.multigrid import Multigrid
 from archord.solver.path.stepping import march
-from archord.solver.path.system import System
+from archord.solver.path.system import System, displacement_space
 from archord.solver.problem import Body, Dirichlet, Problem
+from archord.solver.stiffness import CellStiffness, value_terms
 from tests.solver.solving import solve
 from tests.solver.space import MATERIALS, box
 
@@ -34,24 +35,26 @@ def elastic_cube(n, cell=CellType.tetrahedron, degree=2, comm=MPI.COMM_WORLD, sk
     else:
         mesh = create_unit_cube(comm, n, n, n, cell)
     d = mesh.geometry.dim
-    element = basix.ufl.element(
-        "P", mesh.basix_cell(), degree, shape=(d,), lagrange_variant=LagrangeVariant.equispaced
-    )
-    V = fem.functionspace(mesh, element)
+    V = displacement_space(mesh, degree)
     x = V.tabulate_dof_coordinates()
     fixed = np.zeros((len(x), d), dtype=bool)
     fixed[np.isclose(x[:, d - 1], 0)] = True
     fixed[np.isclose(x[:, 0], 0), 0] = True
-    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    strain = ufl.sym(ufl.grad(u))
-    volumetric = nu / (1 - 2 * nu) * ufl.tr(strain) * ufl.Identity(d)
-    stress = (volumetric + strain) / (1 + nu)  # of E = 1
-    along = fem.Constant(mesh, np.full(d, skew))
-    form = fem.form((ufl.inner(stress, ufl.grad(v)) + ufl.inner(ufl.grad(u) * along, v)) * ufl.dx)
+    kinematics = SPACE if d == 3 else PLANE_STRAIN
+    values = value_terms(d)
+    values[:, 2] += d * d
+    terms = np.concatenate([strain_terms(kinematics, large=True), values])
+    moduli = np.zeros((d * d + d,) * 2)
+    small = kinematics.small
+    moduli[: d * d, : d * d] = small.T @ Elastic(1.0, nu, kinematics.name).elastic_tangent @ small
+    for gradient, (component, _) in enumerate(kinematics.terms):
+        moduli[d * d + component, gradient] = skew
+    cells = np.arange(mesh.topology.index_map(d).size_local)
+    form = CellStiffness(V, kinematics, 2 * degree, terms, moduli).over(cells)
     nodes = [np.flatnonzero(fixed[:, axis]).astype(np.int32) for axis in range(d)]
     bcs = [fem.dirichletbc(0.0, d * nodes[axis] + axis, V.sub(axis)) for axis in range(d)]
-    A = fem_petsc.create_matrix(form, "baij")
-    fem_petsc.assemble_matrix(A, form, bcs=bcs)
+    A = matrix(V, [form])
+    assemble(A, [form], bcs)
     A.assemble()
     return V, fixed, A
 
