@@ -86,7 +86,10 @@ class MeshArrays:
         facets = _groups(gmsh, d - 1)
         points: dict[str, _Group] = {}
         for dim in reversed(range(d - 1)):
-            points |= _groups(gmsh, dim)
+            found = _groups(gmsh, dim)
+            for twice in points.keys() & found:
+                raise ValueError(f"physical groups of lines and of points are called {twice!r}")
+            points |= found
         listed = [group.nodes.reshape(-1, n_nodes) for group in groups.values()]
         cells = np.concatenate(listed)
         # old files repeat cells

@@ -327,6 +327,15 @@ def test_two_groups_of_one_name_are_refused(module, comm):
         read_mesh(gmsh, comm)
 
 
+def test_lines_and_points_of_one_name_are_refused(module, comm):
+    gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+    gmsh.model.occ.synchronize()
+    for dim in (3, 1, 0):
+        gmsh.model.addPhysicalGroup(dim, [1], name="corner")
+    with pytest.raises(ValueError, match="lines and of points are called 'corner'"):
+        read_mesh(gmsh, comm)
+
+
 def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
     (tmp_path / "mesh.stl").touch()
     for path, said in (
