@@ -26,7 +26,7 @@ typedef struct {
 } Pieces;
 
 typedef struct {
-    int32_t n, most, sides, *facet;
+    int32_t n, most, sides, *facet, *polygon, n_polygons;
     double *corners;
 } Broken;
 
@@ -181,6 +181,7 @@ static void add_piece(Broken *all, int32_t facet, int n, const double *const *co
     if (area(&p) < NOTHING) return;
     if (all->n < all->most) {
         all->facet[all->n] = facet;
+        all->polygon[all->n] = all->n_polygons;
         double *at = all->corners + 2 * (int64_t)all->sides * all->n;
         for (int c = 0; c < all->sides; c++) memcpy(at + 2 * c, p.at[c < n ? c : n - 1], sizeof p.at[0]);
     }
@@ -191,7 +192,7 @@ static void add_piece(Broken *all, int32_t facet, int n, const double *const *co
 static void add_pieces(Broken *all, int32_t facet, const Pieces *polygons)
 {
     const int step = all->sides - 2;
-    for (int k = 0; k < polygons->n; k++) {
+    for (int k = 0; k < polygons->n; k++, all->n_polygons++) {
         const Polygon *p = &polygons->piece[k];
         const int n = p->n, best = best_corner(p);
         if (best < 0 && n > all->sides) {
@@ -211,10 +212,10 @@ static void add_pieces(Broken *all, int32_t facet, const Pieces *polygons)
     }
 }
 
-int32_t broken_facets(const Overlay *o, int32_t most, int32_t *facet, double *corners)
+int32_t broken_facets(const Overlay *o, int32_t most, int32_t *facet, int32_t *polygon, double *corners)
 {
     static _Thread_local Pieces parts, left;
-    Broken all = {0, most, o->sides, facet, corners};
+    Broken all = {0, most, o->sides, facet, polygon, 0, corners};
     Polygon whole = {o->sides, {{0}}};
     memcpy(whole.at, o->window, sizeof whole.at[0] * whole.n);
     double middle[2];

@@ -22,13 +22,18 @@ from archord.kernels.compiled import library, pointer, structure
 
 _SOURCE = Path(__file__).with_name("overlay.c")
 _TOUCH = 1e-7  # distance of surfaces that coincide, in radii of their facets
+_FLAT = 1e-15  # least second moment of a polygon, of the sum of both
+_EVEN = 1e-6  # third moment, of a polygon stretched to unit ones, that round-off may turn
+_SLIVER = 1 / 40  # of the mean area of the polygons on a facet
+_APART = 10.0  # distance of facets with unit sides, as good as infinite
 _REACH = 1.2  # of facets, in radii: how far apart those may be that overlie each other
 
 
-def broken_facets(own: Patches, opposite: Patches) -> tuple[Index, Array]:
+def broken_facets(own: Patches, opposite: Patches) -> tuple[Index, Index, Array]:
     """The facets ``(n,)`` of ``own``, in rising order, and corners ``(n, e, 2)`` on them of the
-    pieces into which the facets of ``opposite`` break them. Together the pieces of a facet cover
-    it. A quadrilateral with its last corner twice is a triangle."""
+    pieces into which the facets of ``opposite`` break them; and between both the numbers ``(n,)``,
+    in rising order, of the convex polygons that the pieces make up. Together the pieces of a facet
+    cover it. A quadrilateral with its last corner twice is a triangle."""
     facet, other = _overlying(own, opposite)
     corners = opposite.corner_points()[other]
     n_corners = corners.shape[1]
@@ -50,10 +55,10 @@ def broken_facets(own: Patches, opposite: Patches) -> tuple[Index, Array]:
     needed = 8 * own.n_facets + 2 * len(facet)
     while needed > most:
         most = needed
-        broken = np.empty(most, dtype=np.int32)
+        broken, polygon = np.empty((2, most), dtype=np.int32)
         pieces = np.empty((most, len(window), 2))
-        needed = kernel(given, most, pointer(broken), pointer(pieces))
-    return broken[:needed], pieces[:needed]
+        needed = kernel(given, most, pointer(broken), pointer(polygon), pointer(pieces))
+    return broken[:needed], polygon[:needed], pieces[:needed]
 
 
 def _overlying(own: Patches, opposite: Patches) -> tuple[Index, Index]:
@@ -97,6 +102,63 @@ def piece_rule(pieces: Array, degree: int) -> tuple[Array, Array]:
     by_t = two + s * twist
     area = crossed(by_s, by_t)
     return points, area * w
+
+
+def polygon_rule(triangles: Array, polygon: Index) -> tuple[Array, Array]:
+    """Three points ``(p, 3, 2)`` and their weights ``(p, 3)`` in each polygon, exact for
+    polynomials of the second degree. The ``triangles`` ``(n, 3, 2)`` make up the polygons
+    ``polygon`` ``(n,)``, numbered from zero on.
+
+    Where a polygon is stretched to equal second moments, equal weights at the corners of an
+    equilateral triangle about its middle have the same moments, however that triangle is turned.
+    They lie in a convex polygon (Kannan, Lovasz and Simonovits 1995, theorem 4.1). The triangle is
+    turned so that the third moments agree best, as on a triangle they do.
+    """
+    size, middle = measured(triangles, polygon)
+    x, w = piece_rule(triangles, 3)
+    x = x - middle[polygon, None]
+
+    def mean(values: Array) -> Array:
+        return np.bincount(polygon, (w * values).sum(axis=1)) / size
+
+    ss, st, tt = (mean(x[..., i] * x[..., j]) for i, j in ((0, 0), (0, 1), (1, 1)))
+    # factors of Cholesky's of the second moments
+    least = _FLAT * (ss + tt)
+    along = np.sqrt(np.maximum(ss, least))
+    aside = st / along
+    across = np.sqrt(np.maximum(tt - aside**2, least))
+    s = x[..., 0] / along[polygon, None]
+    t = (x[..., 1] - s * aside[polygon, None]) / across[polygon, None]
+    third = mean(s**3 - 3 * s * t**2) + 1j * mean(3 * s**2 * t - t**3)
+    turn = np.where(np.abs(third) > _EVEN, np.angle(third), 0.0) / 3
+    angle = turn[:, None] + 2 * np.pi / 3 * np.arange(3)
+    s, t = np.sqrt(2) * np.cos(angle), np.sqrt(2) * np.sin(angle)
+    stretched = s * along[:, None], s * aside[:, None] + t * across[:, None]
+    weights: Array = np.repeat(size[:, None] / 3, 3, axis=1)
+    return middle[:, None] + np.stack(stretched, axis=2), weights
+
+
+def measured(triangles: Array, polygon: Index) -> tuple[Array, Array]:
+    """Areas ``(p,)`` of the polygons that `polygon_rule` takes, and their middles ``(p, 2)``."""
+    [middles], [areas] = (values.swapaxes(0, 1) for values in piece_rule(triangles, 1))
+    size: Array = np.bincount(polygon, areas)
+    moments = [np.bincount(polygon, areas * coordinate) for coordinate in middles.T]
+    return size, np.stack(moments, axis=1) / size[:, None]
+
+
+def without_slivers(triangles: Array, polygon: Index, facet: Index) -> Index:
+    """The polygons ``(n,)`` of the ``triangles``, numbered from zero on, where slivers belong to
+    the polygon on the same ``facet`` ``(n,)`` whose middle is nearest."""
+    from scipy.spatial import cKDTree  # a plane problem does not pay for it
+
+    size, middle = measured(triangles, polygon)
+    on_facet = facet[np.unique(polygon, return_index=True)[1]]
+    mean = np.bincount(on_facet, size) / np.bincount(on_facet).clip(1)
+    is_sliver = size < _SLIVER * mean[on_facet]
+    kept = np.flatnonzero(~is_sliver)
+    at = np.column_stack([middle, _APART * on_facet])
+    _, nearest = cKDTree(at[kept]).query(at)
+    return np.where(is_sliver, nearest, np.cumsum(~is_sliver) - 1)[polygon]
 
 
 def quartered(triangles: Array) -> Array:

@@ -17,11 +17,17 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import Curve, Index, Projection
-from archord.geometry.overlay import broken_facets, coincide, piece_rule, quartered
+from archord.geometry.overlay import (
+    broken_facets,
+    coincide,
+    piece_rule,
+    polygon_rule,
+    quartered,
+    without_slivers,
+)
 from archord.geometry.patches import Patches
 
 _EXACT = 4  # degree of the rule in a piece
-_NEARLY_EXACT = 2
 _FEWEST = 4  # pieces of a facet with points of the second degree
 _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
 # for each facet that a facet faces: means of a smooth pressure scatter by 0.1 % at most, wherever
@@ -113,23 +119,36 @@ def _divided(ends: Array, n_parts: int) -> Array:
 
 def pieces_rule(own: Patches, opposite: Patches) -> tuple[Array, Array, Index]:
     """Positions ``(pieces, q, 2)`` and weights ``(pieces, q)`` in the pieces into which the facets
-    of ``opposite`` break those of ``own``, and the facets ``(pieces,)`` of the pieces.
+    of ``opposite`` break those of ``own``, and the facets ``(pieces,)`` of the pieces, in rising
+    order.
 
     Six points in a triangle, nine in a quadrilateral are exact for a uniform pressure on curved
-    facets of second order. Triangles have three where the surfaces do not coincide: their distance
-    spoils more than that, as it does on a cylinder whose meshes differ.
+    facets of second order. Triangular facets have three in each polygon where the surfaces do not
+    coincide: their distance spoils more than that, as it does on a cylinder whose meshes differ.
     """
-    facet, pieces = broken_facets(own, opposite)
-    degree = _EXACT
+    facet, polygon, pieces = broken_facets(own, opposite)
     if own.cell == basix.CellType.triangle and not coincide(own, opposite):
-        degree = _NEARLY_EXACT
-        is_large = np.bincount(facet)[facet] < _FEWEST
-        facet = np.concatenate([facet[~is_large], np.repeat(facet[is_large], 4)])
-        pieces = np.concatenate([pieces[~is_large], quartered(pieces[is_large])])
-        order = np.argsort(facet, kind="stable")
-        facet = facet[order]
-        pieces = pieces[order]
-    xi, w = piece_rule(pieces, degree)
+        facet, xi, w = _of_polygons(facet, polygon, pieces)
+    else:
+        xi, w = piece_rule(pieces, _EXACT)
     whole = basix.make_quadrature(own.cell, 1)[1].sum()
     covered = np.bincount(facet, w.sum(axis=1))
     return xi, w * (whole / covered)[facet, None], facet
+
+
+def _of_polygons(facet: Index, polygon: Index, triangles: Array) -> tuple[Index, Array, Array]:
+    """The facets ``(p,)``, and points and weights ``(p, 3, ...)``, of the polygons that
+    `broken_facets` has found; where they are few on a facet, of its triangles or quarters of
+    them."""
+    begins: np.ndarray = np.diff(polygon, prepend=-1) > 0
+    begins = begins | (np.bincount(facet[begins])[facet] < _FEWEST)
+    is_large = np.bincount(facet)[facet] < _FEWEST
+    times = np.where(is_large, 4, 1)
+    is_quarter = np.repeat(is_large, times)
+    parts = np.repeat(triangles, times, axis=0)
+    parts[is_quarter] = quartered(triangles[is_large])
+    facet = np.repeat(facet, times)
+    number = np.cumsum(np.repeat(begins, times) | is_quarter) - 1
+    number = without_slivers(parts, number, facet)
+    xi, w = polygon_rule(parts, number)
+    return facet[np.unique(number, return_index=True)[1]], xi, w

@@ -22,7 +22,7 @@ def at_points(cell, cells, pressure):
     """A flat sheet broken by another one, the facets and places of its points, their weights, and a
     ``pressure`` there."""
     own = sheet(cell, cells)
-    facet, pieces = broken_facets(own, sheet(cell, cells + 1, up=False))
+    facet, _, pieces = broken_facets(own, sheet(cell, cells + 1, up=False))
     xi, w = piece_rule(pieces, 4)
     shape = own.shapes(xi.reshape(-1, 2))[0].reshape(*w.shape, -1)
     x, y, _ = np.einsum("nqa,nai->inq", shape, own.X[own.connectivity[facet]])
