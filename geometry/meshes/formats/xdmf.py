@@ -47,8 +47,12 @@ def read_xdmf(path: Path) -> MeshArrays:
     cells = _data(path, mesh, "Topology")
     sets: dict[int, dict[str, np.ndarray]] = defaultdict(dict)  # by their topological dimension
     for grid in grids:
-        if grid.find(f"{_TAGS}/DataItem") is None:
+        tags = grid.findall(f"{_TAGS}[DataItem]")
+        if not tags:
             continue
+        if len(tags) > 1:
+            names = ", ".join(tag.attrib.get("Name", "?") for tag in tags)
+            raise ValueError(f"a grid has several values of each cell, {names}; leave one of them")
         of_dimension = sets[_dimension(grid)]
         entities = _data(path, grid, "Topology")
         values = _data(path, grid, _TAGS).ravel()

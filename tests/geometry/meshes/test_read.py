@@ -495,6 +495,25 @@ def write_tags(path, *values):
         file.write_meshtags(corner, square.geometry)
 
 
+TWICE = """<Xdmf><Domain><Grid>
+<Geometry><DataItem Dimensions="3 2">0 0 1 0 0 1</DataItem></Geometry>
+<Topology TopologyType="Triangle"><DataItem Dimensions="1 3">0 1 2</DataItem></Topology>
+<Attribute Name="entity" Center="Cell"><DataItem Dimensions="1">1</DataItem></Attribute>
+<Attribute Name="group" Center="Cell"><DataItem Dimensions="1">2</DataItem></Attribute>
+</Grid></Domain></Xdmf>
+"""
+
+
+def test_cells_with_two_values_are_refused(comm, tmp_path):
+    """Which of them names the sets cannot be told; meshio writes entities and groups of gmsh."""
+    (tmp_path / "two.xdmf").write_text(TWICE)
+    with pytest.raises(ValueError, match="several values of each cell, entity, group"):
+        read_mesh(tmp_path / "two.xdmf", comm)
+    entity = "\n".join(line for line in TWICE.splitlines() if "entity" not in line)
+    (tmp_path / "one.xdmf").write_text(entity)
+    assert list(read_mesh(tmp_path / "one.xdmf", comm).cell_sets) == ["2"]
+
+
 def test_no_tag_of_an_xdmf_file_is_lost(comm, tmp_path):
     """Large values are told apart, a value that two tags have is refused, and vertices are
     points."""
