@@ -141,7 +141,7 @@ def polygon_rule(triangles: Array, polygon: Index) -> tuple[Array, Array]:
 def measured(triangles: Array, polygon: Index) -> tuple[Array, Array]:
     """Areas ``(p,)`` of the polygons that `polygon_rule` takes, and their middles ``(p, 2)``."""
     [middles], [areas] = (values.swapaxes(0, 1) for values in piece_rule(triangles, 1))
-    size: Array = np.bincount(polygon, areas)
+    size = np.bincount(polygon, areas).astype(float)
     moments = [np.bincount(polygon, areas * coordinate) for coordinate in middles.T]
     return size, np.stack(moments, axis=1) / size[:, None]
 

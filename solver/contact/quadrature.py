@@ -149,6 +149,6 @@ def _of_polygons(facet: Index, polygon: Index, triangles: Array) -> tuple[Index,
     parts[is_quarter] = quartered(triangles[is_large])
     facet = np.repeat(facet, times)
     number = np.cumsum(np.repeat(begins, times) | is_quarter) - 1
-    number = without_slivers(parts, number, facet)
-    xi, w = polygon_rule(parts, number)
-    return facet[np.unique(number, return_index=True)[1]], xi, w
+    merged = without_slivers(parts, number, facet)
+    xi, w = polygon_rule(parts, merged)
+    return facet[np.unique(merged, return_index=True)[1]], xi, w

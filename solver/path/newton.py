@@ -25,6 +25,8 @@ _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still, but for a few points
 _FEW = 1e-4  # part of all points, which open and close as they jump between two facets
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
+_CONVERGES = 0.2  # the same by which levels of multigrid are kept
+_ITERATIONS_WITH_LEVELS = 2  # of a solve, which make the levels of multigrid
 _R = PETSc.SNES.ConvergedReason
 _REASONS = {
     _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
@@ -298,13 +300,21 @@ class NewtonSolver:
         factorise = self._lagged is None or self._lagged.factorises(
             self._ksp.getIterationNumber(), result.residuals[-1], renewed=self._renewed
         )
-        self._reuse = not factorise
+        self._reuse = not factorise or self._keeps_levels()
         is_afar = self._from_afar and len(result.residuals) == 1
         self.equilibrium.contact.follow(not is_afar)
         before = self._system.tangent.factorisations
         self._system.update(factorise=factorise)
         result.factorisations += self._system.tangent.factorisations - before
         self._renewed = False
+
+    def _keeps_levels(self) -> bool:
+        """Whether multigrid solves with the levels of an earlier matrix: after two iterations in
+        which Newton's method converges the matrix hardly changes."""
+        residuals = self._result.residuals
+        if not self._iterates or self._renewed or len(residuals) <= _ITERATIONS_WITH_LEVELS:
+            return False
+        return residuals[-1] < _CONVERGES * residuals[-2]
 
     def _is_close(self) -> bool:
         """Whether one more step with the last factorisation will do: Newton's method converges, and

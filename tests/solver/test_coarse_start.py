@@ -75,7 +75,7 @@ def test_joints_in_space_have_one(name, force, tmp_path, monkeypatch):
     given["load"] |= {"steps": 2}
     if name == "joint":
         given["block"].pop("yield_stress")
-        given["joint"] |= {"relative_element_size": 0.13}
+        given["joint"] |= {"relative_element_size": 0.11}
     scene = parse_any(given)
     forces, iterations = [], []
     for fewest in (10**9, 0):
