@@ -4,7 +4,7 @@ it."""
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -112,7 +112,9 @@ class MeshArrays:
         facet_sets = {name: place(corners_of(kind, own.nodes)) for name, own in facets.items()}
         point_sets = {name: np.unique(place(own.nodes)) for name, own in points.items()}
         numbers = _tags(groups), _tags(facets)
-        return cls.of_sets(kind, x, cells, cell_sets, facet_sets, point_sets, numbers)
+        mesh = cls.of_sets(kind, x, cells, cell_sets, facet_sets, point_sets, numbers)
+        notes = (*_nameless(groups, d), *_nameless(facets, d - 1))
+        return replace(mesh, notes=notes)
 
     @classmethod
     def of_sets(
@@ -278,6 +280,16 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
             raise ValueError(f"two physical groups of dimension {dim} are called {name!r}")
         groups[name] = _Group(tag, set(of_type), nodes)
     return groups
+
+
+def _nameless(groups: Mapping[str, _Group], dim: int) -> Iterator[str]:
+    """A warning of a group without a name among others of its dimension that have one."""
+    without = [name for name, group in groups.items() if name == str(group.tag)]
+    if without and len(without) < len(groups):
+        yield (
+            f"the physical group {without[0]} of dimension {dim} has no name, and others have: of "
+            "groups with one name gmsh keeps it for the first"
+        )
 
 
 def _properties(gmsh, types: set[int], dim: int) -> tuple:

@@ -37,6 +37,7 @@ def store_mesh(mesh: MeshArrays, file: BinaryIO) -> None:
         "cell_sets": mesh.cell_sets,
         "facet_sets": mesh.facet_sets,
         "point_sets": {name: nodes.tolist() for name, nodes in mesh.point_sets.items()},
+        "notes": mesh.notes,
     }
     sets = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
     arrays = {name: getattr(mesh, _NAMES.get(name, name)) for name in _ARRAYS}
@@ -63,7 +64,12 @@ def stored_mesh(path: Path) -> MeshArrays:
     coordinates(arrays["x"], dimension_of(kind))
     own = {_NAMES.get(name, name): array for name, array in arrays.items()}
     mesh = MeshArrays(
-        kind=kind, **own, cell_sets=cell_sets, facet_sets=facet_sets, point_sets=points
+        kind=kind,
+        **own,
+        cell_sets=cell_sets,
+        facet_sets=facet_sets,
+        point_sets=points,
+        notes=tuple(words.get("notes", ())),
     )
     _require_whole(mesh)
     return mesh

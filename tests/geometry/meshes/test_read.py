@@ -327,6 +327,20 @@ def test_two_groups_of_one_name_are_refused(module, comm):
         read_mesh(gmsh, comm)
 
 
+def test_a_name_that_gmsh_gave_to_one_of_two_groups_is_told(module, tmp_path, comm):
+    """The second one has no name then, and not a half of what the user meant."""
+    draw(1)
+    assert not gathered(read_mesh(gmsh, comm)).notes
+    first, *_ = gmsh.model.getPhysicalGroups(1)
+    name = gmsh.model.getPhysicalName(*first)
+    curves = gmsh.model.getEntitiesForPhysicalGroup(*first)
+    again = gmsh.model.addPhysicalGroup(1, curves, name=name)
+    gmsh.write(str(tmp_path / "disc.msh"))
+    for source in (gmsh, tmp_path / "disc.msh"):
+        (note,) = gathered(read_mesh(source, comm)).notes
+        assert f"the physical group {again} of dimension 1 has no name" in note
+
+
 def test_lines_and_points_of_one_name_are_refused(module, comm):
     gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
     gmsh.model.occ.synchronize()
