@@ -109,7 +109,7 @@ def one_cell(kind, degree):
     element = basix.ufl.element(
         "P", kind.name, degree, shape=(3,), lagrange_variant=basix.LagrangeVariant.equispaced
     )
-    mesh = create_mesh(MPI.COMM_SELF, np.arange(len(x), dtype=np.int64)[None], x, element)
+    mesh = create_mesh(MPI.COMM_SELF, np.arange(len(x), dtype=np.int64)[None], x=x, e=element)
     of_displacements = displacement_element(kind, degree)
     follow = of_displacements.tabulate(0, X)[0, ..., 0]
     nodes = mesh.geometry.dofmap[0]

@@ -60,7 +60,7 @@ def test_a_curved_cell_takes_a_linear_displacement():
     nodes = lagrange_element(HEXAHEDRON, 2).points
     x = nodes + 0.2 * np.sin(4 * nodes[:, [1, 2, 0]])
     element = basix.ufl.element("P", "hexahedron", 2, shape=(3,))
-    mesh = create_mesh(MPI.COMM_SELF, np.arange(27, dtype=np.int64)[None], x, element)
+    mesh = create_mesh(MPI.COMM_SELF, np.arange(27, dtype=np.int64)[None], x=x, e=element)
     V = displacement_space(mesh, 2)
     A = np.random.default_rng(0).normal(size=(3, 3))
     X, _ = basix.make_quadrature(HEXAHEDRON, 4)

@@ -124,7 +124,7 @@ def bodies(comm, lower=LOWER, upper=UPPER, kind=CellType.tetrahedron, bend=flat)
     even = basix.LagrangeVariant.equispaced  # as all meshes of archord
     element = basix.ufl.element("P", kind.name, 2, even, shape=(3,))
     chosen = slice(None) if comm.rank == 0 else slice(0, 0)
-    mesh = create_mesh(comm, np.concatenate(cells)[chosen], straight[chosen], element)
+    mesh = create_mesh(comm, np.concatenate(cells)[chosen], x=straight[chosen], e=element)
     V = displacement_space(mesh, 2)
     x = V.tabulate_dof_coordinates().copy()
     is_upper = mesh.topology.original_cell_index >= len(cells[0])
