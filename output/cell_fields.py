@@ -19,7 +19,7 @@ from archord.materials.material import Array
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
-    from archord.solver.body_points import PointFields
+    from archord.solver.bulk.body_points import PointFields
     from archord.solver.path.system import System
 
 # what else fields.h5 and exports have

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.report.timer import Timer
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.drives import Drives
 from archord.solver.equilibrium.diagnostics import Diagnostics

@@ -14,7 +14,7 @@ from archord.kernels.compat import ghosted_vector
 from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.materials.material import Points
 from archord.report.timer import Timer
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.equilibrium.springs import Springs
 from archord.solver.equilibrium.unknowns import Unknowns

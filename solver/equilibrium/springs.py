@@ -17,13 +17,13 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.assembly import assemble, matrix
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.stiffness import CellStiffness, value_terms
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.drives import Drives
 from archord.solver.equilibrium.rigid_motions import RigidMotions
 from archord.solver.loads import LOAD_DEGREE
 from archord.solver.problem import Body
-from archord.solver.stiffness import CellStiffness, value_terms
 
 WEAK = 1e-8  # without influence, but well above the round-off of a factorisation
 _STIFFER = 100.0  # most of M over the smallest shear modulus

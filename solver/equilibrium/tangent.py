@@ -14,7 +14,7 @@ from archord.geometry.basis import Array
 from archord.kernels.blocks import add_blocks
 from archord.kernels.compat import ghosted_vector
 from archord.report.timer import BEFORE_SOLVING, Timer
-from archord.solver.assembly import assemble, matrix
+from archord.solver.bulk.assembly import assemble, matrix
 from archord.solver.contact.tangent import Filled
 from archord.solver.equilibrium.evaluation import Evaluation
 from archord.solver.linear.block_product import BlockProduct, quick_product

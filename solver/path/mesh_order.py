@@ -20,7 +20,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array, tabulate
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.materials.material import Points
-from archord.solver.body_points import PointFields
+from archord.solver.bulk.body_points import PointFields
 from archord.solver.path.system import System
 
 Arrays = dict[str, np.ndarray]

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array, displacement_element, lagrange_element
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.report.timer import Timer
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.conditions import Mean
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface, Rigid

@@ -9,10 +9,10 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.bulk import Bulk
+from archord.solver.bulk.distortion import Distortion
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Within
-from archord.solver.distortion import Distortion
 from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.problem import Body, Problem
 

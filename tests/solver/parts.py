@@ -22,7 +22,7 @@ from archord.kernels.compat import ghosted_vector
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface
 from archord.solver.contact.surface import RigidSurface, Surface

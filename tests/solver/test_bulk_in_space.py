@@ -21,8 +21,8 @@ from archord.geometry.strain import PointStrain
 from archord.kernels.compat import ghosted_vector
 from archord.materials.kinematics import SPACE
 from archord.materials.material import Material
-from archord.solver.assembly import assemble, matrix
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.contact.trace_inequality import trace_constants
 from archord.solver.path.system import displacement_space
 from tests.materials.test_space import ASKEW, tensors

@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import mean_stress, von_mises
-from archord.solver.assembly import assemble, matrix
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.bulk import Bulk
 from tests.solver.parts import (
     ELASTIC,
     HARDENING,

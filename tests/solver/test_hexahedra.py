@@ -17,8 +17,8 @@ from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematics import SPACE
-from archord.solver.assembly import assemble, matrix
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.path.mesh_order import MeshOrder
 from archord.solver.path.system import System, displacement_space
 from archord.solver.problem import Body, Interaction, Load, Problem, Support

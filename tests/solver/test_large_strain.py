@@ -18,7 +18,7 @@ from archord.materials.j2 import J2Material
 from archord.materials.material import Array, Material
 from archord.presets.joint import joint_problem
 from archord.scene.presets.joint import Scene
-from archord.solver.bulk import Bulk
+from archord.solver.bulk.bulk import Bulk
 from archord.solver.path.system import System
 from archord.solver.problem import (
     Body,

@@ -13,9 +13,9 @@ from mpi4py import MPI
 from archord.geometry.basis import bulk_quadrature_degree, cell_basis
 from archord.geometry.strain import PointStrain, strain_terms
 from archord.materials.kinematics import AXISYMMETRIC, PLANE_STRAIN, SPACE
-from archord.solver.assembly import assemble, matrix
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.stiffness import CellStiffness, value_terms
 from archord.solver.path.system import displacement_space
-from archord.solver.stiffness import CellStiffness, value_terms
 from tests.solver.parts import scipy_matrix
 
 RULE = 6

@@ -12,7 +12,8 @@ from archord.benchmarks.case import paper_joint
 from archord.geometry.strain import strain_terms
 from archord.materials.elasticity import Elastic
 from archord.materials.kinematics import PLANE_STRAIN, SPACE
-from archord.solver.assembly import assemble, matrix
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.stiffness import CellStiffness, value_terms
 from archord.solver.linear import choose
 from archord.solver.linear import multigrid as module
 from archord.solver.linear.forcing import LOOSEST, forcing_term
@@ -20,7 +21,6 @@ from archord.solver.linear.multigrid import Multigrid
 from archord.solver.path.stepping import march
 from archord.solver.path.system import System, displacement_space
 from archord.solver.problem import Body, Dirichlet, Problem
-from archord.solver.stiffness import CellStiffness, value_terms
 from tests.solver.solving import solve
 from tests.solver.space import MATERIALS, box
 

@@ -13,9 +13,9 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.strain import strain_terms
 from archord.materials.kinematics import Kinematics
-from archord.solver.assembly import assemble
-from archord.solver.body_points import BodyPoints
-from archord.solver.stiffness import CellStiffness
+from archord.solver.bulk.assembly import assemble
+from archord.solver.bulk.body_points import BodyPoints
+from archord.solver.bulk.stiffness import CellStiffness
 
 
 class PointForms:

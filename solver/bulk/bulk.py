@@ -20,11 +20,11 @@ from archord.geometry.cell_rules import CellRule, cell_rules
 from archord.geometry.strain import strain_terms
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.materials.material import Material, Points
-from archord.solver.assembly import assemble, matrix
-from archord.solver.body_points import BodyPoints, PointFields
-from archord.solver.distortion import DistortionMeter
-from archord.solver.point_forms import PointForms
-from archord.solver.stiffness import CellStiffness
+from archord.solver.bulk.assembly import assemble, matrix
+from archord.solver.bulk.body_points import BodyPoints, PointFields
+from archord.solver.bulk.distortion import DistortionMeter
+from archord.solver.bulk.point_forms import PointForms
+from archord.solver.bulk.stiffness import CellStiffness
 
 Index = npt.NDArray[np.integer]
 _NONE = np.zeros(0, dtype=np.int32)

@@ -1,0 +1,1 @@
+"""The bodies between their contacts: internal forces, tangents, and what they recover."""
