@@ -5,7 +5,7 @@
 typedef float Four __attribute__((vector_size(16)));
 
 typedef struct {
-    int32_t lower, upper, ghosts; /* where the parts end so far */
+    int32_t lower, ghosts; /* where the parts end so far */
 } Ends;
 
 /* Ranks smooth at once: with the sizes of all ghosts' entries on the diagonal that converges whatever the matrix (Baker,
@@ -29,11 +29,28 @@ static inline void add_product(int d, const float *B, const float *x, float *y)
         for (int i = 0; i < d; i++) y[i] += B[d * j + i] * x[j];
 }
 
-/* y += the blocks of row i times x */
-static inline void row_times(const BlockPart *part, int d, int32_t i, const float *x, float *y)
+/* y += the blocks of a part's row times x */
+static inline void row_times(const BlockPart *part, int d, int32_t row, const float *x, float *y)
 {
-    for (int32_t k = part->start[i]; k < part->start[i + 1]; k++)
-        add_product(d, part->block + k * (int64_t)(d * d), x + d * part->column[k], y);
+    const int32_t end = part->start[row + 1];
+    int32_t k = part->start[row];
+    if (d == 3) {
+        Four by_first = {0}, by_second = {0}, by_third = {0}, column, sum;
+        for (; k < end; k++) {
+            const float *B = part->block + 9 * (int64_t)k, *of = x + 3 * (int64_t)part->column[k];
+            memcpy(&column, B, 16);
+            by_first += column * of[0];
+            memcpy(&column, B + 3, 16);
+            by_second += column * of[1];
+            memcpy(&column, B + 6, 16);
+            by_third += column * of[2];
+        }
+        memcpy(&sum, y, 16);
+        sum += by_first + by_second + by_third;
+        memcpy(y, &sum, 16);
+        return;
+    }
+    for (; k < end; k++) add_product(d, part->block + k * (int64_t)(d * d), x + d * part->column[k], y);
 }
 
 static void invert(int d, const float *B, float *inverse)
@@ -87,7 +104,7 @@ static void stiffen(BlockRows *A, int32_t i, int32_t end, float *diagonal)
     }
 }
 
-/* Append the blocks of a row of a term, and add its diagonal block. */
+/* Append the blocks of a row of a term that are not right of the diagonal, and add its diagonal block. */
 static void put_row(BlockRows *A, const BlockTerm *term, int32_t i, Ends *at, float *diagonal)
 {
     const int size = A->d * A->d;
@@ -95,7 +112,6 @@ static void put_row(BlockRows *A, const BlockTerm *term, int32_t i, Ends *at, fl
         const int32_t column = term->columns[k];
         const double *block = term->values + size * k;
         if (column < i) put(A->lower, &at->lower, size, column, block);
-        if (column > i) put(A->upper, &at->upper, size, column, block);
         if (column == i)
             for (int n = 0; n < size; n++) diagonal[n] += (float)block[n];
     }
@@ -105,21 +121,40 @@ static void put_row(BlockRows *A, const BlockTerm *term, int32_t i, Ends *at, fl
     }
 }
 
+/* Append the blocks right of the diagonal, of the last row first. */
+static void put_upper(BlockRows *A, const BlockTerm *last)
+{
+    const int size = A->d * A->d;
+    int32_t at = 0;
+    for (int32_t i = A->n - 1; i >= 0; i--) {
+        A->upper->start[A->n - 1 - i] = at;
+        for (const BlockTerm *term = last; term; term = term->before)
+            for (int64_t k = term->offsets[i]; k < term->offsets[i + 1]; k++)
+                if (term->columns[k] > i) put(A->upper, &at, size, term->columns[k], term->values + size * k);
+    }
+    A->upper->start[A->n] = at;
+}
+
 void pack_blocks(BlockRows *A, const BlockTerm *last)
 {
-    Ends at = {0, 0, 0};
+    Ends at = {0, 0};
     for (int32_t i = 0; i < A->n; i++) {
         float diagonal[9] = {0};
         A->lower->start[i] = at.lower;
-        A->upper->start[i] = at.upper;
         A->ghosts->start[i] = at.ghosts;
         for (const BlockTerm *term = last; term; term = term->before) put_row(A, term, i, &at, diagonal);
         stiffen(A, i, at.ghosts, diagonal);
         invert(A->d, diagonal, A->inverse + (int64_t)A->d * A->d * i);
     }
     A->lower->start[A->n] = at.lower;
-    A->upper->start[A->n] = at.upper;
     A->ghosts->start[A->n] = at.ghosts;
+    put_upper(A, last);
+}
+
+/* y += the blocks of row i right of the diagonal times x */
+static inline void upper_times(const BlockRows *A, int d, int32_t i, const float *x, float *y)
+{
+    row_times(A->upper, d, A->n - 1 - i, x, y);
 }
 
 static inline void from_zero(const BlockRows *A, const int d, const double *b, float *x, float *change, double *residual)
@@ -134,7 +169,7 @@ static inline void from_zero(const BlockRows *A, const int d, const double *b, f
     }
     for (int32_t i = n - 1; i >= 0; i--) { /* the diagonal block times x is b without the lower part */
         float sum[4] = {0}, found[4] = {0};
-        row_times(A->upper, d, i, x, sum);
+        upper_times(A, d, i, x, sum);
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         for (int r = 0; r < d; r++) x[d * i + r] -= found[r];
         memcpy(change + d * i, found, d * sizeof(float));
@@ -164,27 +199,29 @@ void subtract_ghosts(const BlockRows *A, const float *x, double *residual)
     }
 }
 
-static inline void both_ways(const BlockRows *A, const int d, const double *b, float *x, float *change)
+static inline void both_ways(const BlockRows *A, const int d, const double *b, float *x, float *right)
 {
     const int32_t n = A->n;
-    memcpy(change, x, (size_t)n * d * sizeof(float));
+    for (int32_t i = n - 1; i >= 0; i--) {
+        float sum[4] = {0};
+        upper_times(A, d, i, x, sum);
+        memcpy(right + d * i, sum, d * sizeof(float));
+    }
     for (int32_t i = 0; i < n; i++) {
         float sum[4] = {0}, found[4] = {0};
         row_times(A->lower, d, i, x, sum);
-        row_times(A->upper, d, i, x, sum);
         row_times(A->ghosts, d, i, x, sum);
-        for (int r = 0; r < d; r++) sum[r] = (float)b[d * i + r] + A->added[d * i + r] * x[d * i + r] - sum[r];
+        for (int r = 0; r < d; r++)
+            sum[r] = (float)b[d * i + r] + A->added[d * i + r] * x[d * i + r] - right[d * i + r] - sum[r];
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
         memcpy(x + d * i, found, d * sizeof(float));
     }
-    for (int32_t i = n - 1; i >= 0; i--) { /* only the upper part has changed */
+    for (int32_t i = n - 1; i >= 0; i--) { /* only the part right of the diagonal has changed */
         float sum[4] = {0}, found[4] = {0};
-        row_times(A->upper, d, i, change, sum);
+        upper_times(A, d, i, x, sum);
+        for (int r = 0; r < d; r++) sum[r] = right[d * i + r] - sum[r];
         add_product(d, A->inverse + (int64_t)i * d * d, sum, found);
-        for (int r = 0; r < d; r++) {
-            x[d * i + r] += found[r];
-            change[d * i + r] -= x[d * i + r];
-        }
+        for (int r = 0; r < d; r++) x[d * i + r] += found[r];
     }
 }
 
