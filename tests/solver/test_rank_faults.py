@@ -42,7 +42,7 @@ SCENE = """
     steps = 4
 """
 PLACES = {
-    "setup": ("solver.bulk", "Bulk", "__init__", 1),
+    "setup": ("solver.bulk.bulk", "Bulk", "__init__", 1),
     "residual": ("solver.contact.contact", "Contact", "evaluate", 7),
     "tangent": ("solver.contact.tangent", "ContactTangent", "filled", 4),
     "return map": ("materials.material", "Points", "update", 13),
