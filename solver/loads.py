@@ -115,14 +115,18 @@ class Loads:
         return force.array.reshape(-1, density.shape[-1])[:n_owned].copy()
 
     def forces(self, load: DeadLoad) -> Array:
-        """Forces ``(n_owned, d)`` on the modelled part per unit of the drive."""
+        """Forces ``(n_owned, d)`` on the modelled part per unit of the drive. Raises ValueError for
+        a density whose integral is zero or not finite."""
         on = self.region(load.cells, load.facets)
         if load.pressure:
             return self._spread(on, -load.pressure * on.normal)
         density: Array = np.ones(on.weight.shape)
         if load.density is not None:
-            density = load.density(np.moveaxis(on.point, -1, 0))
+            given = load.density(np.moveaxis(on.point, -1, 0))
+            density = np.broadcast_to(given, on.weight.shape)
         total = on.integral(density)
+        if not 0 < abs(total) < np.inf:
+            raise ValueError(f"the density of a load has the integral {total:g}: nothing is loaded")
         forces = self._spread(on, density[..., None] * np.array(load.force))
         return forces / (self.problem.whole * total)
 

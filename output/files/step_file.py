@@ -123,7 +123,9 @@ class StepFile:
             with h5py.File(self.path) as file:
                 there = {name: a for name, a in fixed.items() if name in file}
                 fits = all(file[name].shape == a.shape for name, a in there.items())
-                if file["accepted"][()] < after or not fits:
+                if not fits:
+                    raise ValueError("its arrays belong to another mesh, or another version")
+                if file["accepted"][()] < after:
                     raise ValueError(f"it does not hold the first {after} steps of this run")
                 loads = file["load"][:after].tolist()
                 if not fixed:  # a run without contact has nothing to tell of it

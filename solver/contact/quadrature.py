@@ -138,17 +138,17 @@ def pieces_rule(own: Patches, opposite: Patches) -> tuple[Array, Array, Index]:
 
 def _of_polygons(facet: Index, polygon: Index, triangles: Array) -> tuple[Index, Array, Array]:
     """The facets ``(p,)``, and points and weights ``(p, 3, ...)``, of the polygons that
-    `broken_facets` has found; where they are few on a facet, of its triangles or quarters of
-    them."""
+    `broken_facets` has found. On a facet with few of them each triangle counts as a polygon; with
+    few triangles, each quarter of one."""
     begins: np.ndarray = np.diff(polygon, prepend=-1) > 0
-    begins = begins | (np.bincount(facet[begins])[facet] < _FEWEST)
-    is_large = np.bincount(facet)[facet] < _FEWEST
-    times = np.where(is_large, 4, 1)
-    is_quarter = np.repeat(is_large, times)
+    has_few_polygons = np.bincount(facet[begins])[facet] < _FEWEST
+    has_few_triangles = np.bincount(facet)[facet] < _FEWEST
+    times = np.where(has_few_triangles, 4, 1)
+    is_quarter = np.repeat(has_few_triangles, times)
+    begins = np.repeat(begins | has_few_polygons, times) | is_quarter
     parts = np.repeat(triangles, times, axis=0)
-    parts[is_quarter] = quartered(triangles[is_large])
+    parts[is_quarter] = quartered(triangles[has_few_triangles])
     facet = np.repeat(facet, times)
-    number = np.cumsum(np.repeat(begins, times) | is_quarter) - 1
-    merged = without_slivers(parts, number, facet)
+    merged = without_slivers(parts, np.cumsum(begins) - 1, facet)
     xi, w = polygon_rule(parts, merged)
     return facet[np.unique(merged, return_index=True)[1]], xi, w

@@ -138,7 +138,7 @@ def two_steps(path, fixed) -> None:
         (lambda path: (path.parent / "x" / "0001.h5").unlink(), "is missing or damaged"),
         (
             lambda path: two_steps(path, FIXED | {"mesh/tag": np.arange(6)}),
-            "does not hold the first 2 steps",
+            "its arrays belong to another mesh, or another version",
         ),
         (
             lambda path: StepFile(path, FIXED).write(0.1, values(1)),

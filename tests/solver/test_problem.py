@@ -131,6 +131,25 @@ def test_a_load_is_spread_as_its_density_says():
     )
 
 
+def applied(density):
+    """The forces of a load of this ``density``."""
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    load = DeadLoad("upper", (3.0, 4.0), density)
+    mesh = blocks(MPI.COMM_SELF, 3, 3)
+    problem = Problem(mesh, bodies, (), [Dirichlet("base", "base", 1)], [load])
+    return System(problem).equilibrium.drives.applied[0]
+
+
+def test_a_density_of_one_number_spreads_evenly():
+    np.testing.assert_allclose(applied(lambda x: 2.0), applied(None), atol=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
+def test_a_density_without_an_integral_is_refused(value):
+    with pytest.raises(ValueError, match="the density of a load has the integral"):
+        applied(lambda x: value * x[0])
+
+
 def test_a_guess_moves_bodies_rigidly():
     mesh = blocks(MPI.COMM_SELF, 2, 3)
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]

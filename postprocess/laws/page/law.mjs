@@ -412,7 +412,7 @@ function totalLoss(data, side, strain, elastic, stresses, x) {
             return {
                 force: sum.force + own.force,
                 slope: sum.slope + own.slope,
-                deviation: Math.hypot(sum.deviation, own.deviation, own.begun * data.mesh[model]),
+                deviation: Math.hypot(sum.deviation, own.deviation, own.begun * data.solved[model]),
                 peak: sum.peak + own.peak,
                 angle: sum.angle + own.angle,
                 travel: mixed("travel"),

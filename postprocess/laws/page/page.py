@@ -95,7 +95,7 @@ def law_data() -> tuple[str, bytes]:
             "shares": hardening_model.SHARES.tolist(),
         },
         "factors": {"products": factor_model.PRODUCTS, "models": _json(factor_model.TABLE)},
-        "mesh": yield_model.SOLVED_ERROR,
+        "solved": yield_model.SOLVED_ERROR,
         "range": _range(),
         "metals": metals(),
         "exports": _exports(),

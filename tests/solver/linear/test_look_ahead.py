@@ -117,3 +117,21 @@ def test_a_scene_gives_the_same_digits_wherever_memory_lies():
         held.append(np.zeros(size))
         last.append(solve(scene).steps[-1])
     assert len({(m["P"], m["p0"], m["eps"]) for m in last}) == 1
+
+
+@pytest.mark.parametrize(
+    ("dimension", "yields", "friction", "iterations"),
+    [
+        (2, False, False, np.inf),
+        (3, False, True, np.inf),
+        (2, True, False, 0),
+        (2, True, True, np.inf),
+        (3, True, False, 1),
+        (3, True, True, 1),
+    ],
+)
+def test_how_long_the_active_set_is_updated_while_bodies_yield(
+    dimension, yields, friction, iterations
+):
+    facts = choose.Facts(MPI.COMM_SELF, 5000, dimension, yields, friction, False, False, 0.5, bool)
+    assert look_ahead.iterations_while_bodies_yield(facts) == iterations
