@@ -179,11 +179,15 @@ def report(folder: Path, output: Path | None, force: bool) -> int:
 @click.option(
     "--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section"
 )
+@click.option(
+    "--of", default="", metavar="LOAD", help="--over: the load that P is of, if it has several"
+)
 @output("table (.csv) or picture to write")
 def probe(
     folder: Path,
     angles: tuple[float, ...],
     over: float | None,
+    of: str,
     output: Path | None,
     along: tuple[float, ...] | None,
     **asked: Any,
@@ -197,7 +201,9 @@ def probe(
         raise click.UsageError("choose one of --line and --along")
     asked["line"] = along or asked["line"]
     found = Run(folder).probe(**asked)
-    found = found.over(over) if over is not None else found
+    if of and over is None:
+        raise InputError(f"--of {of}: is the load of --over, which is missing.")
+    found = found.over(over, of) if over is not None else found
     print(probe_text(found, angles))
     if output is not None:
         from archord.postprocess.pictures.pictures import draw_probe

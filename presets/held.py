@@ -26,6 +26,7 @@ _FAR = 0.1  # of the size of a surface: drawn farther behind another one, it doe
 _APART = 0.01  # of the same: a gap between tied surfaces that is told of
 _ALIKE = 2.0  # ratio of a drawn overlap and an interference, up to which they mean the same fit
 _ADDS = 0.1  # of a fit: a drawn gap or overlap by which it is another one
+_ON_AXIS = 1e-9  # of the size of the mesh: a radius that is none
 _BENT = 0.01  # of the length of an edge: how far it may depart from a line and be straight
 
 
@@ -50,6 +51,7 @@ def check(problem: Problem) -> list[str]:
         excused = SPACE if in_space else ("rotation",)
         faults = chain(
             beyond_axis(whole.x) if around_axis else [],
+            _pressed_axis(problem, whole) if around_axis else [],
             _shared(problem, whole, owner),
             _half_loaded(problem, whole),
             _loose(moves, touching, excused),
@@ -120,6 +122,20 @@ def _half_loaded(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     for name in sorted(_spread(problem)):
         for said in facets_within(whole, name):
             yield f"{said}, where nothing can load them: give it the facets of the boundary alone"
+
+
+def _pressed_axis(problem: Problem, whole: MeshArrays) -> Iterator[str]:
+    """What is said of pressures around an axis on facets of the axis itself."""
+    size = np.ptp(whole.x, axis=0).max(initial=0.0)
+    for load in _loads(problem):
+        if load.kind != "pressure":
+            continue
+        corners = _corners(whole, whole.facet_sets[load.on])
+        if np.abs(whole.x[corners, 0]).max(initial=0.0) <= _ON_AXIS * size:
+            yield (
+                f"the pressure {load.name!r} is on {load.on!r}, which lies on the axis x = 0 and "
+                "has no area there, so that it would load nothing: give it a surface off the axis"
+            )
 
 
 def _half_held(problem: Problem, whole: MeshArrays) -> Iterator[str]:

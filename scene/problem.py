@@ -23,6 +23,7 @@ from archord.scene.parts import (
     turns,
 )
 from archord.scene.presets.joint import STEPS
+from archord.scene.presets.way_back import doubts_of_way_back
 from archord.scene.sections.analysis import ProblemAnalysis, ProblemOutput, Stepping
 from archord.scene.sections.bodies import require_solids
 from archord.scene.sections.checked import Checked
@@ -258,7 +259,7 @@ class ProblemScene(Checked):
         found = super().doubts
         if not self.fits:
             found += unused(self.path, "path", "fit_steps", "an overlap or an interference")
-        return found
+        return [*found, *doubts_of_way_back(self.mesh.shape, self.load)]
 
     @property
     def expected_seconds(self) -> float:

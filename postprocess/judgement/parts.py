@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -75,9 +76,15 @@ def _lug(run: Run) -> Part:
             "lug, in x."
         )
     shape = _shape_of(run)
-    thickness = run.scene.thickness if shape.space is None else shape.space.thickness
+    thickness = run.scene.thickness
+    bears = math.inf
+    if shape.space is not None:
+        thickness = shape.space.thickness
+        # a bushing is as long as its hole
+        bears = thickness if shape.wall else shape.space.arguments()["pin_length"]
     force = _pulling(run, pull)
-    return _sectioned("", _body_of(run, "lug"), force, run.units[f"{pull} force"], shape, thickness)
+    unit = run.units[f"{pull} force"]
+    return _sectioned("", _body_of(run, "lug"), force, unit, shape, thickness, bears)
 
 
 def _plate(run: Run, name: str) -> Part:
@@ -108,13 +115,22 @@ def _plate(run: Run, name: str) -> Part:
 
 
 def _sectioned(
-    name: str, body: BodySection, force: Array, unit: str, lug: LugShape, thickness: float
+    name: str,
+    body: BodySection,
+    force: Array,
+    unit: str,
+    lug: LugShape,
+    thickness: float,
+    bears: float = math.inf,
 ) -> Part:
-    bears = "hole" if lug.wall else "pin"
-    note = f"bearing by hand is {BEARING:g} times the strength on the diameter of the {bears}"
+    """A part with the sections of a ``lug`` by hand, on which a pin ``bears`` over this length."""
+    inner = "hole" if lug.wall else "pin"
+    note = f"bearing by hand is {BEARING:g} times the strength on the diameter of the {inner}"
+    if bears < thickness:
+        note += f", over the length {bears:g} of the pin"
 
     def by_hand(_: str, strength: float) -> dict[str, float]:
-        return lug_forces(lug, strength, thickness)
+        return lug_forces(lug, strength, thickness, bears)
 
     noun = f"{name} plate" if name else "lug"
     return Part(name, body, force, unit, noun, by_hand, (note,))

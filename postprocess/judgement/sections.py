@@ -38,16 +38,18 @@ BEARING = 1.5
 _SPREAD = math.radians(40)  # where the shear-out planes leave the hole, from the load axis
 
 
-def lug_forces(lug: LugShape, strength: float, thickness: float) -> dict[str, float]:
+def lug_forces(
+    lug: LugShape, strength: float, thickness: float, bears: float = math.inf
+) -> dict[str, float]:
     """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin
-    or the bushing."""
+    or the bushing, over a length ``bears`` that may be shorter than its ``thickness``."""
     edge = lug.arguments()["edge_distance"]
     bore = lug.hole
     bearing = bore if lug.wall else lug.radius
     planes = 2 * (edge - bore * math.cos(_SPREAD))
     return {
         "net section": strength * (lug.width - 2 * bore) * thickness,
-        "bearing": BEARING * strength * 2 * bearing * thickness,
+        "bearing": BEARING * strength * 2 * bearing * min(thickness, bears),
         "shear-out": planes * thickness * strength / math.sqrt(3),
     }
 

@@ -45,14 +45,16 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
     else:
         quantity = quantity or "hoop"
         found = along_edge(run, edge, quantity, step)
-    force, by = _driving(run, step)
+    pulls = _pulls(run, step)
+    by = max(pulls, key=lambda name: abs(pulls[name]), default="")
     return Probe(
         place=edge or "line",
         quantity=quantity,
         unit=_unit_of(quantity, run.scene.units),
         step=step,
-        force=force,
+        force=pulls.get(by, 0.0),
         by=by,
+        pulls=pulls,
         length=run.scene.units.length,
         axes=kind.axes,
         per=_PER[kind.name],
@@ -71,15 +73,12 @@ def _unit_of(quantity: str, units: Any) -> str:
     return ""
 
 
-def _driving(run: Probed, step: int) -> tuple[float, str]:
-    """The largest force of the loads at ``step``, per unit thickness, 0 if that is round-off; and
-    its load's name."""
-    forces = {by: run.columns[column] for by, column in run.view.pulls.items()}
-    if not forces:
-        return 0.0, ""
-    by = max(forces, key=lambda name: abs(forces[name][step - 1]))
-    force = forces[by][step - 1]
-    largest = max(map(abs, forces[by]))
-    if abs(force) <= _NOTHING * largest:
-        return 0.0, by
-    return force / run.scene.thickness, by
+def _pulls(run: Probed, step: int) -> dict[str, float]:
+    """The forces of the loads at ``step``, per unit thickness, 0 where they are round-off."""
+    columns = {by: run.columns[column] for by, column in run.view.pulls.items()}
+    found = {}
+    for by, forces in columns.items():
+        force = forces[step - 1]
+        is_force = abs(force) > _NOTHING * max(map(abs, forces))
+        found[by] = force / run.scene.thickness if is_force else 0.0
+    return found

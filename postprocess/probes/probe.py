@@ -3,7 +3,8 @@ factor over a section."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _ROUND_OFF = 1e-6  # degrees
+_SAME = 1e-6  # relative difference of forces that are the same
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Probe:
         The names of the coordinates.
     per : str
         What the force is of.
+    pulls : dict
+        The forces of all loads that are resultants, by the loads' names.
 
     Examples
     --------
@@ -82,6 +86,7 @@ class Probe:
     angle: Array | None = None
     axes: tuple[str, ...] = ("x", "y")
     per: str = "per unit thickness"  # what the force is of
+    pulls: Mapping[str, float] = field(default_factory=dict)  # by loads, as the force
 
     @property
     def largest(self) -> int:
@@ -115,8 +120,9 @@ class Probe:
                 return float(np.interp(0.0, off[order], values))
         raise InputError(f"{self.place}: has no point at {angle:g} degrees.")
 
-    def over(self, length: float) -> Probe:
-        """This over P / ``length``, the mean stress that the force makes in a section. Raises
+    def over(self, length: float, of: str = "") -> Probe:
+        """This over P / ``length``, the mean stress that the force P makes in a section: the force
+        of the load ``of``, which may be left out where all forces are of one size. Raises
         `InputError`, also for a body of revolution, whose force is of the whole ring, and in space,
         where the force is not per unit thickness."""
         if self.axes != PLANE_STRAIN.axes:
@@ -127,11 +133,35 @@ class Probe:
                 f"{self.place}: has no factor over a length, as the force of {whole}; "
                 "divide by the mean stress of the section's area."
             )
-        if not (self.force and length > 0):
-            section = f"a section of {length:g} under a force of {self.force:g}"
+        force, by = self._chosen(of)
+        if not (force and length > 0):
+            section = f"a section of {length:g} under a force of {force:g}"
             raise InputError(f"{self.place}: has no factor over {section}.")
-        values = self.values / (self.force / length)
-        return replace(self, quantity=f"{self.quantity}/(P/L)", unit="", values=values)
+        return replace(
+            self,
+            quantity=f"{self.quantity}/(P/L)",
+            unit="",
+            values=self.values / (force / length),
+            force=force,
+            by=by,
+        )
+
+    def _chosen(self, of: str) -> tuple[float, str]:
+        """The force of the load ``of``, or the only one, and its load. Raises `InputError`."""
+        if of and of not in self.pulls:
+            known = ", ".join(self.pulls) or "none"
+            raise InputError(f"--of {of}: must be a load with a force; this run has {known}.")
+        if of:
+            return self.pulls[of], of
+        pulling = {name: force for name, force in self.pulls.items() if force}
+        largest = abs(self.force)
+        if any(largest - abs(force) > _SAME * largest for force in pulling.values()):
+            told = ", ".join(f"{name} {force:.6g}" for name, force in pulling.items())
+            raise InputError(
+                f"{self.place}: has no factor over a length without a load to choose: the forces "
+                f"are {told}; name one by --of."
+            )
+        return self.force, self.by
 
     def frame(self) -> pd.DataFrame:
         """As a table."""

@@ -107,7 +107,8 @@ class Scene(Checked):
         load = f"load.{self.load.kind}"
         self.require_open()
         if self.space is not None:
-            require_solid(self, not joint.is_ring, joint.radius)
+            require(not joint.is_ring, "joint.model", 'must be "block" in space')
+            require_solid(self, True, joint.radius)
         require_solids({(name,): body for name, body in self.solids.items()})
         said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
         require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)

@@ -254,6 +254,36 @@ def test_a_force_in_space_makes_no_stress_over_a_length(tmp_path):
         probe.over(2.0)
 
 
+def test_a_factor_is_of_the_force_of_one_load(tmp_path, capsys):
+    """Of two bars under two forces the larger one was taken for both: of the other bar the factor
+    was a fifth too small."""
+    bars = {"thin": (0, 0, 4, 1), "thick": (0, 2, 4, 1)}
+    problem = archord.Problem(
+        archord.rectangles(bars, size=1.0),
+        bodies=[archord.Body(name, archord.Elastic(1e3, 0.0)) for name in bars],
+        supports=[archord.Support(f"{name} left") for name in bars],
+        loads=[
+            archord.Load(f"pull {name}", on=f"{name} right", direction="x", force=force)
+            for name, force in (("thin", 8.0), ("thick", 10.0))
+        ],
+        steps=1,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    probe = run.probe(line=(1.0, 0.5, 3.0, 0.5), quantity="stress_xx")
+    assert (probe.force, probe.by) == pytest.approx((10.0, "pull thick"))
+    with pytest.raises(archord.InputError, match="pull thin 8, pull thick 10; name one by --of"):
+        probe.over(1.0)
+    factor = probe.over(1.0, of="pull thin")
+    np.testing.assert_allclose(factor.values, 1.0, rtol=1e-9)
+    assert (factor.force, factor.by) == pytest.approx((8.0, "pull thin"))
+    with pytest.raises(archord.InputError, match="--of push: must be a load with a force"):
+        probe.over(1.0, of="push")
+    asked = ["probe", str(run.folder), "--edge", "thin top", "--of", "pull thin"]
+    assert command(asked) == 2
+    assert "is the load of --over" in capsys.readouterr().err
+    assert command([*asked, "--over", "1"]) == 0
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [

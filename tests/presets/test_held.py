@@ -79,6 +79,13 @@ def test_two_squares_are_no_fault(squares):
         ),
         ({"units": {"length": "mm"}, "mesh": {"scale": 0.001}}, "large; is it in metres"),
         (
+            {
+                "analysis": {"plane": "axisymmetric"},
+                "load": [{"name": "p", "on": "lower l", "pressure": 1.0}],
+            },
+            "the pressure 'p' is on 'lower l', which lies on the axis x = 0 and has no area there",
+        ),
+        (
             {"load": [{"name": "p", "on": "top", "direction": "y", "displacement": 1.0}]},
             "there is no .* 'top'",
         ),

@@ -380,3 +380,41 @@ def test_an_override_changes_the_shape_of_a_preset(tmp_path):
         with pytest.raises(InputError) as fault:
             load_scene(path, [override])
         assert said in str(fault.value)
+
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+LUG_SHAPE = {"lug": {"radius": 10.0, "clearance": 0.1, "width": 40.0}, "plate": STEEL}
+SLEEVED = {
+    "bushing": {"radius": 10.0},
+    "sleeve": [{"bore": 10.05, "outer": 14.0} | STEEL],
+    "housing": {"bore": 13.98, "outer": 30.0} | STEEL,
+}
+IN_SPACE = {
+    "joint": {"radius": 10.0, "clearance": 0.05, "block_size": 40.0},
+    "block": STEEL,
+    "space": {"thickness": 10.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("sections", "load", "said"),
+    [
+        (LUG_SHAPE, {"force": [5e3, -5e3]}, "force = -5000 moves the pin back, where nothing"),
+        (LUG_SHAPE, {"displacement": [0.1, -0.19]}, ""),
+        (LUG_SHAPE, {"displacement": [0.1, -0.21]}, "= -0.21 moves the pin back by more than 0.2"),
+        (SLEEVED, {"displacement": -0.04}, ""),
+        (SLEEVED, {"displacement": -0.2}, "= -0.2 moves the pin back by more than 0.05"),
+        (IN_SPACE, {"displacement": [2.0, -1.9]}, ""),
+        (IN_SPACE, {"displacement": [2.0, -2.1]}, "moves the pin back by more than 0.1"),
+    ],
+)
+def test_half_a_pin_that_is_moved_back_is_told(sections, load, said):
+    """A force moved it by 3.6 mm for 0.26, and a displacement left P at 0, without a word."""
+    scene = parse_any(sections | {"pin": STEEL, "load": load})
+    if not isinstance(scene, ProblemScene):
+        scene = parse_any(scene.general())
+    assert [said in doubt for doubt in scene.doubts] == [True] * bool(said)
+    if sections is IN_SPACE:
+        return
+    whole = parse_any(sections | {"pin": STEEL | {"whole": True}, "load": load})
+    assert whole.doubts == []

@@ -27,6 +27,8 @@ _POOR = 0.3  # half an interval over its value that tells hardly anything
 _SERIAL = 0.5  # correlation of neighbouring residuals that noise hardly ever has
 _MISSED = 0.05  # rms of residuals over the largest force beyond which something is wrong
 _GAP = 3  # points before first touch that show where it is
+_LEAD = 5  # points by which a curve begins
+_ZERO = 0.02  # of the largest force: what noise may leave of none
 _RETURNED = 0.1  # share of the largest force by which the way back must leave first loading
 
 
@@ -116,7 +118,7 @@ def doubts(found: Identification) -> list[str]:
                 f"{names[i]} and {names[k]} can hardly be told apart (correlation {alike:.3f}): "
                 f"{why}"
             )
-    return [*said, *_doubts_of_law(found), *_doubts_of_residuals(found)]
+    return [*said, *_doubts_of_zero(found), *_doubts_of_law(found), *_doubts_of_residuals(found)]
 
 
 def _doubts_of(one: Estimate, found: Identification) -> list[str]:
@@ -149,6 +151,19 @@ def _reason(names: set[str], found: Identification) -> str:
     if COMPLIANCE in names:
         return "machine and joint are springs in a row; give --machine-stiffness"
     return "the curve tells a combination of both; give one of them"
+
+
+def _doubts_of_zero(found: Identification) -> list[str]:
+    """A warning of a curve that begins with a force: the machine's own, or behind first touch."""
+    curve = found.model.curve
+    begins = float(np.median(curve.load[:_LEAD]))
+    if abs(begins) <= _ZERO * curve.largest:
+        return []
+    share = f"{abs(begins) / curve.largest:.1%} of the largest"
+    return [
+        f"the curve begins at a force of {abs(begins):.4g}, {share}, where the joint has none: "
+        "subtract what the machine reads without a load, and measure from before first touch"
+    ]
 
 
 def _returns(found: Identification) -> bool:

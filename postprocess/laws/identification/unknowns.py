@@ -66,6 +66,14 @@ def of_scene(scene: Scene, frees: Iterable[str]) -> list[Unknown]:
         twice = {key for one in found for key in one.keys} & {*keys}
         if twice or len({*keys}) < len(keys):
             raise InputError(f"--free {free}: frees a key twice.")
+        given = [key for one in found for key in one.keys]
+        for key in keys:
+            section, _, name = key.partition(".")
+            others = {f"{section}.{n}" for names in _alternatives(section, name) for n in names}
+            clash = [other for other in (*given, *keys) if other in others and other != key]
+            if clash:
+                said = f"{key} and {clash[0]} say one thing; free one of them"
+                raise InputError(f"--free {free}: {said}.")
         unknown = _of_keys(scene, free, keys)
         found.append(_bounded(unknown, free, bounds) if bounds else unknown)
     return found

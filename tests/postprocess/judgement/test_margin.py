@@ -2,12 +2,14 @@
 of both."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from archord.cli import run as command
 from archord.postprocess.judgement.margin import load_at, margin_text, margins
+from archord.postprocess.judgement.parts import parts_of
 from archord.postprocess.judgement.sections import (
     ClevisPin,
     lug_forces,
@@ -56,9 +58,37 @@ def test_hand_formulas_are_those_of_the_sections():
     assert found["bearing"] == pytest.approx(1.5 * 100 * 20 * 5)
     planes = 2 * (20 - 10.1 * math.cos(math.radians(40))) * 5
     assert found["shear-out"] == pytest.approx(planes * 100 / math.sqrt(3))
+    short = lug_forces(LugShape(**SHAPE, edge_distance=20.0), 100.0, 5.0, bears=2.0)
+    assert short == found | {"bearing": pytest.approx(1.5 * 100 * 20 * 2)}
     bushed = lug_forces(LugShape(**SHAPE, wall=2.0, interference=0.1), 100.0, 5.0)
     assert bushed["net section"] == pytest.approx(100 * (40 - 24) * 5)
     assert bushed["bearing"] == pytest.approx(1.5 * 100 * 24 * 5)
+
+
+@pytest.mark.parametrize(
+    ("space", "bushing", "length"),
+    [
+        ({"thickness": 12.0, "pin_length": 6.0}, {}, 6.0),
+        ({"thickness": 12.0, "pin_length": 16.0}, {}, 12.0),
+        ({"thickness": 12.0}, {}, 12.0),
+        ({"thickness": 12.0, "pin_length": 6.0}, {"bushing": STEEL | {"thickness": 2.0}}, 12.0),
+    ],
+)
+def test_a_short_pin_bears_over_its_length(space, bushing, length):
+    """The bearing force of a pin half as long as the hole was twice too large. A bushing bears over
+    the thickness of its lug."""
+    scene = parse_any(lug({"force": 1e4}, {"hardening": CURVE}, space=space) | bushing)
+    run = SimpleNamespace(
+        scene=scene,
+        folder="run",
+        number=lambda step: 1,
+        columns={"pull force": [1e4]},
+        units={"pull force": "N"},
+    )
+    part = parts_of(run)[""]
+    diameter = 2 * 12.1 if bushing else 20.0
+    assert part.by_hand("yield", 100.0)["bearing"] == pytest.approx(150.0 * diameter * length)
+    assert ("over the length" in part.notes[0]) == (length < 12.0)
 
 
 def test_a_pin_bends_about_the_faces_that_bear():

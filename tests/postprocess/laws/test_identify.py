@@ -141,6 +141,21 @@ def test_what_cannot_be_told_apart_is_said():
     assert "no points before first touch" in said(found)
 
 
+@pytest.mark.usefixtures("_begun_at_the_scene")
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_force_that_the_machine_reads_without_a_load_is_told(sign):
+    """3 % of the largest force made the yield stress 8 % too large, and nothing said why."""
+    curve = measured(ELASTIC, {}, 5, n=60, noise=0.002, soft=0.0)
+    zero = 0.03 * curve.largest
+    moved = MeasuredCurve(curve.displacement, curve.load + sign * zero)
+    scene = archord.load_scene(ELASTIC)
+    found = identify(scene, moved, ["joint.clearance"], stiffness=np.inf)
+    assert "the curve begins at a force of" in said(found)
+    assert "what the machine reads without a load" in said(found)
+    found = identify(scene, curve, ["joint.clearance"], stiffness=np.inf)
+    assert "the curve begins at a force" not in said(found)
+
+
 def test_units_that_are_wrong_by_1000_end_at_a_bound():
     curve = measured(STEEL, {}, 3, n=100, soft=0.0)
     kilo = MeasuredCurve(curve.displacement, curve.load / 1000)
@@ -156,6 +171,7 @@ def test_units_that_are_wrong_by_1000_end_at_a_bound():
         ("joint.block_size", "the law does not depend on joint.block_size"),
         ("block.strength", "a scene has no key block.strength"),
         ("joint.clearance,joint.clearance", "frees a key twice"),
+        ("joint.clearance,joint.relative_clearance", "say one thing; free one of them"),
         ("joint.clearance=3:1", "the lower one first"),
         ("joint.clearance=few", "must read LOW:HIGH"),
     ],
