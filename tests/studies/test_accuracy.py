@@ -16,13 +16,15 @@ import archord
 from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.cost.work_precision_codes import CASES
 from archord.commands.progress import Progress
+from archord.measures.record import Record
 from archord.output.restart import plan_restart
-from archord.output.run import solve_scene
+from archord.output.run import Outcome, solve_scene
 from archord.presets import mesh_family
 from archord.presets.mesh_family import MeshFamily, ProblemFamily
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, parse_scene, resolved
 from archord.scene.presets import joint_geometry as scene_geometry
+from archord.studies import accuracy
 from archord.studies.accuracy import solve_to_accuracy
 from tests.output.run_files import accepted_steps, same_run
 
@@ -159,6 +161,27 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
     outcome = accurate(open_scene(3e-3, load=load), tmp_path)
     assert outcome.steps[-1]["delta"] == pytest.approx(0.01, rel=3e-3)
     assert outcome.accuracy.levels[-1].last == outcome.steps[-1]["delta"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "order"), [({"yield_stress": 0.002}, 1.0), ({"analysis": {"friction": 0.3}}, 0.5)]
+)
+def test_the_error_of_steps_is_what_is_left_to_their_limit(tmp_path, monkeypatch, kind, order):
+    """Of a P that comes near its limit with the step where a body yields, and with the root of the
+    step where it rubs: by these orders nothing is over- or underestimated."""
+
+    def converging(scene, folder, comm, *, interrupt, on_start):
+        on_start(SimpleNamespace(n_dofs=round(1 / scene.joint.h**2)))
+        P = 1 + 0.004 * scene.stepping.initial**order
+        (folder / "run.json").write_text('{"error_estimates": {}}')
+        values = {"P": P, "delta": 2.0}
+        step = Record(1, 2.0, values, 2.0, *np.zeros(4), 1, 0, 0.0)
+        return Outcome(folder, "done", "", [step], [])
+
+    monkeypatch.setattr(accuracy, "solve_scene", converging)
+    found = accurate(open_scene(1e-3, 1, **kind), tmp_path).accuracy
+    assert found.step_error == pytest.approx(0.004 * found.substeps**-order, rel=5e-3)
+    assert 2 * found.step_error <= found.asked
 
 
 @pytest.mark.parametrize(("steps", "many_substeps"), [(1, 32), (4, 16)])
