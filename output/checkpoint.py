@@ -73,6 +73,7 @@ def halt(
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": system.equilibrium.largest_reaction,
         "stabilisation_energy": springs.energy if springs else 0.0,
+        "springs_idle": springs is not None and springs.idle,
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": levels.tolist(),
         "contact_points": RULE.get(),
@@ -115,6 +116,8 @@ def resume(
     system = order.system
     if system.equilibrium.springs:
         system.equilibrium.springs.energy = scalars["stabilisation_energy"]
+        # version 0.2 did not write it; where they are not idle, guesses only take longer
+        system.equilibrium.springs.idle = scalars.get("springs_idle", False)
     system.solver.continues_gamma = scalars["gamma_by_and_by"]
     solved = state("fields/displacement", "level")
     system.equilibrium.resume(position.load, solved, scalars["largest_reaction"])

@@ -96,15 +96,12 @@ class Equilibrium:
         and evaluate it."""
         self.restore(load, state)
         self.largest_reaction = largest_reaction
-        self.contact.search()
         # the slip of rigid discs counts from where they are
         self.contact.move(self.unknowns.levels, self.problem.fitted(load))
         self.contact.begin(self.displacement())
         self.evaluate()
         self.linear.follow()
         self.contact.begin(self.displacement())  # now that it is known which points touch
-        if self.springs:
-            self.springs.look()
 
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""

@@ -110,7 +110,7 @@ class Springs:
         self.rest = self._now
         self.energy += self.work
         self.works = self._works()
-        self.look()
+        self.idle = self._leave_all()
 
     def _works(self) -> dict[str, float]:
         """What they took up at the last evaluation, as ``works``."""
@@ -144,14 +144,14 @@ class Springs:
         works = self._works()
         return max(works, key=lambda name: works[name])
 
-    def look(self) -> None:
-        """See whether they are `idle`."""
+    def _leave_all(self) -> bool:
+        """Whether they leave all to contact at the last evaluation."""
         forces = [np.abs(self.forces).sum()]
         for interface in self._contact.interfaces:
             forces.append(sum(float(np.abs(pair.forces).sum()) for pair in interface.pairs))
         pulled, *pressed = self.comm.allreduce(np.array(forces))
         is_little = pulled + np.abs(self.on_levels).sum() < _LITTLE * sum(pressed)
-        self.idle = bool(is_little and self.rigid.all_reached([force > 0 for force in pressed]))
+        return bool(is_little and self.rigid.all_reached([force > 0 for force in pressed]))
 
 
 def _form(drives: Drives, body: Body, softest: float) -> fem.Form:

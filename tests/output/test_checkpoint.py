@@ -2,20 +2,24 @@
 written."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
+from archord.geometry.shapes.rectangles import rectangles
+from archord.materials.elasticity import Elastic
 from archord.measures.energies import Work
 from archord.measures.record import Record
 from archord.output import checkpoint
 from archord.report.errors import InputError
 from archord.solver.path.load_path import Position
 from archord.solver.path.mesh_order import MeshOrder
-from archord.solver.path.stepping import Step
+from archord.solver.path.stepping import Step, march
 from archord.solver.path.system import System
+from archord.solver.problem import Body, Dirichlet, Drive, Interaction, Problem
 from tests.solver.contact.test_ranks import CUTS
 from tests.solver.solving import joint_system, scene, solve
 from tests.solver.test_stabilisation import sleeves
@@ -33,18 +37,44 @@ def pressed():
     return checkpoint.halt(MeshOrder(joint), "scene", *at)
 
 
-def test_the_energy_of_springs_goes_on(tmp_path):
-    """What springs took up before a halt counts after it, too."""
-    halted = System(sleeves())
-    halted.solve([0.15])
-    energy = halted.stabilisation_energy
-    assert energy > 0
-    record = Record(1, 0.15, {}, 0.0, *np.zeros(4), 1, 0, 0.0)
-    position = Position(1, halted.equilibrium.load, 0.15, halted.equilibrium.state())
-    saved = checkpoint.halt(MeshOrder(halted), "", record, Step(0.15), position, Work())
-    going_on = System(sleeves())
+def rubbing() -> Problem:
+    """A block that is pressed on another and drawn along it by less than makes it slide, and one
+    beside them that weak springs hold."""
+    boxes = {"lower": (0, 0, 4, 1), "upper": (1, 1, 2, 1), "loose": (6, 0, 1, 1)}
+    rub = Interaction("rub", ("upper bottom", "lower top"), friction=0.5)
+    supports = [
+        *(Dirichlet("base", "lower bottom", axis) for axis in (0, 1)),
+        Dirichlet("top", "upper top", 1, 1.0, "press"),
+        Dirichlet("top x", "upper top", 0, 1.0, "draw"),
+    ]
+    drives = [Drive("press", [0.0, -1e-3, -1e-3]), Drive("draw", [0.0, 0.0, 1e-4])]
+    bodies = [Body(name, Elastic(1000.0, 0.0)) for name in boxes]
+    mesh = rectangles(boxes, 1.0, MPI.COMM_SELF)
+    return Problem(mesh, bodies, [rub], supports, drives=drives, stabilise=True)
+
+
+@pytest.mark.parametrize(
+    ("problem", "loads", "idle"),
+    [(sleeves, [0.1, 0.12], False), (sleeves, [0.3, 0.31], True), (rubbing, [1.0, 1.5], False)],
+    ids=["floating", "carried", "sticking"],
+)
+def test_a_system_goes_on_from_a_checkpoint_as_if_not_left(tmp_path, problem, loads, idle):
+    """With springs that rest where they were, and points that know whether they touched."""
+    systems = [System(problem()) for _ in range(2)]
+    halted, going_on = systems
+    halted.solve(loads[:1])
+    position = Position(1, loads[0], loads[0], halted.equilibrium.state())
+    record = Record(1, loads[0], {}, 0.0, *np.zeros(4), 1, 0, 0.0)
+    saved = checkpoint.halt(MeshOrder(halted), "", record, Step(loads[0]), position, Work())
     checkpoint.resume(MeshOrder(going_on), tmp_path, saved)
-    assert going_on.stabilisation_energy == pytest.approx(energy, rel=1e-14)
+    springs = [system.equilibrium.springs for system in systems]
+    assert [each.idle for each in springs] == [idle, idle]
+    for system in systems:
+        march(system.load_path(replace(position)), [loads[0], loads[1]])
+    energies = [each.energy for each in springs]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-9)
+    states = [system.equilibrium.state() for system in systems]
+    np.testing.assert_allclose(states[1], states[0], rtol=0, atol=1e-12)
 
 
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:

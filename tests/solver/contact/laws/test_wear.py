@@ -289,16 +289,28 @@ def test_wear_goes_on_from_a_checkpoint(comm):
     """The depth of every point comes back, and the path goes on as if it had not been left."""
     before = rubbed(comm, Wear(0.05))
     before.solve([1.0, 1.5])
-    at = before.equilibrium
-    history = MeshOrder(before).collect_history()
-    after = rubbed(comm, Wear(0.05))
-    MeshOrder(after).spread_history(history)
-    after.equilibrium.resume(1.5, at.state(), at.largest_reaction)
+    after = gone_on(before, rubbed(comm, Wear(0.05)))
     assert worn(after) == pytest.approx(worn(before), rel=1e-12)
-    path = after.load_path(Position(load=1.5, stride=0.5))
-    march(path, [2.0, 3.0])
+    march(after.load_path(Position(load=1.5, stride=0.5)), [2.0, 3.0])
     before.solve([2.0, 3.0])
     assert worn(after) == pytest.approx(worn(before), rel=1e-9)
+
+
+def test_a_law_knows_the_length_of_the_step_after_a_halt():
+    """It counts from the load at which the path was left."""
+    before = rubbed(MPI.COMM_SELF, Viscous())
+    before.solve([1.0, 1.5])
+    after = gone_on(before, rubbed(MPI.COMM_SELF, Viscous()))
+    march(after.load_path(Position(load=1.5, stride=0.5)), [1.75])
+    assert after.drive_force("slide") == pytest.approx(Viscous.eta * 0.02, rel=1e-2)
+
+
+def gone_on(before: System, after: System) -> System:
+    """``after`` in the state that ``before`` was halted in at the load 1.5."""
+    at = before.equilibrium
+    MeshOrder(after).spread_history(MeshOrder(before).collect_history())
+    after.equilibrium.resume(1.5, at.state(), at.largest_reaction)
+    return after
 
 
 def worn(system: System) -> float:
