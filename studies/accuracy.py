@@ -42,7 +42,8 @@ class Level:
 
     ``element_size`` is over R, of a file over the size of its cells. ``last`` is the last value of
     P, or of delta under a force. Beside them stand what it cost, and the errors that were estimated
-    with it, if any.
+    with it, if any. ``cutbacks`` count steps that were shorter than the ``substeps`` say, as they
+    did not converge.
     """
 
     mesh: int
@@ -55,6 +56,7 @@ class Level:
     iterations: int
     mesh_error: float | None = None
     step_error: float | None = None
+    cutbacks: int = 0
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,8 @@ class _Search:
         these steps.
 
         With friction errors fall more slowly than steps, and the first differences may grow: only
-        one that is smaller than the one before says how large the error is.
+        one that is smaller than the one before says how large the error is. A run whose steps were
+        cut may have taken the steps of the finer run: the difference of both tells nothing.
         """
         has_friction = self.scene.has_friction
         order = _ORDER_WITH_FRICTION if has_friction else 1.0
@@ -167,6 +170,12 @@ class _Search:
             finer, finer_level = self._solve(mesh, 2 * self.substeps)
             if finer is None:
                 raise _End
+            if level.cutbacks and 4 * self.substeps <= MOST_SUBSTEPS:
+                self._tell(level)
+                curve = finer
+                level = finer_level
+                self.substeps = 2 * self.substeps
+                continue
             apart = step_error(curve, finer)
             is_evidence = apart <= before or not has_friction
             before = apart
@@ -211,8 +220,16 @@ class _Search:
         curve = self.comm.bcast(self.family.curve(outcome.steps))
         iterations = sum(m.iterations for m in outcome.steps)
         seconds = round(perf_counter() - begun, 4)
-        sizes = self.family.sizes(scene)
-        level = Level(mesh + 1, *sizes, substeps, self.family.dofs, curve[-1], seconds, iterations)
+        level = Level(
+            mesh + 1,
+            *self.family.sizes(scene),
+            substeps,
+            self.family.dofs,
+            curve[-1],
+            seconds,
+            iterations,
+            cutbacks=sum(m.cutbacks for m in outcome.steps),
+        )
         return curve if self.family.resolved(scene, outcome.steps) else None, level
 
     def _tell(self, level: Level) -> None:

@@ -25,7 +25,7 @@ from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_any, parse_scene, resolved
 from archord.scene.presets import joint_geometry as scene_geometry
 from archord.studies import accuracy
-from archord.studies.accuracy import solve_to_accuracy
+from archord.studies.accuracy import Level, _Search, solve_to_accuracy
 from tests.output.run_files import accepted_steps, same_run
 
 
@@ -218,6 +218,34 @@ def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
         assert errors[-1] < asked / 2
     assert taken[1] > taken[0]
     assert errors[1] < errors[0]
+
+
+def test_a_run_whose_steps_were_cut_tells_no_error_of_steps(tmp_path, monkeypatch):
+    """Its steps may be the steps of the finer run: the error was told to be 7e-13, and was 7.6e-3.
+    Here each curve is 1 less a twentieth of its longest step."""
+    scene = parse_any(
+        {
+            "lug": {"radius": 10.0, "clearance": 0.1, "width": 40.0},
+            "pin": {"E": 210e3, "nu": 0.3},
+            "plate": {"material": "S355"},
+            "load": {"displacement": 0.2, "steps": 1},
+            "analysis": {"accuracy": 0.1},
+        }
+    )
+    told = []
+
+    def solved(search, mesh, substeps):
+        length = min(1 / substeps, 0.5)  # the first run is cut in two
+        curve = np.array([1 - 0.05 * length])
+        level = Level(1, 0.1, 0.5, substeps, 99, curve[-1], 1.0, 9, cutbacks=int(substeps == 1))
+        return curve, level
+
+    monkeypatch.setattr(_Search, "_solve", solved)
+    search = _Search(scene, tmp_path, MPI.COMM_SELF, None, None, told.append, {})
+    _, level = search._choose_steps(1, *search._solve(1, 1))
+    assert (level.substeps, search.substeps) == (2, 2)
+    assert search.step_error == pytest.approx(0.025, rel=0.1)
+    assert [one.step_error for one in told if one.substeps == 1] == [None]
 
 
 def test_a_mesh_that_does_not_see_the_contact_is_no_evidence(tmp_path, monkeypatch):
