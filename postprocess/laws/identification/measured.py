@@ -62,11 +62,14 @@ def read_curve(
     cells = [[cell.strip().strip('"') for cell in line.split(separator)] for line in lines]
     if separator != ",":
         cells = [[cell.replace(",", ".") for cell in row] for row in cells]
-    begin = next((k for k, row in enumerate(cells) if _is_number(row[0])), len(cells))
+    begin = next((k for k, row in enumerate(cells) if not _is_heading(row)), len(cells))
     heads = cells[0] if begin else []
     columns = [_column(path, heads, name, k) for k, name in enumerate((delta, load))]
     if columns[0] == columns[1]:
         fault = f"column {columns[0] + 1} is taken for displacement and force"
+        raise InputError(f"{path}: {fault}; name both, by --delta and --load.")
+    if any(column < len(heads) and not heads[column] for column in columns):
+        fault = "has a column without a heading, as of a table's index, among the first two"
         raise InputError(f"{path}: {fault}; name both, by --delta and --load.")
     _require_one_reading(path, separator, lines, cells, begin, columns)
     numbers = np.array([_numbers(path, row, columns) for row in cells[begin:]]).reshape(-1, 2)
@@ -91,6 +94,13 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _is_heading(row: list[str]) -> bool:
+    """Whether a ``row`` has no numbers; the first column may be an index, whose heading is
+    empty."""
+    is_index = not row[0] and not all(map(_is_number, row))
+    return is_index or not _is_number(row[0])
 
 
 def _column(path: Path, heads: list[str], name: str | None, default: int) -> int:

@@ -238,6 +238,17 @@ def test_a_comma_of_two_meanings_is_refused(tmp_path, text, words):
         read_curve(path)
 
 
+def test_a_column_without_a_heading_is_no_displacement(tmp_path):
+    """As pandas writes tables with their index: columns are found by their names, and the index is
+    not taken for the first one."""
+    path = tmp_path / "curve.csv"
+    path.write_text(",u,F\n" + "".join(f"{k},{0.1 * k},{2 * k}\n" for k in range(9)))
+    curve = read_curve(path, "u", "F")
+    assert (curve.displacement[-1], curve.load[-1]) == pytest.approx((0.8, 16))
+    with pytest.raises(InputError, match="a column without a heading.*name both, by --delta and"):
+        read_curve(path)
+
+
 def test_units_below_the_headings_are_compared(tmp_path):
     """As test machines write them, with or without brackets."""
     path = tmp_path / "curve.csv"
