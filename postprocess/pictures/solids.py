@@ -38,7 +38,7 @@ class Skin(NamedTuple):
     """The boundary of deformed bodies as ``k`` triangles.
 
     - ``corners`` ``(k, 3, 3)``: seen from outside against the clock
-    - ``values`` ``(k,)``: of the field
+    - ``values`` ``(k, 3)``: of the field at the corners
     """
 
     corners: Array
@@ -94,9 +94,8 @@ def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
     triangles[inside_out] = triangles[inside_out, ::-1]
     x = surface.points + surface.point_data["displacement"]
     found = getattr(surface, of_what)["value"]
-    if not of_cells:
-        found = found[triangles].mean(axis=1)
-    return Skin(x[triangles], found)
+    at_corners = np.stack([found] * 3, axis=1) if of_cells else found[triangles]
+    return Skin(x[triangles], at_corners)
 
 
 def field_panel(
@@ -105,7 +104,8 @@ def field_panel(
     """A ``field`` at ``step`` (see `shown_step`) on the deformed bodies, seen from the octant that
     shows most of it. Raises `InputError` for a field that the run does not have, and for a ``cut``
     that leaves nothing."""
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import TriMesh
+    from matplotlib.tri import Triangulation
 
     fields = run.fields(step or shown_step(run))
     values, label, map_name = field_values(run, fields, field)
@@ -114,7 +114,7 @@ def field_panel(
     if map_name == OF_PEEQ:
         shown = np.where(shown == 0, np.nan, shown)
     normal = _normals(skin.corners)
-    size = np.abs(np.nan_to_num(shown))
+    size = np.abs(np.nan_to_num(shown)).mean(axis=1)
     view = _best_view(normal, size, cut)
     # Faces that look away are hidden, but their triangles can be nearer than those before them.
     facing = np.flatnonzero(normal @ view.towards > 0)
@@ -123,10 +123,10 @@ def field_panel(
     known = shown[np.isfinite(shown)]
     colours = colours_for(known, map_name)
     painted = _painted(colours, shown[order], normal[order], view)
-    polygons = view.flat(skin.corners[order])
-    axes.add_collection(
-        PolyCollection(polygons, facecolors=painted, edgecolors=painted, linewidths=0.5)
-    )
+    places = view.flat(skin.corners[order]).reshape(-1, 2)
+    triangles = np.arange(len(places)).reshape(-1, 3)
+    drawn = Triangulation(*places.T, triangles)
+    axes.add_collection(TriMesh(drawn, facecolors=painted.reshape(-1, 4), rasterized=True))
     axes.autoscale_view()
     axes.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
     _draw_axes(axes, view)
@@ -178,14 +178,15 @@ def _best_view(normal: Array, size: Array, cut: str) -> View:
 
 
 def _painted(colours: Colours, values: Array, normal: Array, view: View) -> Array:
-    """Colours ``(k, 4)`` of faces, darker where they are seen from the side."""
+    """Colours ``(k, 3, 4)`` of the corners of faces with these ``values`` ``(k, 3)``, darker where
+    the faces are seen from the side."""
     span = max(colours.high - colours.low, np.finfo(float).tiny)
     scaled = (values - colours.low) / span
     painted = colours.map(np.clip(np.nan_to_num(scaled), 0, 1))
     painted[~np.isfinite(values), :3] = _ELASTIC
     facing = np.abs(normal @ view.towards)
     light = _DARKEST + (1 - _DARKEST) * facing
-    painted[:, :3] *= light[:, None]
+    painted[..., :3] *= light[:, None, None]
     return painted
 
 

@@ -260,7 +260,8 @@ def test_pictures_show_bodies_pressures_and_forces(folders, tmp_path):
 
 
 def test_the_skin_of_bodies_encloses_their_volume(folders):
-    """Triangles are seen from outside; a cut ends at its plane, where it has a face."""
+    """Triangles are seen from outside; a cut ends at its plane, where it has a face. A field of the
+    nodes has its values at the corners."""
     run = archord.load(folders[CellType.tetrahedron])
     fields = run.fields()
     still = replace(fields, displacement=0 * fields.displacement)
@@ -269,7 +270,9 @@ def test_the_skin_of_bodies_encloses_their_volume(folders):
     volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
     assert np.linalg.det(skin.corners).sum() / 6 == pytest.approx(volume, rel=1e-5)
     assert np.isin(skin.values, fields.von_mises).all()
-    x = skin_of(run, still, fields.von_mises, "x=0.4").corners[..., 0]
+    at_nodes = skin_of(run, still, fields.coordinates[:, 0], "x=0.4")
+    x = at_nodes.corners[..., 0]
+    np.testing.assert_allclose(at_nodes.values, x, atol=1e-7)
     assert x.max() == pytest.approx(0.4)
     assert np.isclose(x, 0.4).all(axis=1).any()
 
