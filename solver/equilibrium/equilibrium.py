@@ -56,6 +56,12 @@ class Equilibrium:
         """Length of the step from the last accepted load to the present one."""
         return abs(self.load - self._accepted_load)
 
+    @property
+    def lets_go(self) -> bool:
+        """Whether the forces that pushed in the last accepted state are gone at the load."""
+        pushes = self.drives.pushes
+        return pushes(self._accepted_load) and not pushes(self.load)
+
     def pack(self, state: Array, x: PETSc.Vec) -> None:
         """Put a ``state`` into the unknowns ``x``, with the prescribed values at the load."""
         self.unknowns.pack(self.load, state, x)

@@ -80,6 +80,7 @@ class Springs:
         self.energy = 0.0
         self.works: dict[str, float] = {}
         self.idle = False
+        self._tightness = 1.0
 
     def pull(self, u: Array) -> Array:
         """Forces ``(n_owned dofs,)`` of displacements ``u``, alike, on the bodies' springs."""
@@ -98,6 +99,15 @@ class Springs:
         self.on_levels = self.of_levels * self._turned
         on_bodies = self.comm.allreduce(float(self.forces @ self._moved))
         self.work = (on_bodies + float(self.on_levels @ self._turned)) / 2
+
+    def hold(self, tightness: float) -> None:
+        """Let them be ``tightness`` times as stiff as they are at first."""
+        change = tightness / self._tightness
+        self._tightness = tightness
+        if change != 1:
+            self._matrix.scale(change)
+            self.of_free.scale(change)
+            self.of_levels = change * self.of_levels
 
     def rest_at(self, state: Array) -> None:
         """Let them have no force in a ``state``, an array of displacements and levels."""

@@ -16,6 +16,8 @@ from archord.solver.path.newton import CIRCLING, Newton, NewtonSolver
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
+# times as stiff are springs where forces let go: what nothing pushes leaps where they are weaker
+_HOLDING = 16.0
 _ROUGH = 1e-3  # residual over reaction at which a solution is good enough for a guess
 
 
@@ -40,6 +42,8 @@ class Recovery:
         """
         at = self.equilibrium
         at.load = load
+        if at.springs is not None:
+            at.springs.hold(_HOLDING if at.lets_go else 1.0)
         self._solves = []
         for guess, afar in guesses:
             if at.springs is not None and (afar or not at.springs.idle):

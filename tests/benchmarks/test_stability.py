@@ -8,9 +8,11 @@ from dataclasses import replace
 
 import h5py
 import pytest
+from mpi4py import MPI
 
 from archord.benchmarks.case import Expected, slug
 from archord.benchmarks.stability.cases import FILE, FINE, cases, fine_scene
+from archord.benchmarks.stability.eye import drawn_eye
 from archord.benchmarks.stability.picture import what_happened
 from archord.benchmarks.stability.run import (
     Check,
@@ -22,6 +24,7 @@ from archord.benchmarks.stability.run import (
     with_references,
 )
 from archord.cli import run
+from archord.output.run import solve_scene
 from archord.scene.presets.joint import Scene
 
 
@@ -131,6 +134,21 @@ def test_blocks_of_quadrilaterals_and_triangles(tmp_path):
     for name in ("20:1, contact", "1:20, triangles, tied"):
         line = judge(table[name], {name: solve_case(table[name], tmp_path)}, {})
         assert (line.verdict, line.result.quantities["pull displacement"]) == ("converges", -0.01)
+
+
+def test_an_eye_is_let_go_on_a_coarse_mesh(tmp_path):
+    """Nothing pushes its pins then, so that no step is too short to fail: the out-of-balance forces
+    of the fit moved them by more than their clearances in an iteration."""
+    scene = cases()["eye, pulled and let go"].scene
+    mesh = scene.mesh.model_copy(update={"file": str(drawn_eye(14))})
+    at_once = scene.path.model_copy(update={"steps": 1})
+    uncut = scene.stepping.model_copy(update={"minimum": 1.0})
+    coarse = scene.model_copy(update={"mesh": mesh, "path": at_once, "stepping": uncut})
+    outcome = solve_scene(coarse, tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "done"
+    pulled, let_go = outcome.steps[1:]
+    pressure = "joint A largest pressure"
+    assert let_go[pressure] < 1e-3 * pulled[pressure]
 
 
 def test_a_budget_ends_a_case(tmp_path):
