@@ -44,7 +44,7 @@ class LinearSystem:
                 stiffness = self.unknowns.drives.stiffness
                 n = self.unknowns.n_levels
                 product = self.tangent.product  # of matrices that the solver knows
-                self.border = Bordered(product, n, stiffness, lambda _: self._solver())
+                self.border = Bordered(product, n, stiffness, self._solver)
             self.strategy = self._strategy()
 
     def _facts(self) -> Facts:

@@ -14,7 +14,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy, krylov_iterations
 
 # stiffness against a motion over ``stiffness`` below which nothing resists the force
@@ -78,7 +77,7 @@ class Bordered(Strategy):
     that was factorised. Collective.
 
     The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance;
-    ``factoriser`` gives the strategy for ``A``. ``last`` is the border as it was updated last.
+    ``give_strategy`` gives the strategy for ``A``. ``last`` is the border as it was updated last.
     ``singular`` numbers the level that a force moves most which nothing resists, or None.
     ``krylov_iterations`` are of all solves with ``A``, 0 of factorisations.
     """
@@ -88,13 +87,13 @@ class Bordered(Strategy):
         A: PETSc.Mat,
         m: int,
         stiffness: float,
-        factoriser: Callable[[PETSc.Mat], Strategy] = Direct,
+        give_strategy: Callable[[], Strategy],
     ) -> None:
         self.comm = A.comm.tompi4py()
         self.singular: int | None = None
         self.krylov_iterations = 0
         self._stiffness = stiffness
-        self._factoriser = factoriser
+        self._give_strategy = give_strategy
         zero: Array = np.zeros((A.getLocalSize()[0], m))
         self.last = Border(A, zero, zero, np.zeros((m, m)))
         self.matrix = self.last.matrix()
@@ -110,7 +109,7 @@ class Bordered(Strategy):
         self._stale = True
         self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
-        self._factoriser(A).attach(self._ksp)
+        self._give_strategy().attach(self._ksp)
 
     def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
         """New border for a matrix with new values (see `Border`). Without ``factorise`` the

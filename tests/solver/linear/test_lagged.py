@@ -8,6 +8,7 @@ from petsc4py import PETSc
 from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose, lagged
 from archord.solver.linear.bordered import Bordered
+from archord.solver.linear.direct import Direct
 from tests.solver.solving import small_scene, solve
 
 FORCE = {"load": {"displacement": None, "relative_force": 0.012}}
@@ -94,7 +95,7 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
         return np.block([[values, B], [C.T, D]])
 
     fill(old)
-    system = Bordered(A, m, 1.0)
+    system = Bordered(A, m, 1.0, lambda: Direct(A))
     x, r = system.matrix.createVecs()
     r.array[:] = rng.normal(size=n + m)
     system.update(*borders[0])
