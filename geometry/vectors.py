@@ -1,10 +1,12 @@
-"""Products and lengths of arrays of vectors."""
+"""Products and lengths of arrays of vectors, and which numbers count as alike."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from archord.materials.material import Array
+
+ALIKE = 1e-7  # relative difference of values that images in a mirror have, too
 
 
 def unit(vectors: Array) -> Array:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from archord.geometry.vectors import ALIKE
 from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
@@ -21,7 +22,6 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
     from archord.solver.path.system import System
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
-_ALIKE = 1e-7  # relative difference of values that images in a mirror have, too
 _ON_CONE = 1e-6  # of the largest shear: what comes as close slides
 OF_FRICTION = ("shear", "sticks")  # of one with friction also
 
@@ -119,7 +119,7 @@ def _first_largest(values: Array) -> int:
     by round-off, as images in a mirror do."""
     flat = values.ravel()
     largest = flat.max()
-    return int(np.argmax(flat >= largest - _ALIKE * abs(largest)))
+    return int(np.argmax(flat >= largest - ALIKE * abs(largest)))
 
 
 def _size(values: Array) -> Array:

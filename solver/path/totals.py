@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.geometry.vectors import ALIKE
 from archord.solver.bulk.bulk import Bulk
 from archord.solver.bulk.distortion import Distortion
 from archord.solver.contact.contact import Contact
@@ -17,7 +18,6 @@ from archord.solver.equilibrium.equilibrium import Equilibrium
 from archord.solver.problem import Body, Problem
 
 _AT_REST = 10.0  # times the round-off: forces that are none
-_ALIKE = 1e-7  # relative difference of values that images in a mirror have, too
 _DIGITS = 9  # of places that are not one
 
 
@@ -154,7 +154,7 @@ class Totals:
         x = np.concatenate(places)
         largest = self.comm.allreduce(peeq.max(initial=0.0), op=MPI.MAX)
         size = self.comm.allreduce(np.abs(x).max(initial=0.0), op=MPI.MAX)
-        alike = x[peeq >= max((1 - _ALIKE) * largest, np.finfo(float).tiny)]
+        alike = x[peeq >= max((1 - ALIKE) * largest, np.finfo(float).tiny)]
         rounded = np.round(alike / max(size, np.finfo(float).tiny), _DIGITS)
         last = np.lexsort(rounded.T[::-1])[-1:]
         here = list(zip(rounded[last].tolist(), alike[last].tolist(), strict=True))
