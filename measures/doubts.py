@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
@@ -12,10 +13,11 @@ from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt
 from archord.solver.contact.laws.named import Tied
+from archord.solver.parts import Load
 
 if TYPE_CHECKING:
     from archord.solver.path.system import System
-    from archord.solver.problem import Body
+    from archord.solver.problem import Body, Problem
 
 Check = Callable[[Accepted, Record], Iterable[str]]  # what to warn of after a step; collective
 
@@ -62,6 +64,26 @@ def volume_doubts(system: System) -> list[str]:
                 "far off on coarse meshes; forces and displacements are not; smaller elements help"
             ]
     return []
+
+
+def point_doubts(problem: Problem) -> list[str]:
+    """Warnings of loads on single points, where displacements have no limit as elements get
+    smaller."""
+    places = problem.mesh.point_sets
+    elsewhere = {*problem.mesh.facet_sets, *(coupling.name for coupling in problem.couplings)}
+    said = []
+    for load in problem.loads:
+        if not isinstance(load, Load) or load.on in elsewhere or load.on not in places:
+            continue
+        points = places[load.on]
+        is_one = len(points) > 0 and np.ptp(points, axis=0).max() == 0
+        if is_one and load.kind != "pressure" and np.any(getattr(load, load.kind)):
+            said.append(
+                f"{load.name!r} loads the single point {load.on!r}, whose displacement over the "
+                "force grows without a limit as elements get smaller; a facet set, a coupling or "
+                "the cells of a body spread a load"
+            )
+    return said
 
 
 def stiff_quadrilaterals(system: System) -> list[str]:

@@ -12,7 +12,12 @@ from typing import Any
 from mpi4py import MPI
 
 from archord.measures.account import Account, Driven, Values, sizes
-from archord.measures.doubts import contrast_doubts, stiff_quadrilaterals, volume_doubts
+from archord.measures.doubts import (
+    contrast_doubts,
+    point_doubts,
+    stiff_quadrilaterals,
+    volume_doubts,
+)
 from archord.measures.edge import fixed, per_step, surface_profiles
 from archord.measures.energies import ENERGIES
 from archord.measures.measure import Accepted, Column, column
@@ -74,6 +79,7 @@ def general_account(
     frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
     warnings += friction_doubts(frictions)
     warnings += contrast_doubts(problem.bodies)
+    warnings += point_doubts(problem)
     warnings += volume_doubts(system)
     warnings += stiff_quadrilaterals(system)
     return _account(scene, system, warnings, file)
