@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import product
 
+from mpi4py import MPI
+
 from archord.measures.doubts import (
     LARGE,
     LARGE_STRAIN,
@@ -16,6 +18,7 @@ from archord.measures.doubts import (
     round_off_doubts,
     told_of_facets,
 )
+from archord.measures.edge import AnyProfile
 from archord.measures.energies import largest_energies
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
@@ -26,6 +29,7 @@ from archord.solver.path.system import System
 
 _FEWEST_FACETS = 3
 _FAR_TURN = 0.02  # angle at which linear rotations stretch radii by 0.02 %
+_FALSE = 0.05  # gap of fixed partners that is none, over what the contact presses together
 _SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating bodies
 _CARRYING = 0.01  # of the same, where the springs carry what contact should
 _ALONE = 0.1  # of the same at the end, where no force pushes the bodies that springs hold
@@ -60,6 +64,7 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
             if fixed_partners:
                 longest = system.sides[name].facet_lengths().max()
                 yield from _slip_doubts(name, profile.largest_slip, longest)
+                yield from _gap_doubts(system, name, profile)
 
     def strains(state: Accepted, m: Record) -> Iterator[str]:
         peeq = [value for name, value in m.values.items() if name.endswith(" peeq_max")]
@@ -104,6 +109,21 @@ def _slip_doubts(surface: str, slip: float, longest: float) -> Iterator[str]:
             'had at first; analysis.kinematics = "current" is for that'
         )
         yield Doubt(text, slip)
+
+
+def _gap_doubts(system: System, surface: str, profile: AnyProfile) -> Iterator[str]:
+    """A warning where a ``surface`` keeps its partners, and slip along normals that do not turn is
+    taken for a gap that is not small beside what the contact presses together. Collective."""
+    here = [pair.false_gap() for pair in system.contact.pairs if pair.surface.name == surface]
+    gap = system.comm.allreduce(max(here, default=0.0), op=MPI.MAX)
+    pressure, _ = profile.largest
+    size = profile.contact_length ** (1 / (system.problem.kinematics.dimension - 1))
+    approach = pressure * size / system.sides[surface].material.elastic_tangent[0, 0]
+    if gap > _FALSE * approach:
+        part = f"where about {approach:.2g} is pressed together"
+        text = f"{surface!r} keeps the partners and normals that it had at first, so that gaps are"
+        cure = 'analysis.kinematics = "current" is for that'
+        yield Doubt(f"{text} wrong by up to {gap:.2g}, {part}; {cure}", gap)
 
 
 def _spring_doubts(state: Accepted, m: Record) -> Iterator[str]:

@@ -223,6 +223,16 @@ class Pair:
         """Gap ``(m,)`` of the undeformed surfaces, of a pair that does not move."""
         return (self.separation * self.projection.normal).sum(1)
 
+    def false_gap(self) -> float:
+        """By how much gaps that points of this rank carry pressure at differ from the gaps of the
+        deformed surfaces, at most: of a pair that does not move."""
+        own, motion = self._moved
+        x = _flat(self.surface.point) + own
+        now = self.opposite.curve.continued(x, self._outward, motion, self.projection.facet)
+        gap = ((x - now.point) * now.normal).sum(axis=1) + self.offset
+        apart = np.where(self.active & now.found, gap - self.opening[:, 0], 0.0)
+        return float(np.abs(apart).max(initial=0.0))
+
     def _answer(self, opening: Array, trial: Array) -> None:
         """Let the law answer; points without a partner carry nothing."""
         points = self.points

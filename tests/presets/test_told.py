@@ -1,5 +1,6 @@
 """What a run tells of numbers that are not what they seem, and does not tell of those that are."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -165,6 +166,42 @@ def test_partners_of_the_beginning_are_told_of_where_surfaces_slide_far(tmp_path
     stated = problem([contact], loads=[press, slide])
     said = [text for text in told_of(stated, tmp_path / "run") if "partners" in text]
     assert len(said) == 2 * (kinematics == "reference")
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+def test_gaps_of_fixed_partners_that_turn_are_told_of(tmp_path, kinematics):
+    """By how much they are wrong: slip times the angle of the blocks, which turn together and slide
+    by less than a facet, and a little where they deform."""
+    angle = 0.01
+    slide = 0.3
+    mesh = archord.rectangles({"low": (-2, -1, 4, 1), "up": (-1, 0, 2, 1)}, size=0.5)
+    steel = archord.Elastic(1000.0, 0.3)
+    couplings = [
+        archord.Coupling("base", "low bottom", point=(0.0, 0.0)),
+        archord.Coupling("lid", "up top", point=(0.0, 0.0)),
+    ]
+    lifted = [-0.005, -0.005 + slide * angle]
+    loads = [
+        archord.Load("turn", on="base", direction="rotation", displacement=[angle, angle]),
+        archord.Load("follow", on="lid", direction="rotation", displacement=[angle, angle]),
+        archord.Load("press", on="lid", direction="y", displacement=lifted),
+        archord.Load("slide", on="lid", direction="x", displacement=[0.0, slide]),
+    ]
+    stated = archord.Problem(
+        mesh,
+        [archord.Body(name, steel) for name in ("low", "up")],
+        [archord.Interaction("contact", ("up bottom", "low top"), kinematics=kinematics)],
+        [archord.Support("held", on="base", fixed="xy")],
+        loads,
+        couplings=couplings,
+        steps=1,
+    )
+    said = [text for text in told_of(stated, tmp_path / "run") if "normals" in text]
+    if kinematics == "current":
+        assert said == []
+        return
+    wrong = [float(re.search(r"wrong by up to (\S+),", text)[1]) for text in said]
+    assert wrong == pytest.approx(2 * [slide * angle], rel=0.25)
 
 
 def test_a_contact_with_friction_is_not_called_frictionless():
