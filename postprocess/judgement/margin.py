@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from archord.postprocess.run import Run
 
 YIELD_PEEQ = 0.01
+_NO_PULL = 1e-9  # of the largest force: round-off
 
 
 @dataclass(frozen=True)
@@ -171,12 +172,26 @@ def _by_elements(
     for kind, name, limit in limits:
         allowable, reached = load_at(force, peeq, limit)
         checks.append(StrengthCheck(kind, "FE", name, allowable, applied[kind], bound=not reached))
+        notes += _without_pull(part, peeq, limit, name)
     for kind in dict.fromkeys(check.kind for check in checks if check.margin is None):
         notes.append(
             f"the {kind} margin is not known by finite elements: {applied[kind]:g} is beyond the "
             f"largest force that was solved, {force.max():.5g}; solve further"
         )
     return checks, notes
+
+
+def _without_pull(part: Part, peeq: Array, limit: float, name: str) -> list[str]:
+    """A note where the PEEQ of a ``part`` passes the ``limit`` of a criterion of this ``name`` in a
+    step in which nothing pulls, as a fit or a push may be."""
+    passed = np.flatnonzero(peeq > limit)
+    if not len(passed) or part.force[passed[0]] > _NO_PULL * part.force.max():
+        return []
+    step = passed[0] + 1
+    return [
+        f"the {part.noun} passes {name} in step {step}, in which no force pulls: the allowable is "
+        "of what came before; solve the pull alone"
+    ]
 
 
 def load_at(force: Array, peeq: Array, limit: float) -> tuple[float, bool]:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from archord.cli import run as command
-from archord.postprocess.judgement.margin import load_at, margin_text, margins
-from archord.postprocess.judgement.parts import parts_of
+from archord.postprocess.judgement.margin import _by_elements, load_at, margin_text, margins
+from archord.postprocess.judgement.parts import Part, parts_of
 from archord.postprocess.judgement.sections import (
     ClevisPin,
     lug_forces,
@@ -181,6 +181,19 @@ def test_margins_of_a_cycled_lug(runs):
     )
     assert 0 < first < limit <= largest
     assert "> +0.333" in margin_text(found)
+
+
+@pytest.mark.parametrize(("pushed", "step"), [([0.0, -5.0], 2), ([3.0, 6.0], 0)])
+def test_what_a_push_did_before_is_told(pushed, step):
+    """A lug that yields while its pin pushes had the margin -1 under any pull, without a word."""
+    body = BodySection(name="lug", **STEEL, yield_stress=300.0)
+    part = Part("", body, np.array([*pushed, 0.0, 8.0]), "N", "lug")
+    peeq = np.array([0.0, 0.02, 0.02, 0.03])
+    _, notes = _by_elements(part, peeq, {"yield": 4.0, "ultimate": 4.0}, 0.01, 0.05)
+    told = [note for note in notes if "in which no force pulls" in note]
+    assert [f"passes PEEQ of 0.01 in step {step}" in note for note in told] == (
+        [False, True] if step else []
+    )
 
 
 def test_nothing_is_extrapolated(runs):
