@@ -134,7 +134,8 @@ def _doubts_of(one: Estimate, found: Identification) -> list[str]:
     if one.is_bound:
         ends = f"{one.unknown.low:.4g} to {one.unknown.high:.4g}"
         cure = "check the units of the curve and the values of the scene"
-        return [f"{name} = {one.value:.4g}: is at a bound of what was allowed, {ends}; {cure}"]
+        said = f"{name} = {one.value:.4g}: is at a bound of what was allowed, {ends}"
+        return [f"{said}, and taken as known in the intervals of the others; {cure}"]
     half = (one.high - one.low) / 2
     if one.unknown.keys and half > _POOR * abs(one.value):
         return [f"{name}: is known to {half / one.value:.0%} only"]

@@ -161,6 +161,7 @@ def test_units_that_are_wrong_by_1000_end_at_a_bound():
     kilo = MeasuredCurve(curve.displacement, curve.load / 1000)
     found = identify(archord.load_scene(STEEL), kilo, ["block.E,pin.E", BOTH], stiffness=np.inf)
     assert "is at a bound of what was allowed" in said(found)
+    assert "taken as known in the intervals of the others" in said(found)
     assert "check the units" in said(found)
 
 
