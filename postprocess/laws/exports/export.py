@@ -22,6 +22,7 @@ from archord.postprocess.laws.exports.translate import select
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
 
+_OF_MEMORY = {"stored_energy"}
 _INNER = {"deeper", "forces", "sector_deeper"}  # which users do not call
 _TEMPLATES = tomllib.loads(Path(__file__).with_name("templates.toml").read_text(encoding="utf-8"))
 
@@ -76,7 +77,7 @@ def export_law(law: JointCurve | FittedLaw, target: Path, contact: Contact | Non
     title = program.about["title"]
     constants = [form.constant(name, *each) for each in _constants(program, used).items()]
     called = [function for function in program.functions if function not in _INNER]
-    handles = [f"    the_law.{function} = @{function};" for function in called]
+    handles = [f"    the_law.{function} = {_handle(function)};" for function in called]
     parts = _element_parts(form.template, name, program, contact or Contact())
     return Template(_TEMPLATES[form.template].lstrip()).substitute(
         name=name,
@@ -88,6 +89,14 @@ def export_law(law: JointCurve | FittedLaw, target: Path, contact: Contact | Non
         handles="\n".join(handles) + parts["handles"],
         element=parts["element"],
     )
+
+
+def _handle(function: str) -> str:
+    """Octave's handle of a ``function``, which takes numbers but for the one of a memory: products
+    of arrays are of matrices there."""
+    if function in _OF_MEMORY:
+        return f"@{function}"
+    return f"@(varargin) of_scalars(@{function}, varargin)"
 
 
 def _constants(program: Program, used: set[str]) -> Tables:

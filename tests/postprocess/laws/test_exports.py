@@ -247,6 +247,33 @@ def test_javascript_says_what_the_table_says(curve: JointCurve, tmp_path: Path) 
     check(curve, pairs, np.fromfile(tmp_path / "out").reshape(-1, 6))
 
 
+ARRAYS = """
+addpath('.'); law = law(); refused = 0;
+x = law.range * [0.1 0.2; 0.3 0.5];
+calls = {@() law.force(x, 0), @() law.force(0.1 * law.range, x), @() law.residual(x), ...
+    @() law.peak_pressure(x), @() law.advance(0, x), @() law.expected_error(-x(1, :), 0)};
+for k = 1:numel(calls)
+    try
+        calls{k}();
+    catch fault
+        refused += ! isempty(strfind(fault.message, 'numbers, not arrays'));
+    end
+end
+[P, stiffness] = law.force(x(1), 0);
+assert(refused == numel(calls) && P > 0 && stiffness > 0);
+assert(arrayfun(@(x) law.force(x, 0), x)(1) == P);
+"""
+
+
+def test_octave_takes_no_arrays(curve: JointCurve, tmp_path: Path) -> None:
+    """Of square ones it multiplied matrices: pressures of -5500 MPa for 335, without a word."""
+    if not shutil.which("octave-cli"):
+        pytest.skip("octave-cli is not here")
+    write(curve, tmp_path / "law.m")
+    command = ["octave-cli", "--quiet", "--norc", "--eval", ARRAYS]
+    subprocess.run(command, cwd=tmp_path, check=True)
+
+
 def test_every_line_is_a_statement_or_a_comment(curve: JointCurve, tmp_path: Path) -> None:
     """In Octave's functions, whatever the length of the docstrings that became comments; and
     Modelica's descriptions end on the line on which they begin."""
