@@ -226,6 +226,7 @@ class TangentMatrix:
                 return
             self.of_contact.zeroEntries()
             self._add_contact(self.of_contact, filled)
+            self.A.assemble()
             self.A.stateIncrease()  # what solves with it has to be set up again
 
     def _for_border(self, filled: Filled) -> Filled:

@@ -11,6 +11,8 @@ from petsc4py import PETSc
 from archord.benchmarks.case import paper_joint
 from archord.geometry.strain import strain_terms
 from archord.materials.elasticity import Elastic
+from archord.materials.hardening import LinearHardening
+from archord.materials.j2 import J2Material
 from archord.materials.kinematics import PLANE_STRAIN, SPACE
 from archord.solver.bulk.assembly import assemble, matrix
 from archord.solver.bulk.stiffness import CellStiffness, value_terms
@@ -20,7 +22,8 @@ from archord.solver.linear.forcing import LOOSEST, forcing_term
 from archord.solver.linear.multigrid import Multigrid
 from archord.solver.path.stepping import march
 from archord.solver.path.system import System, displacement_space
-from archord.solver.problem import Body, Dirichlet, Problem
+from archord.solver.problem import Body, Dirichlet, Interaction, Load, Problem, Support
+from tests.solver.contact.blocks_in_space import bodies, tagged
 from tests.solver.solving import solve
 from tests.solver.space import MATERIALS, box
 
@@ -201,3 +204,25 @@ def test_a_body_in_space_yields_in_hardly_more_iterations(monkeypatch):
     usual, expected = solved()
     assert iterations <= usual + 1
     assert force == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_loose_body_yields_as_by_a_factorisation(monkeypatch):
+    """Weak springs are added to a matrix to which the cells that yield have added theirs."""
+    metal = J2Material(210e3, 0.3, "space", LinearHardening(200.0, 2000.0))
+
+    def moved() -> float:
+        problem = Problem(
+            tagged(bodies(MPI.COMM_SELF)),
+            [Body("lower", metal), Body("upper", metal)],
+            [Interaction("contact", ("upper", "lower"))],
+            [Support("base"), Support("left", fixed="x"), Support("front", fixed="y")],
+            [Load("press", on="upper", direction="z", force=-300.0)],
+        )
+        system = System(problem)
+        system.solve([1.0])
+        assert system.peeq()[0] > 1e-3
+        return system.drive_displacement("press")
+
+    usual = moved()
+    monkeypatch.setattr(module, "FEWEST_DOFS", 0)
+    assert moved() == pytest.approx(usual, rel=1e-8)
