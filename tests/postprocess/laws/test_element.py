@@ -330,6 +330,30 @@ def test_all_languages_give_the_same_forces(suffix: str, name: str, tmp_path: Pa
     assert (wanted[-2] == 0).all()
 
 
+MISSPELLED = """
+import * as law from './law.mjs';
+const e = [0.06, 0.05], v = [20, -35];
+const friction = (contact) => law.element(law.new_element(), e, v, 3, contact)[0][2];
+if (Math.abs(friction({ mu_static: 0, mu_dynamic: 0 })) !== 0) process.exit(1);
+try {
+    friction({ mu: 0.3 });
+    process.exit(2);
+} catch (fault) {
+    if (!/no mu, but damping/.test(fault.message)) process.exit(3);
+}
+"""
+
+
+def test_javascript_knows_the_parameters_of_a_contact(tmp_path: Path) -> None:
+    """One of another name was passed over, and the friction was that of the export."""
+    if not shutil.which("node"):
+        pytest.skip("node is not here")
+    law = tmp_path / "law.mjs"
+    law.write_text(export_law(yielding(), law, CONTACT), encoding="utf-8")
+    (tmp_path / "client.mjs").write_text(MISSPELLED)
+    subprocess.run(["node", "client.mjs"], cwd=tmp_path, check=True)
+
+
 HIT = """
 model Hit "a pin that hits its hole along a line and crosses to the other side"
   Law.Element joint(interval = {interval});
