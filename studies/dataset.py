@@ -19,7 +19,12 @@ import numpy as np
 from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.law_fit import NodeRun, first_loading, solved_in
-from archord.postprocess.laws.general.yield_model import first_yield, mesh_excess, telling_side
+from archord.postprocess.laws.general.yield_model import (
+    Yielding,
+    first_yield,
+    mesh_excess,
+    telling_side,
+)
 from archord.report.files import replacing, write_rows
 from archord.studies.law_design import FRESH, Drawn, Row, joints, sweep_file
 
@@ -130,7 +135,8 @@ def _mesh_error(numbers: Sequence[float], x: Array) -> Array:
     strain, *of_bodies, pin, block = numbers
     side = str(telling_side(bool(strain), pin, block))
     begins = first_yield(elastic_model(), bool(strain), Elastic(*of_bodies), block)
-    return np.hypot(_MESH_ERROR, _WHOLE_EXCESS * mesh_excess(side, x / begins))
+    excess = mesh_excess(side, Yielding(np.inf, block), x / begins)  # the most that it can be
+    return np.hypot(_MESH_ERROR, _WHOLE_EXCESS * excess)
 
 
 def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:

@@ -19,6 +19,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.factor_model import FRICTION, LARGE_STRAIN, LARGEST
+from archord.postprocess.laws.general.law_fit import steps_count
 from archord.studies.hardening_design import hardened
 from archord.studies.law_design import (
     ELEMENT_SIZE,
@@ -72,18 +73,20 @@ def drawn(share: float, seed: int) -> Iterator[tuple[Drawn, float]]:
             yield (hardened(joint, random) if hardens else joint), friction
 
 
-def rows(kind: str, share: float, seed: int) -> Iterator[Row]:
-    """The scenes of a ``share`` of `JOINTS`, without friction or large strain and with it."""
+def rows(kind: str, share: float, seed: int, *, checks: bool = False) -> Iterator[Row]:
+    """The scenes of a ``share`` of `JOINTS`, without friction or large strain and with it; to check
+    the law also in two step sizes where `steps_count`."""
     for (joint, friction), turn in zip(drawn(share, seed), cycle(range(_BACK)), strict=False):
         x = nodes(joint)
-        if turn == 0:
-            x = np.concatenate([x, x[-1] * _WAY])
-        row = joint.own | {"load.displacement": [*x]}
-        yield row
+        back = x[-1] * _WAY if turn == 0 else []
+        path = {"load.displacement": [*x, *back]}
+        own: Row = {"analysis.strain": "large"}
         if kind == FRICTION:
-            yield row | {"analysis.friction": friction}
-        else:
-            yield row | {"analysis.strain": "large"}
+            own = {"analysis.friction": friction}
+        yield joint.own | path
+        yield joint.own | path | own
+        if checks and steps_count(joint.numbers):
+            yield joint.own | own | {"load.displacement": [*x], "load.steps": 2}
 
 
 def main() -> None:
@@ -99,7 +102,7 @@ def main() -> None:
     if given.fresh:
         share = given.fresh / sum(JOINTS.values())
         seed = 1000 * given.seed
-    text = sweep_file(rows(given.kind, share, seed))
+    text = sweep_file(rows(given.kind, share, seed, checks=bool(given.fresh)))
     print(checking(text, given.element_size) if given.fresh else text, end="")
 
 

@@ -29,7 +29,7 @@ from archord.materials.named import metals
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import NODES, SMALLEST_S, law_of_numbers
 from archord.postprocess.laws.general.hardening_model import BODIES
-from archord.postprocess.laws.general.law_fit import EARLY
+from archord.postprocess.laws.general.law_fit import steps_count
 from archord.postprocess.laws.general.yield_model import first_yield
 from archord.studies.law_design import (
     CHECK_SIZE,
@@ -198,11 +198,11 @@ def drawn(share: float, seed: int, *, special: bool = False) -> Iterator[Drawn]:
 
 
 def rows_to_fit(given: Iterable[Drawn]) -> Iterator[Row]:
-    """The scenes of the ``given`` joints: to 3 dR, in two step sizes where yielding is early."""
+    """The scenes of the ``given`` joints: to 3 dR, in two step sizes where `steps_count`."""
     for joint in given:
         row = joint.own | {"load.displacement": [*steady_nodes(joint, _NEXT)]}
         yield row
-        if min(joint.numbers[5:]) < EARLY:
+        if steps_count(joint.numbers):
             yield row | {"load.steps": 2}
 
 

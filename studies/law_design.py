@@ -8,8 +8,8 @@
 A joint is drawn from Sobol's sequence over Poisson's ratios, the ratio of the moduli, dR/R, the
 yield stress (from the smallest s of the range to one at which yielding begins at 3 dR), and the
 other body's yield stress. It is solved at multiples of about the displacement of first yield up to
-3 dR, then unloaded. A quarter of the joints are also unloaded from a smaller displacement. Where
-yielding begins early, a second run takes two steps between the same nodes.
+3 dR, then unloaded. A quarter of the joints are also unloaded from a smaller displacement. In
+plane stress, and where yielding begins early, a second run takes two steps between the same nodes.
 
 The law tells where a joint opens, and with it the displacements of the unloading. The first sweep
 was designed with an earlier law: law_design.npz has the residual clearances that this law told.
@@ -36,7 +36,7 @@ from archord.postprocess.laws.general.general_law import (
     SMALLEST_S,
     law_of_numbers,
 )
-from archord.postprocess.laws.general.law_fit import EARLY
+from archord.postprocess.laws.general.law_fit import steps_count
 from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
 from archord.scene.sections.errors import toml_value
 
@@ -271,15 +271,15 @@ def fresh_nodes(joint: Drawn) -> Array:
 def yielding_rows(
     joint: Drawn, x: Array, way: Array, chance: float, opens: Callable[[float], Any]
 ) -> Iterator[Row]:
-    """Scenes of one joint that yields: to the last of ``x`` and back, twice as fine where it yields
-    early, and, where ``chance`` is less than one, to an earlier one, back, and on. ``opens`` tells
-    the residual clearance by the deepest displacement."""
+    """Scenes of one joint that yields: to the last of ``x`` and back, twice as fine where
+    `steps_count`, and, where ``chance`` is less than one, to an earlier one, back, and on.
+    ``opens`` tells the residual clearance by the deepest displacement."""
 
     def back(deepest: float) -> list[float]:
         return [t for t in deepest - (deepest - opens(deepest)) * way if t > 0.01]
 
     yield joint.own | {"load.displacement": [*x, *back(x[-1])]}
-    if min(joint.numbers[5:]) < EARLY:
+    if steps_count(joint.numbers):
         yield joint.own | {"load.displacement": [*x], "load.steps": 2}
     if chance < 1 and len(x) > 3:
         i = 2 + int(chance * (len(x) - 3))

@@ -43,7 +43,6 @@ from archord.postprocess.laws.general.hardening_model import (
 )
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import (
-    WITHIN,
     NodeRun,
     by_joint,
     first_loading,
@@ -61,6 +60,7 @@ from archord.report.table import Table
 
 Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
 _RANGE = (0.05, 3.05)  # x of the data
+_WITHIN = 0.93  # share of errors that expected errors are to contain
 _USUAL = (0.099, 2.001)
 _GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(len(TERMS) - 3)])
 # how far from it coefficients are likely
@@ -97,10 +97,10 @@ class Hardened:
         elastic = elastic_model()
         of_bodies = Elastic(*numbers[1:5])
         side, *_ = sides_of(numbers)
-        s = Yielding(*numbers[5:]).of(side)
-        begins = first_yield(elastic, bool(numbers[0]), of_bodies, s)
+        yielding = Yielding(*numbers[5:])
+        begins = first_yield(elastic, bool(numbers[0]), of_bodies, yielding.of(side))
         without = elastic.at(of_bodies, x)
-        excess = mesh_excess(side, x / begins)
+        excess = mesh_excess(side, yielding, x / begins)
         force = np.log(y / without.y) - excess
         pressure = np.log(peak / without.peak) - excess
         return cls(numbers, flows(joint), x, force, pressure)
@@ -235,7 +235,7 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
     for name, parts in sorted(by_kind.items()):
         off, deviation, rise = np.concatenate(parts, axis=1)
         left = np.sqrt(np.maximum(off**2 - deviation**2, 0.0)) / np.maximum(rise, _LITTLE)
-        factor = np.quantile(left, WITHIN["force"])
+        factor = np.quantile(left, _WITHIN)
         factors[name] = float(f"{factor:.3g}")
         inside = np.abs(off) <= np.hypot(deviation, factors[name] * rise)
         table.add(name, len(parts), rms_largest(100 * off), f"{inside.mean():.0%}")

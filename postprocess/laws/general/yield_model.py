@@ -50,15 +50,18 @@ _AT = np.log([ELASTIC_BELOW, *MULTIPLES])  # ln u, between which curves are cubi
 # stays elastic. In plane stress the first is the part for a contact at the largest pressure of
 # plastic flow, 2/sqrt(3) sigY.
 _STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}
+# Kinds of joints whose errors scatter unlike: the other body is as strong, stronger, or elastic.
+KINDS = ("both", "weaker", "alone")
+_APART = (0.0, 0.1, 0.9, 1.0)  # parts of `_STRONGER` between which a joint goes over to the next
+_OTHER = 5  # the place of the input of `features` that tells of the other body
+_SOFTER = (0.45, 0.5)  # p m of pins, between which they come to count as soft
 # exponent of what a yielded pin leaves; x/x0 where that is asked
 _FELT = 0.3
 _DEEPER = 3.0
 # ln of the block's s over the pin's, between 0 and which the processes of the two sides are mixed
 _BLENDED = 0.05
-# of P, relative, of the solved joints: what is left of the error of the mesh (see `mesh_excess`),
-# and of pins that yield in plane stress the error of steps: joints of s above 0.6 were solved in
-# one number of steps
-SOLVED_ERROR = dict.fromkeys(SIDES, 0.0) | {"stress block": 2.5e-3, "stress pin": 4e-3}
+# of P, relative, of the solved joints: what is left of the error of the mesh (see `mesh_excess`)
+SOLVED_ERROR = dict.fromkeys(SIDES, 0.0) | {"stress block": 2.5e-3, "stress pin": 5e-4}
 _MOST_EXCESS = 3.3e-3
 _EXCESS_BEGINS = 1.5  # u
 _EXCESS_GROWS = 0.5  # in ln u
@@ -139,15 +142,16 @@ def onset(
     return x0, np.interp(_DEEPER * x0, x, lost)
 
 
-def mesh_excess(side: str, u: Array) -> Array:
+def mesh_excess(side: str, yielding: Yielding, u: Array) -> Array:
     """ln of P and of p0 of elements of 5 %R over P and p0 of 2 %R, by multiples ``u`` ``(k,)`` of
-    about the x of first yield. It is felt where a block yields in plane stress
+    about the x of first yield. It is felt in plane stress where a block yields before the pin
     (benchmarks/law_meshes.py); if the mesh's error is of first order, two thirds of it are left."""
     if side != "stress block":
         return np.zeros_like(u)
+    pins_lead = (1 - yielding.block / yielding.pin) / _STRONGER["stress"][0]
     beyond = np.log(np.maximum(u / _EXCESS_BEGINS, 1.0))
     grown = 1 - np.exp(-beyond / _EXCESS_GROWS)
-    return _MOST_EXCESS * grown
+    return _MOST_EXCESS * min(pins_lead, 1.0) * grown
 
 
 def _pressure_at_yield(strain: bool, x: Array) -> Array:
@@ -171,6 +175,30 @@ def features(side: str, joints: Elastic, yielding: Yielding, lost: npt.ArrayLike
     return np.stack(np.broadcast_arrays(*inputs), axis=-1)
 
 
+def kind_of_scatter(side: str, inputs: Array) -> Array:
+    """The place in `KINDS` of joints of these `features` ``(..., d)``, between two where joints go
+    over from one kind to the next."""
+    if side == PIN_ALONE:
+        apart: Array = np.ones(inputs.shape[:-1])
+    elif side == PIN_WEAKER:
+        apart = np.minimum(-inputs[..., _OTHER], _APART[2])
+    else:
+        apart = inputs[..., _OTHER]
+    return np.interp(apart, _APART, (0, 1, 1, 2))
+
+
+def softness(inputs: Array) -> Array:
+    """How far the pins of joints of these `features` ``(..., d)`` count as soft, 0 to 1."""
+    return np.interp(inputs[..., 1], _SOFTER, (0.0, 1.0))
+
+
+def scatter(side: str, inputs: Array, spread: Mapping[str, float]) -> Array:
+    """The factor on standard deviations of P of joints of these `features` ``(..., d)``."""
+    factors = [spread[kind] for kind in KINDS]
+    usual = np.interp(kind_of_scatter(side, inputs), range(len(KINDS)), factors)
+    return usual * (1 + softness(inputs) * (spread["soft"] - 1))
+
+
 @dataclass(frozen=True)
 class YieldModel:
     """The processes of a ``side``.
@@ -180,7 +208,8 @@ class YieldModel:
     - ``back_inputs`` ``(k, d + 1)``: features, and ln u of the deepest point
     - ``back`` ``(k, 4)``: the last columns of `SolvedJoints.back`
     - ``kernels``: by the names of `processes`
-    - ``spread``: factors on standard deviations below which 9 in 10 errors are
+    - ``spread``: factors on standard deviations below which 9 in 10 errors are, of the force by the
+      kind of joint (see `scatter`)
     """
 
     side: str
@@ -191,7 +220,7 @@ class YieldModel:
     back_inputs: Array
     back: Array
     kernels: Mapping[str, Kernel]
-    spread: Mapping[str, float]
+    spread: Mapping[str, Any]
 
     @cached_property
     def processes(self) -> dict[str, Process]:
@@ -228,7 +257,7 @@ class YieldModel:
         told = Loss(
             force=force,
             slope=slope / x[begun],
-            deviation=self.spread["force"] * deviation,
+            deviation=scatter(self.side, each, self.spread["force"]) * deviation,
             peak=peak,
             angle=angle,
             travel=travel,

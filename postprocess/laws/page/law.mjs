@@ -323,6 +323,18 @@ function features(side, { p, m, n, clearance }, stresses, lost) {
     return [...inputs, ...within.map((part) => Math.min((1 - share) / part, 1))];
 }
 
+const KINDS = ["both", "weaker", "weaker", "alone"]; // of joints, in which errors scatter unlike
+const APART = [0, 0.1, 0.9, 1]; // where they are, from bodies as strong as each other to an elastic one
+const SOFTER = [0.45, 0.5]; // p m between which a pin comes to count as soft
+
+/** The factor on standard deviations of P of a joint with these features. */
+function scatterOf(side, inputs, spread) {
+    const own = side === PIN_WEAKER ? Math.min(-inputs[5], APART[2]) : inputs[5];
+    const apart = side === PIN_ALONE ? 1 : own;
+    const soft = straight(inputs[1], SOFTER, [1, spread.soft]);
+    return soft * straight(apart, APART, KINDS.map((kind) => spread[kind]));
+}
+
 /** The three processes of a side: of force, of pressure and angle, and of the way back. */
 function processesOf(data, side) {
     const { joints, kernels } = data;
@@ -391,7 +403,7 @@ function sideLoss(data, side, elastic, stresses, x, onset) {
         const state = curves(u);
         const wayError = Math.hypot(told.spread.back * uncertain, NINE_IN_TEN * misfit, again);
         const begun = clip(Math.log(place / (ELASTIC_BELOW * x0)) / 0.2, 0, 1);
-        const deviation = told.spread.force * state.deviation;
+        const deviation = scatterOf(side, inputs, told.spread.force) * state.deviation;
         return { ...state, slope: state.slope / place, deviation, travel: 1 + travel, toe, wayError, begun };
     });
 }
