@@ -14,7 +14,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options, slices
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 PIN_RADIUS = 10.0
@@ -56,7 +56,7 @@ def mesh_of_joint(comm: MPI.Comm, size: Size, thickness: float, pin_length: floa
     Facet sets are "pin" and "hole", and of "block" and "pin" the tops, where they are held, the
     sides in x = 0 and the middles in z = 0: "pin top", "block side" and so on.
     """
-    return gmsh_to_mesh(comm, partial(_draw_joint, size, thickness, pin_length))
+    return gmsh_to_mesh(comm, partial(_draw_joint, size, thickness, pin_length), cut=slices)
 
 
 def mesh_of_clevis(comm: MPI.Comm, size: Size, lug: float, fork: float) -> TaggedMesh:
@@ -66,7 +66,7 @@ def mesh_of_clevis(comm: MPI.Comm, size: Size, lug: float, fork: float) -> Tagge
     Facet sets are "lug hole", "fork hole", "pin in lug", "pin in fork", and sides, middles and tops
     as of `mesh_of_joint`.
     """
-    return gmsh_to_mesh(comm, partial(_draw_clevis, size, lug, fork))
+    return gmsh_to_mesh(comm, partial(_draw_clevis, size, lug, fork), cut=slices)
 
 
 def _draw_joint(size: Size, thickness: float, pin_length: float, gmsh: Any) -> None:

@@ -29,6 +29,7 @@ from archord.kernels.compat import cell_nodes
 
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 _MOST_SECTORS = 4  # in space: beyond, boxes have fewer nodes on their sides
+_MANY_CELLS = 10_000  # from which on two parts are slices
 
 # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
 _ALL_QUADS = 3
@@ -57,6 +58,7 @@ def gmsh_to_mesh(
     quads: bool = False,
     partitioner=None,
     key: tuple = (),
+    cut: Cut | None = None,
 ) -> TaggedMesh:
     """Mesh what a function draws in gmsh, and distribute it over the ranks.
 
@@ -83,6 +85,8 @@ def gmsh_to_mesh(
         Replaces the `usual_cut`, as in dolfinx.
     key : tuple
         All that enters the mesh. If it is given, the mesh is kept and found again by it.
+    cut : callable
+        Tells the rank of each cell in place of the `usual_cut`, and is called as `sectors` is.
 
     Returns
     -------
@@ -121,7 +125,7 @@ def gmsh_to_mesh(
             failure = RuntimeError(f"gmsh could not mesh the problem: {error}")
     if failure := comm.bcast(failure):
         raise failure
-    return distribute(comm, made, partitioner)
+    return distribute(comm, made, partitioner, cut)
 
 
 def _made(
@@ -327,6 +331,15 @@ def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     """
     middle_x, middle_y = x[cells].mean(axis=1).T[:2]
     return _in_turn(np.arctan2(middle_y, middle_x), n_parts)
+
+
+def slices(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+    """As the `usual_cut`, for bodies around pins along z: two parts of many cells are slices across
+    z, which have equally much of what touches. Of two sectors one has more of the loaded side of a
+    hole; they share less, which counts for few cells."""
+    if n_parts != 2 or len(cells) < _MANY_CELLS:
+        return usual_cut(3, n_parts)(x, cells, n_parts)
+    return _in_turn(x[cells].mean(axis=1)[:, 2], n_parts)
 
 
 def strips(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:

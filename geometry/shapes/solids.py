@@ -19,6 +19,7 @@ from archord.geometry.meshes.fenicsx import (
     gathered,
     gmsh_to_mesh,
     set_mesh_options,
+    slices,
 )
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.quality import is_folded
@@ -106,13 +107,13 @@ def mesh_solids(
     """
     build = partial(draw_solids, sketch, slabs, rims)
     key = (*vars(sketch).items(), tuple(slabs), rims)
-    made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key)
+    made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key, cut=slices)
     made.mesh.geometry.x[:] *= radius
     _require_sound(made)
     if half:
         return made
     drawn = gathered(made)
-    return distribute(comm, drawn and mirrored(drawn), partitioner)
+    return distribute(comm, drawn and mirrored(drawn), partitioner, slices)
 
 
 def _require_sound(made: TaggedMesh) -> None:

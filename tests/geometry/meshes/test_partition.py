@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dolfinx.mesh import entities_to_geometry
 
-from archord.geometry.meshes.fenicsx import boxes, sectors, usual_cut
+from archord.geometry.meshes.fenicsx import boxes, sectors, slices, usual_cut
 from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from tests.geometry.shapes.measures import Facets
 
@@ -46,6 +46,22 @@ def test_boxes_of_a_cube_have_as_many_cells_each_and_short_sides(n_parts):
 def test_boxes_are_of_many_parts_in_space():
     assert usual_cut(3, 16) is boxes
     assert usual_cut(3, 2) is usual_cut(2, 16) is sectors
+
+
+@pytest.mark.parametrize("n_parts", [2, 3])
+@pytest.mark.parametrize("n_cells", [1000, 20_000])
+def test_two_parts_of_many_cells_are_slices_across_z(n_parts, n_cells):
+    """As many cells each, one below the other; few cells, and more parts, are cut in sectors."""
+    rng = np.random.default_rng(1)
+    x = rng.uniform(0, 1, (300, 3))
+    cells = rng.integers(0, 300, (n_cells, 4))
+    part = slices(x, cells, n_parts)
+    if n_parts > 2 or n_cells == 1000:
+        assert (part == sectors(x, cells, n_parts)).all()
+        return
+    assert np.bincount(part).tolist() == [n_cells / 2, n_cells / 2]
+    z = x[cells].mean(axis=1)[:, 2]
+    assert z[part == 0].max() <= z[part == 1].min()
 
 
 @pytest.mark.mpi
