@@ -109,6 +109,10 @@ class Patches:
         counts = np.bincount(self.corners.ravel())
         self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
 
+    def part(self, first: int, last: int) -> Patches:
+        """The facets from ``first`` on, before ``last``, alone."""
+        return Patches(self.X, self.connectivity[first:last], self.cell, self.degree)
+
     def _across_edges(self) -> Index:
         """The facets ``(n_facets, e)`` across the edges."""
         ends = np.stack([self.corners, np.roll(self.corners, -1, axis=1)], axis=-1)

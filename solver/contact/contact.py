@@ -22,10 +22,10 @@ from dolfinx import fem
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.materials.material import Points
-from archord.solver.contact.interaction import Interface, Within, on_every_rank
+from archord.solver.contact.interaction import Interface, Within
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
-from archord.solver.contact.surface import RigidSurface, Surface
+from archord.solver.contact.surface import RigidSurface, Surface, on_every_rank
 from archord.solver.contact.tangent import ContactTangent, point_rates
 
 

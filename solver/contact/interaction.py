@@ -12,22 +12,20 @@ which ``a(v, v) + share gamma |v_n|^2`` exceeds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import ProjectionError, RigidCircle, RigidRound
+from archord.geometry.curve import RigidCircle, RigidRound
 from archord.geometry.rigid_in_space import RigidBall
 from archord.report.errors import InputError, in_sentences, require_between, require_of
 from archord.solver.contact.laws.law import ContactLaw, fault_of
 from archord.solver.contact.laws.named import NAMES, contact_law
 from archord.solver.contact.pair import Pair
-from archord.solver.contact.surface import RigidSurface, Surface
+from archord.solver.contact.surface import RigidSurface, Surface, on_every_rank
 
 Vector = tuple[float, ...]
 Within = Callable[[Array], np.ndarray]  # whether points (m, d) are in a part
@@ -277,17 +275,3 @@ def _shares(integrated: Sequence[Surface]) -> list[float]:
     """Shares of the virtual work, in proportion to the compliances of the bodies."""
     compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in integrated])
     return [float(share) for share in compliance / compliance.sum()]
-
-
-@contextmanager
-def on_every_rank(comm: MPI.Comm) -> Iterator[None]:
-    """Let a `ProjectionError` that any rank raises within the context be raised on all of them.
-    Collective."""
-    failure = None
-    try:
-        yield
-    except ProjectionError as error:
-        failure = str(error)
-    failures = [said for said in comm.allgather(failure) if said]
-    if failures:
-        raise ProjectionError(failures[0])

@@ -19,7 +19,6 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import Curve, Index, Projection
 from archord.geometry.overlay import (
     broken_facets,
-    coincide,
     piece_rule,
     polygon_rule,
     quartered,
@@ -117,17 +116,18 @@ def _divided(ends: Array, n_parts: int) -> Array:
     return np.append(start + within * size, ends[-1])
 
 
-def pieces_rule(own: Patches, opposite: Patches) -> tuple[Array, Array, Index]:
+def pieces_rule(own: Patches, opposite: Patches, *, same: bool) -> tuple[Array, Array, Index]:
     """Positions ``(pieces, q, 2)`` and weights ``(pieces, q)`` in the pieces into which the facets
     of ``opposite`` break those of ``own``, and the facets ``(pieces,)`` of the pieces, in rising
     order.
 
     Six points in a triangle, nine in a quadrilateral are exact for a uniform pressure on curved
-    facets of second order. Triangular facets have three in each polygon where the surfaces do not
-    coincide: their distance spoils more than that, as it does on a cylinder whose meshes differ.
+    facets of second order. Triangular facets have three in each polygon where the surfaces are not
+    the ``same``: their distance spoils more than that, as it does on a cylinder whose meshes
+    differ.
     """
     facet, polygon, pieces = broken_facets(own, opposite)
-    if own.cell == basix.CellType.triangle and not coincide(own, opposite):
+    if own.cell == basix.CellType.triangle and not same:
         facet, xi, w = _of_polygons(facet, polygon, pieces)
     else:
         xi, w = piece_rule(pieces, _EXACT)

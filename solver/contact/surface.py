@@ -7,15 +7,19 @@ all of it and exchanges its displacement; each rank integrates the facets of the
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import basix
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
+from mpi4py import MPI
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis
-from archord.geometry.curve import Curve, RigidCircle, in_pieces
+from archord.geometry.curve import Curve, ProjectionError, RigidCircle, in_pieces
+from archord.geometry.overlay import coincide
 from archord.geometry.patches import Patches
 from archord.geometry.rigid_in_space import RigidBall
 from archord.geometry.strain import PointStrain
@@ -33,6 +37,7 @@ from archord.solver.contact.facets import (
 from archord.solver.contact.quadrature import pieces_rule, segment_rule
 from archord.solver.contact.trace_inequality import trace_constants
 
+_MANY_FACETS = 500  # of a rank, from which on it breaks its share alone
 # a direction in which no two nodes of a closed piece should be equally far
 _ASKEW = np.array([0.5257, 0.8507])
 
@@ -186,9 +191,23 @@ class Surface:
     def face(self, opposite: Surface) -> None:
         """Place the points so that forces go to the ``opposite`` surface exactly; no history."""
         if isinstance(self.curve, Patches) and isinstance(opposite.curve, Patches):
-            self.place_points(*pieces_rule(self.curve, opposite.curve))
+            self.place_points(*self._broken_by(self.curve, opposite.curve))
         if isinstance(self.curve, Curve) and isinstance(opposite.curve, Curve):
             self.place_points(*segment_rule(self.curve, opposite.curve))
+
+    def _broken_by(self, own: Patches, opposite: Patches) -> tuple[Array, Array, np.ndarray]:
+        """`pieces_rule` of the surface's ``own`` facets; of many, each rank breaks a share."""
+        same = coincide(own, opposite)
+        n_ranks = self.comm.size
+        if own.n_facets < _MANY_FACETS * n_ranks:
+            return pieces_rule(own, opposite, same=same)
+        ends = np.arange(n_ranks + 1) * own.n_facets // n_ranks
+        first, last = ends[self.comm.rank : self.comm.rank + 2]
+        with on_every_rank(self.comm):
+            xi, w, facet = pieces_rule(own.part(first, last), opposite, same=same)
+        shares = self.comm.allgather((xi, w, facet + first))
+        xi, w, facet = (np.concatenate(parts) for parts in zip(*shares, strict=True))
+        return xi, w, facet
 
     def place_points(self, xi: Array, w: Array, facet: np.ndarray | None = None) -> None:
         """Put the contact points at ``xi`` ``(n_facets, q)`` in (0, 1), in space ``(pieces, q,
@@ -343,3 +362,17 @@ class RigidSurface:
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, d)``, whatever the displacement of the bodies."""
         return self.motion
+
+
+@contextmanager
+def on_every_rank(comm: MPI.Comm) -> Iterator[None]:
+    """Let a `ProjectionError` that any rank raises within the context be raised on all of them.
+    Collective."""
+    failure = None
+    try:
+        yield
+    except ProjectionError as error:
+        failure = str(error)
+    failures = [said for said in comm.allgather(failure) if said]
+    if failures:
+        raise ProjectionError(failures[0])
