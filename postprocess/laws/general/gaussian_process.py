@@ -31,8 +31,9 @@ class Kernel:
     def between(self, one: Array, other: Array) -> Array:
         """Covariances ``(n, m)`` of points ``(n, d)`` and ``(m, d)``."""
         scale = np.sqrt(7) / self.lengths
-        a = one * scale
-        b = other * scale
+        middle = one.mean(axis=0)  # about which squares are small, and so their round-off
+        a = (one - middle) * scale
+        b = (other - middle) * scale
         r = (-2 * a) @ b.T  # in place from here on: new memory takes longer than numbers
         r += (a**2).sum(1)[:, None]
         r += (b**2).sum(1)
