@@ -277,7 +277,7 @@ def _judged(model: Model, found: Any, scale: float) -> Identification:
     J = model.jacobian(z, range(len(z)), r)
     size = np.linalg.norm(J, axis=0)
     bound = (np.abs(model.bounds - z) < _BOUND).any(axis=0)
-    blind = size < _FLAT * size.max()
+    blind = size <= _FLAT * size.max()  # all of them where the law never touches
     known = ~bound & ~blind
     inside = np.abs(r) <= scale
     J = J[:, known]

@@ -141,6 +141,18 @@ def test_what_cannot_be_told_apart_is_said():
     assert "no points before first touch" in said(found)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_curve_that_never_touches_tells_nothing():
+    """No unknown changes the law then, and none is the most that one can."""
+    curve = measured(ELASTIC, {}, 1, n=50)
+    scene = archord.load_scene(ELASTIC)
+    late = 2 * curve.displacement.max()
+    found = identify(scene, curve, ["joint.clearance", "block.E"], offset=late, stiffness=np.inf)
+    assert all(one.blind for one in found.estimates)
+    assert np.isnan(found.correlation).all()
+    assert "block.E: cannot be told, the curve does not depend on it" in said(found)
+
+
 @pytest.mark.usefixtures("_begun_at_the_scene")
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_force_that_the_machine_reads_without_a_load_is_told(sign):
