@@ -59,6 +59,7 @@ def gmsh_to_mesh(
     partitioner=None,
     key: tuple = (),
     cut: Cut | None = None,
+    finish: Callable[[MeshArrays], MeshArrays] | None = None,
 ) -> TaggedMesh:
     """Mesh what a function draws in gmsh, and distribute it over the ranks.
 
@@ -87,6 +88,9 @@ def gmsh_to_mesh(
         All that enters the mesh. If it is given, the mesh is kept and found again by it.
     cut : callable
         Tells the rank of each cell in place of the `usual_cut`, and is called as `sectors` is.
+    finish : callable
+        Makes another mesh of the mesh on rank 0, before it is distributed. What it raises is raised
+        on every rank.
 
     Returns
     -------
@@ -123,6 +127,11 @@ def gmsh_to_mesh(
             failure = error
         except Exception as error:
             failure = RuntimeError(f"gmsh could not mesh the problem: {error}")
+    if made and finish:
+        try:
+            made = finish(made)
+        except Exception as error:
+            failure = error
     if failure := comm.bcast(failure):
         raise failure
     return distribute(comm, made, partitioner, cut)

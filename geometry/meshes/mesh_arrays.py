@@ -145,7 +145,7 @@ class MeshArrays:
         bodies = np.zeros(len(cells), dtype=np.int32)
         bodies[members] = tags
         sides = sides_of(kind, cells)
-        found = {name: sides_between(kind, cells, new[of]) for name, of in facet_sets.items()}
+        found = _sides_of_sets(kind, cells, new, facet_sets)
         what = "edges" if dimension_of(kind) == 2 else "faces"
         for name, members in found.items():
             if lost := (members >= len(sides)).sum():
@@ -210,6 +210,19 @@ class MeshArrays:
 
 def _counted(names: Iterable[str]) -> dict[str, int]:
     return {name: number for number, name in enumerate(names, 1)}
+
+
+def _sides_of_sets(
+    kind: basix.CellType, cells: np.ndarray, new: np.ndarray, sets: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Which of `sides_of` ``cells`` are in each of the ``sets``, whose corners ``(k, c)`` have
+    ``new`` numbers; found at once, as all sides are sorted for it."""
+    if not sets:
+        return {}
+    corners = new[np.concatenate(list(sets.values()))]
+    ends = np.cumsum([len(of_set) for of_set in sets.values()])
+    members = np.split(sides_between(kind, cells, corners), ends[:-1])
+    return dict(zip(sets, members, strict=True))
 
 
 def _one_tag_each(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
@@ -14,14 +14,9 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import (
-    distribute,
-    gathered,
-    gmsh_to_mesh,
-    set_mesh_options,
-    slices,
-)
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options, slices
 from archord.geometry.meshes.jacobian import smallest_determinants
+from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import is_folded
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.mirrored import mirrored
@@ -107,24 +102,20 @@ def mesh_solids(
     """
     build = partial(draw_solids, sketch, slabs, rims)
     key = (*vars(sketch).items(), tuple(slabs), rims)
-    made = gmsh_to_mesh(comm, build, partitioner=partitioner, key=key, cut=slices)
-    made.mesh.geometry.x[:] *= radius
-    _require_sound(made)
-    if half:
-        return made
-    drawn = gathered(made)
-    return distribute(comm, drawn and mirrored(drawn), partitioner, slices)
+    finish = partial(_finished, radius, half)
+    return gmsh_to_mesh(comm, build, partitioner=partitioner, key=key, cut=slices, finish=finish)
 
 
-def _require_sound(made: TaggedMesh) -> None:
-    mesh = gathered(made)
-    n_folded = 0
-    if mesh is not None:
-        n_folded = int(is_folded(mesh, *smallest_determinants(mesh)).sum())
-    if n_folded := made.mesh.comm.bcast(n_folded):
+def _finished(radius: float, half: bool, drawn: MeshArrays) -> MeshArrays:
+    """The half mesh that was ``drawn``, times ``radius``, or the whole one. Raises ValueError for
+    folded elements."""
+    n_folded = is_folded(drawn, *smallest_determinants(drawn)).sum()
+    if n_folded:
         raise ValueError(
             f"{n_folded} of the elements that were drawn are folded; choose a smaller element size"
         )
+    made = replace(drawn, x=radius * drawn.x)
+    return made if half else mirrored(made)
 
 
 def lines_of(sketch: Sketch, profile: str) -> list[_Line]:
