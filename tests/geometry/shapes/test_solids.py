@@ -121,12 +121,13 @@ def test_cells_at_fillets_are_not_folded(shape, fillet):
     assert (smallest / largest).min() > -0.01
 
 
-def test_folded_elements_are_refused(monkeypatch):
-    """The elements at a fillet, were they as large as the others."""
+@pytest.mark.mpi
+def test_folded_elements_are_refused(monkeypatch, comm):
+    """The elements at a fillet, were they as large as the others; on every rank."""
     monkeypatch.setenv("ARCHORD_KEEP_MESHES", "0")
     monkeypatch.setattr(solids, "_OF_FILLET", 100.0)
     with pytest.raises(ValueError, match="are folded; choose a smaller element size"):
-        made(lug, *LUG, chamfer=0.0, fillet=0.1)
+        made(lug, *LUG, chamfer=0.0, fillet=0.1, comm=comm)
 
 
 def test_elements_shrink_toward_the_rim():
