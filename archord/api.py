@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from archord.output.folder import MESH, is_sweep
+from archord.output.folder import CHECKPOINT, MESH, is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.report.errors import InputError
@@ -172,6 +172,8 @@ def solve(
     if restart:
         planned = _plan(checked, folder, comm)
         if planned.finished:
+            if given is not None and not given.mesh_file:
+                _require_own_mesh(given, planned, folder, comm)
             return Run(folder)
         checked = partial(_scene_of, planned.scene)
         options = {"force": True, "start": planned.start}
@@ -283,6 +285,18 @@ def _scene_of(given: Any, caller: str = "archord.solve") -> AnyScene:
     if getattr(in_space, "space", None) is not None:
         return scene_file.parse_any(in_space.general(), caller)
     return given
+
+
+def _require_own_mesh(problem: Problem, planned: Plan, folder: Path, comm: MPI.Comm) -> None:
+    """Raise `InputError` unless the mesh of the ``problem``, which no file tells, is the one of the
+    finished run in ``folder``. Collective."""
+    from archord.output.checkpoint import require_same_mesh
+    from archord.presets.account import account_of
+    from archord.solver.path.mesh_order import MeshOrder
+
+    system = account_of(planned.scene, comm, given=problem).system
+    checkpoint = planned.start.checkpoint if planned.start else None
+    require_same_mesh(MeshOrder(system), folder / CHECKPOINT, checkpoint)
 
 
 def _plan(checked: Callable[[], AnyScene], folder: Path, comm: MPI.Comm) -> Plan:

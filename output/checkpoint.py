@@ -88,12 +88,9 @@ def halt(
     return Checkpoint(m.step, scene, mesh, scalars, arrays)
 
 
-def resume(
-    order: MeshOrder, path: Path, checkpoint: Checkpoint | None
-) -> tuple[Record, Step, Position, Work]:
-    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``);
-    returns what `halt` was given. Raises `InputError` if it
-    is of another mesh. Collective."""
+def require_same_mesh(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> Any:
+    """The scalars of ``checkpoint`` (needed on rank 0 only, read from ``path``). Raises
+    `InputError` if it is of another mesh, or its sets lie elsewhere. Collective."""
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
     fault = ""
@@ -103,6 +100,15 @@ def resume(
         fault = "belongs to other bodies, supports, loads or surfaces of this mesh: its sets differ"
     if fault:
         raise InputError(f"{path}: {fault}, so that the run cannot be continued.")
+    return scalars
+
+
+def resume(
+    order: MeshOrder, path: Path, checkpoint: Checkpoint | None
+) -> tuple[Record, Step, Position, Work]:
+    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``);
+    returns what `halt` was given. Raises `InputError` as `require_same_mesh`. Collective."""
+    scalars = require_same_mesh(order, path, checkpoint)
     order.spread_history(checkpoint.arrays if checkpoint else None)
 
     def state(name: str, level: str) -> Array:

@@ -77,7 +77,8 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
             return Plan(
                 scene, start, f"the run in {folder} is finished: writing {' and '.join(lost)} again"
             )
-        return Plan(scene, None, f"the run in {folder} is finished: nothing to do", finished=True)
+        said = f"the run in {folder} is finished: nothing to do"
+        return Plan(scene, start, said, finished=True)
     said = f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}"
     changed = [name for name in TABLES if fault_of(folder, name, start.report.get("files", {}))]
     return Plan(scene, start, f"{said}, writing {' and '.join(changed)} again" if changed else said)

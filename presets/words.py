@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from archord.materials.hardening import Hardening, LinearHardening, TabularHarde
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.materials.material import Material
+from archord.report.attributes import attributes_of, described
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.contact import CONTACT_LAWS
@@ -25,14 +25,13 @@ from archord.solver.contact.laws.named import LAWS
 from archord.solver.parts import Body, Coupling, Load, Support
 from archord.solver.problem import Problem
 
-_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 _LARGEST_NU = 0.499999
 
 
 def words_of(problem: Problem, mesh_file: str, fields: str | bool = "nodes") -> ProblemScene:
     """The scene that tells of ``problem``, whose mesh is, or will be, the file ``mesh_file``.
 
-    Materials and laws of one's own classes are told by class and representation. Raises
+    Materials and laws of one's own classes are told by class, representation and attributes. Raises
     `InputError` for what a scene refuses, and for conditions that it has no words for.
     """
     make: Any = ProblemScene
@@ -141,8 +140,11 @@ def _moduli(material: Any, plane: str) -> dict[str, float]:
 
 def _own(part: Any) -> dict[str, Any]:
     """An object of a class of one's own in words, the same ones in every process."""
-    text = _ADDRESS.sub("", repr(part))
-    return {"kind": type(part).__qualname__, "text": " ".join(text.split())}
+    return {
+        "kind": type(part).__qualname__,
+        "text": described(part),
+        "attributes": attributes_of(part),
+    }
 
 
 def _interaction(part: Interaction) -> dict[str, Any]:

@@ -118,6 +118,7 @@ class OwnSection(Section):
 
     kind: Name = key("the class", example="Archard")
     text: str = key("what Python prints of the object", example="Archard(rate=1e-8)")
+    attributes: dict[str, str] = key("its attributes, by which a change is known", default={})
 
 
 class OwnMaterial(OwnSection):

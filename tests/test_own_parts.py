@@ -56,6 +56,12 @@ class Wear(archord.ContactLaw):
         return {"worn volume": archord.Quantity(state.depth, "mm2")}
 
 
+class Untold(Wear):
+    """The same, of whose parameters the representation tells nothing."""
+
+    __repr__ = object.__repr__
+
+
 class WrittenInPlace(Wear):
     """The same, whose history is written into what it gets."""
 
@@ -422,6 +428,15 @@ def test_no_scene_is_solved_with_the_description_of_an_object(run, tmp_path, wor
 def test_another_object_does_not_continue_a_run(run):
     with pytest.raises(archord.InputError, match="only"):
         archord.solve(sliding(MPI.COMM_SELF, k=0.002), run.folder, restart=True)
+
+
+def test_another_attribute_does_not_continue_a_run_whatever_the_representation_tells(tmp_path):
+    """Continued with a wear of 2e-3 the run had the pressures of neither law."""
+    archord.solve(sliding(MPI.COMM_SELF, law=Untold), tmp_path / "run")
+    with pytest.raises(archord.InputError, match=r"\"k\": \"0.002\""):
+        archord.solve(sliding(MPI.COMM_SELF, 0.002, Untold), tmp_path / "run", restart=True)
+    same = archord.solve(sliding(MPI.COMM_SELF, law=Untold), tmp_path / "run", restart=True)
+    assert same.status == "done"
 
 
 def test_an_extended_path_goes_on(run, tmp_path):

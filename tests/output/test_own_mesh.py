@@ -227,3 +227,24 @@ def test_other_sets_of_the_same_mesh_do_not_continue_a_run(tmp_path):
     with pytest.raises(archord.InputError, match="its sets differ, so that the run cannot be"):
         archord.solve(longer(other), tmp_path / "run", restart=True)
     assert archord.solve(longer(facets), tmp_path / "run", restart=True).steps == 5
+
+
+def test_a_finished_run_is_not_taken_for_one_on_another_mesh(tmp_path):
+    """A block of height 2 under 2 % has 20 MPa; the run on it told 20 MPa of height 2.5, too."""
+
+    def pressed(height):
+        block = {"block": (0.0, 0.0, 4.0, height)}
+        return archord.Problem(
+            archord.rectangles(block, 1.0, MPI.COMM_SELF),
+            bodies=[archord.Body("block", archord.Elastic(1000.0, 0.0))],
+            supports=[archord.Support("block bottom")],
+            loads=[archord.Load("press", "block top", "y", displacement=-0.04)],
+            steps=1,
+        )
+
+    run = archord.solve(pressed(2.0), tmp_path / "run")
+    before = (run.folder / "run.json").read_bytes()
+    assert archord.solve(pressed(2.0), run.folder, restart=True).status == "done"
+    with pytest.raises(archord.InputError, match="belongs to another mesh"):
+        archord.solve(pressed(2.5), run.folder, restart=True)
+    assert (run.folder / "run.json").read_bytes() == before
