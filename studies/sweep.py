@@ -68,11 +68,10 @@ def result_of(case: Case, folder: Path) -> Result:
     between_meshes = (
         case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
     )
-    if status == "done" and not between_meshes:
+    if status in ("done", "stopped", "interrupted") and not between_meshes:
         fault = fault_of_run(run, case.scene, report)
         if fault:
             return Result(case.run, "open", f"{run}: {fault}", damaged=True)
-    if status in ("done", "stopped", "interrupted") and not between_meshes:
         return Result(case.run, status, report.get("message", ""), steps)
     return Result(case.run, "open", steps=steps)
 

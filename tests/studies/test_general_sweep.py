@@ -200,6 +200,26 @@ def test_a_case_of_a_changed_mesh_file_is_solved_again(tmp_path, capsys):
         plan_restart(case)
 
 
+def test_a_stopped_case_of_a_changed_mesh_file_is_solved_again(tmp_path, capsys):
+    """A block of width 1 cannot carry what one of width 2 does."""
+    mesh = tmp_path / "block.npz"
+    text = BLOCK.format(mesh=mesh).replace("displacement = 0.01", "force = -600.0")
+    file = tmp_path / "block.sweep.toml"
+    file.write_text(text.replace("nu = 0.3", "nu = 0.3, yield_stress = 300.0"))
+    store_block(mesh, 1.0)
+    assert sweep(file, "-o", tmp_path / "out", "-q") == 3
+    assert sweep(file, "-o", tmp_path / "out", "-q") == 3
+    assert "was changed after the run" not in capsys.readouterr().err
+    store_block(mesh, 2.0)
+    assert sweep(file, "-o", tmp_path / "out", "--gather", "-q") == 0
+    assert table(tmp_path / "out" / "sweep.csv") == []
+    assert sweep(file, "-o", tmp_path / "out", "-q") == 0
+    assert "was changed after the run" in capsys.readouterr().err
+    (row,) = table(tmp_path / "out" / "cases.csv")
+    assert row["status"] == "done"
+    assert float(row["press force [N/mm]"]) == -600.0
+
+
 DECK = """*INCLUDE, INPUT=nodes.txt
 *ELEMENT, TYPE=CPE4, ELSET=block
 1, 1, 2, 3, 4
