@@ -14,7 +14,7 @@ by 180. Forces of Abaqus are all of the whole ring.)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.formats.source import Mesh
 from archord.output.user_file import writing
 from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label
-from archord.postprocess.decks.mesh_lines import mesh_lines
+from archord.postprocess.decks.mesh_lines import ALL_NODES, DRIVES, mesh_lines
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.model_lines import model_lines
 from archord.postprocess.decks.step_lines import step_lines
@@ -67,12 +67,19 @@ def write_deck(scene: AnyScene, path: Path, name: str, given: Problem | None = N
 def deck(system: System, mesh: DeckMesh, targets: Sequence[float], heading: str = "") -> str:
     """The input deck of the problem of ``system`` on ``mesh`` with a step to each of the
     ``targets`` on the path. Raises ValueError for what a deck cannot say."""
-    names = {*mesh.elements, *mesh.node_sets, *mesh.surfaces}
-    if len({label(name) for name in names}) < len(names):
-        listed = ", ".join(sorted(names))
-        raise ValueError(f"names must differ in more than case and signs for a deck: {listed}")
+    _require_labels({*mesh.elements, *mesh.node_sets, *mesh.surfaces}, (ALL_NODES, DRIVES))
+    _require_labels({interaction.name for interaction in system.problem.interactions})
     model = DeckModel(system, mesh)
     lines = [*mesh_lines(model, heading), *model_lines(model)]
     for k, target in enumerate(targets, 1):
         lines += step_lines(model, target, first=k == 1, last=k == len(targets))
     return "\n".join(lines) + "\n"
+
+
+def _require_labels(names: Iterable[str], taken: Sequence[str] = ()) -> None:
+    """Raise ValueError where two of the ``names`` have one label, or a label is ``taken``."""
+    labels = [*taken, *map(label, names)]
+    if len(set(labels)) < len(labels):
+        own = f" and from its own {' and '.join(taken)}" if taken else ""
+        listed = ", ".join(sorted(names))
+        raise ValueError(f"names must differ in more than case and signs for a deck{own}: {listed}")

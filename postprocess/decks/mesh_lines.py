@@ -12,6 +12,8 @@ from archord.postprocess.decks.rows import continued, joined, number
 
 _FAMILIES = {"strain": "CPE", "stress": "CPS", "axisymmetric": "CAX", "space": "C3D"}
 _MODELS = {"axisymmetric": "axisymmetric, printed forces", "space": "in space, forces"}
+ALL_NODES = "ALL_NODES"  # the deck's own node sets, beside the sets of the problem
+DRIVES = "DRIVES"
 _REDUCED = 20  # nodes of elements with reduced integration, as archord has but for contact
 
 
@@ -21,13 +23,13 @@ def mesh_lines(model: DeckModel, heading: str) -> list[str]:
     whole = number(model.problem.whole / model.thick)
     words = _MODELS.get(model.problem.kinematics.name, f"thickness {number(model.thick)}, forces")
     lines = ["*HEADING", f"archord: {heading}; {words} times {whole} are of the whole"]
-    lines.append("*NODE, NSET=ALL_NODES")
+    lines.append(f"*NODE, NSET={ALL_NODES}")
     x = _drawn(model)
     for i in range(len(x)):
         place = [number(x[i, axis]) for axis in range(x.shape[1])]
         lines.append(", ".join([str(i + 1), *place]))
     if model.own:
-        lines.append("*NODE, NSET=DRIVES")
+        lines.append(f"*NODE, NSET={DRIVES}")
         lines += [f"{node}, 0., 0." for node in model.own.values()]
     first = 1
     for name, nodes in mesh.elements.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from archord.postprocess.decks.mesh import label
+from archord.postprocess.decks.mesh_lines import DRIVES
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.rows import block, number, pair
 
@@ -39,7 +40,7 @@ def step_lines(model: DeckModel, target: float, *, first: bool, last: bool) -> l
     for name in dict.fromkeys(label(m.node_set) for m in model.moved):
         lines += [f"*NODE PRINT, NSET={name}, TOTALS=ONLY", "RF"]
     if model.own:
-        lines += ["*NODE PRINT, NSET=DRIVES", "U"]
+        lines += [f"*NODE PRINT, NSET={DRIVES}", "U"]
     if last:
         as_drawn = "" if model.mesh.x.shape[1] == 3 else _AS_DRAWN
         lines += [line.format(as_drawn) for line in _RESULTS]

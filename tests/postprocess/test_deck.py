@@ -544,3 +544,34 @@ def test_ranks_write_one_deck_of_a_whole_mesh(comm, tmp_path):
         with pytest.raises(archord.InputError, match=f"the mesh is on {comm.size} ranks"):
             archord.export_deck(shared, path, force=True)
     assert path.read_text() == text
+
+
+@pytest.mark.parametrize("held", ["low bottom", "all nodes", "drives"])
+@pytest.mark.parametrize("contacts", [("lower", "upper"), ("c 1", "c-1")])
+def test_names_that_a_deck_takes_for_one_are_refused(held, contacts, tmp_path):
+    """A support on "all nodes" held every node; of two laws of one name the last one counted."""
+    bodies = ("low", "middle", "top")
+    blocks = {name: (0.0, float(k), 2.0, 1.0) for k, name in enumerate(bodies)}
+    tagged = rectangles(blocks, 1.0, MPI.COMM_SELF)
+    tagged.facet_sets[held] = tagged.facet_sets["low bottom"]
+    steel = Elastic(210e3, 0.3)
+    lower, upper = contacts
+    problem = archord.Problem(
+        tagged,
+        bodies=[archord.Body(name, steel) for name in bodies],
+        interactions=[
+            archord.Interaction(lower, ("middle bottom", "low top"), friction=0.1),
+            archord.Interaction(upper, ("top bottom", "middle top"), friction=0.5),
+        ],
+        supports=[
+            archord.Support("base", on=held),
+            archord.Support("middle left", fixed="x"),
+            archord.Support("top left", fixed="x"),
+        ],
+        loads=[archord.Load("press", on="top top", direction="y", force=-1.0)],
+    )
+    if held == "low bottom" and lower == "lower":
+        assert archord.export_deck(problem, tmp_path / "deck.inp").exists()
+        return
+    with pytest.raises(archord.InputError, match="must differ in more than case and signs"):
+        archord.export_deck(problem, tmp_path / "deck.inp")
