@@ -145,8 +145,7 @@ def law(
         print(draw_laws(states, joint, plot, by_load, to))
     else:
         tables = [law_table(entry, joint, state, units, thickness) for entry, state in states]
-        # in one write: mpirun may lose a last line whose end comes apart from it
-        print("\n\n".join(map(str, tables)) + "\n", end="")
+        print(*tables, sep="\n\n")
     warn(*said)
     return 0
 

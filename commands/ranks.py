@@ -10,6 +10,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
+from io import TextIOWrapper
 
 # commands that all ranks work on; all others are rank 0's alone
 COLLECTIVE = ("solve", "reproduce", "sweep", "benchmark stability")
@@ -58,6 +59,9 @@ def run_on_ranks(command: str, work: Callable[[], int]) -> int:
             return 0
         for name in [name for name in os.environ if name.startswith(_LAUNCHER)]:
             del os.environ[name]
+        if isinstance(sys.stdout, TextIOWrapper):
+            # all in one write: mpirun may lose a last line whose end comes apart from it
+            sys.stdout.reconfigure(line_buffering=False)
         return work()
     if launcher_rank() != 0:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115

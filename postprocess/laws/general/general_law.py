@@ -21,7 +21,12 @@ from archord.postprocess.laws.general.factor_model import (
     Plain,
     gain,
 )
-from archord.postprocess.laws.general.hardening_model import Flows, flows, gains, hardened_loss
+from archord.postprocess.laws.general.hardening_model import (
+    Flows,
+    flows,
+    hardened_loss,
+    largest_gain,
+)
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent, line_contact_level
 from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
@@ -227,7 +232,7 @@ def outside(joint: LawJoint) -> str:
         if not low * (1 - _LAST_DIGITS) <= value <= high * (1 + _LAST_DIGITS):
             to = f"to {high:g}" if high < math.inf else "and more"
             return f"{name} = {value:.4g} is outside {low:g} {to}"
-    gain = float(gains(joint_numbers(joint), flows(joint), NODES[-1]).max())
+    gain = largest_gain(joint_numbers(joint), flows(joint), NODES[1:])
     if gain > LARGEST_GAIN:
         said = f"{gain:.3g} times the yield stress, at most {LARGEST_GAIN:g} times is covered"
         return f"a body hardens by 3 dR to {said}"

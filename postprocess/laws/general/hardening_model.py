@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -92,6 +92,7 @@ class Strains(NamedTuple):
     step: Array
 
 
+@lru_cache(maxsize=64)
 def flows(joint: LawJoint) -> Flows:
     """s by PEEQ of pin and block."""
     unit = joint.unit / joint.radius
@@ -240,19 +241,28 @@ def _step(miss: Array, last: Array) -> Array:
     return np.clip(step, -farthest, farthest)
 
 
-def gains(numbers: Sequence[float], given: Flows, x: float) -> Array:
-    """``s_eff/s`` of the bodies that harden at ``x``; one of none."""
-    found = representative(hardening_model()["strain"], numbers, given, np.array([x]))
+@lru_cache(maxsize=64)
+def strains(numbers: tuple[float, ...], given: Flows, x: tuple[float, ...]) -> Strains:
+    """`representative` by the model that comes with archord."""
+    return representative(hardening_model()["strain"], numbers, given, np.array(x))
+
+
+def largest_gain(numbers: Sequence[float], given: Flows, x: Array) -> float:
+    """The largest ``s_eff/s`` of the bodies that harden, at the last ``x`` ``(k,)``; one of
+    none."""
     hardens = [i for i, flow in enumerate(given) if flow is not None]
+    if not hardens:
+        return 1.0
+    found = strains(tuple(numbers), tuple(given), tuple(x))
     s = np.array(numbers[5:])
-    return np.append(1.0, found.s[hardens, 0] / s[hardens])
+    return max(1.0, *(found.s[hardens, -1] / s[hardens]))
 
 
 def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     """What yielding does at ``x`` ``(k,)`` to the joint with these ``numbers``, whose bodies harden
     as ``given``. Raises ValueError where no eps_rep is found."""
     table = hardening_model()
-    found = representative(table["strain"], numbers, given, x)
+    found = strains(tuple(numbers), tuple(given), tuple(x))
     if found.step.max() > _FOUND:
         at = x[found.step.argmax()]
         raise ValueError(
