@@ -42,7 +42,6 @@ _KINDS = {
     "elastic": 45,
 }
 JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
-_SHARES = {FRICTION: 1.0, LARGE_STRAIN: 0.4}  # of them that are solved: large strain does less
 _SMALLEST = 0.03  # coefficient of friction
 _SEED = 7200
 _FIRST = 0.05  # x
@@ -97,7 +96,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--element-size", type=float, default=ELEMENT_SIZE, help="of fresh ones")
     given = parser.parse_args()
-    share = _SHARES[given.kind]
+    share = 1.0
     seed = _SEED
     if given.fresh:
         share = given.fresh / sum(JOINTS.values())

@@ -26,7 +26,7 @@ import numpy as np
 
 from archord.materials.elasticity import Plane, contact_modulus
 from archord.materials.named import metals
-from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.elastic_model import Elastic
 from archord.postprocess.laws.general.general_law import NODES, SMALLEST_S, law_of_numbers
 from archord.postprocess.laws.general.hardening_model import BODIES
 from archord.postprocess.laws.general.law_fit import steps_count
@@ -38,6 +38,7 @@ from archord.studies.law_design import (
     Drawn,
     Row,
     checking,
+    earlier_model,
     fresh_nodes,
     joints,
     steady_nodes,
@@ -109,7 +110,7 @@ def pair(metal_of: Mapping[str, Any], strain: bool, clearance: float) -> Drawn:
         own |= {f"{body}.E": metal["E"] / E_star, f"{body}.nu": metal["nu"]}
         own |= {f"{body}.yield_stress": float(points[0, 1]), f"{body}.hardening": points.tolist()}
         strengths.append(float(points[0, 1]) / clearance)
-    first = float(first_yield(elastic_model(), strain, elastic, min(strengths)))
+    first = float(first_yield(earlier_model(), strain, elastic, min(strengths)))
     return Drawn(own, (float(strain), *elastic, *strengths), first, first, 0.5, 1.0)
 
 

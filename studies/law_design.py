@@ -11,8 +11,9 @@ other body's yield stress. It is solved at multiples of about the displacement o
 3 dR, then unloaded. A quarter of the joints are also unloaded from a smaller displacement. In
 plane stress, and where yielding begins early, a second run takes two steps between the same nodes.
 
-The law tells where a joint opens, and with it the displacements of the unloading. The first sweep
-was designed with an earlier law: law_design.npz has the residual clearances that this law told.
+The law tells where joints yield first and open. The sweep was designed with an earlier law, so that
+it is always the same file: law_design.json has the elastic model of this law, and law_design.npz
+the residual clearances that it told.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import argparse
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +30,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel
 from archord.postprocess.laws.general.general_law import (
     CLEARANCES,
     NU,
@@ -42,9 +44,10 @@ from archord.scene.sections.errors import toml_value
 
 Row = dict[str, Any]
 # How many joints of each kind. A kind is the plane, what yields, whether the other body is stronger
-# ("weaker"), and whether by little ("alike"), or the pin is soft, or yields early.
+# ("weaker"), and whether by little ("alike"), or the pin is soft, or yields early, or is as
+# compliant as the block or more.
 JOINTS = {
-    "strain both": 280,
+    "strain both": 220,
     "strain block": 170,
     "strain block weaker": 170,
     "strain pin": 170,
@@ -64,10 +67,16 @@ JOINTS = {
     "stress block weaker alike": 110,
     "stress pin weaker alike": 40,
     "strain pin weaker early": 64,
+    "strain both early compliant": 20,
+    "strain block early compliant": 20,
+    "strain block weaker early compliant": 32,
+    "strain pin early compliant": 40,
+    "strain pin weaker early compliant": 40,
 }
-_SPECIAL = ("soft", "alike", "early")  # kinds that are not drawn to check the law
+# kinds that are not drawn to check the law
+_SPECIAL = ("soft", "alike", "early", "compliant")
 FRESH = {kind: n for kind, n in JOINTS.items() if not kind.endswith(_SPECIAL)}
-FRESH |= {"strain elastic": 90, "stress elastic": 60}
+FRESH |= {"strain both": 280, "strain elastic": 90, "stress elastic": 60}
 # Joints that are solved on several meshes, and the sizes of their elements over R: the error of the
 # mesh is largest where a block yields alone in plane stress.
 MESHES = {
@@ -93,6 +102,7 @@ FRESH_WAY = np.array(
 )
 _CYCLES = 0.25  # share of joints that are also unloaded from a smaller displacement
 _OPENS = Path(__file__).with_suffix(".npz")
+_ELASTIC = Path(__file__).with_suffix(".json")
 ELEMENT_SIZE = 0.05  # over R, of the joints to fit to
 CHECK_SIZE = 0.025  # of joints to check the law on, unless another one is asked for
 _BASE = f"""
@@ -152,6 +162,7 @@ def _drawn(kind: str, u: Array, beyond: float) -> Drawn:
     stiffest = RATIOS[1] * wide
     if "soft" in more:
         nu[0] = NU[1] * (0.83 + 0.17 * u[0])
+    if "soft" in more or "compliant" in more:
         stiffest = 0.8
     ratio = _between(RATIOS[0] / wide, stiffest, u[2])
     ends = 1 - nu**2 if strain else np.ones(2)
@@ -171,13 +182,13 @@ def _drawn(kind: str, u: Array, beyond: float) -> Drawn:
         latest = _latest(strain, elastic)
         largest = 0.4 if "early" in more else latest
         s = _between(SMALLEST_S[plane] / wide, largest, u[4] ** 1.2)
-        onset = last = float(first_yield(elastic_model(), strain, elastic, s))
+        onset = last = float(first_yield(earlier_model(), strain, elastic, s))
     if yields == "both":
         stronger = s
     elif "weaker" in more and yields == "pin" and strain:
         # The block holds the weak pin, and decides the force once it yields, too.
         stronger = _between(s, latest, u[5])
-        last = float(first_yield(elastic_model(), strain, elastic, stronger))
+        last = float(first_yield(earlier_model(), strain, elastic, stronger))
     elif "weaker" in more:
         stronger = s / (0.98 - (0.25 if "alike" in more else 0.75) * u[5])
     pin, block = (s, stronger) if yields == "pin" else (stronger, s)
@@ -188,6 +199,12 @@ def _drawn(kind: str, u: Array, beyond: float) -> Drawn:
     return Drawn(own, (float(strain), *elastic, pin, block), onset, last, odd, chance)
 
 
+@cache
+def earlier_model() -> ElasticModel:
+    """The elastic model that the sweep was designed with."""
+    return ElasticModel.from_json(_ELASTIC.read_text(encoding="utf-8"))
+
+
 def _between(low: float, high: float, share: float) -> float:
     return low * (high / low) ** share
 
@@ -195,7 +212,7 @@ def _between(low: float, high: float, share: float) -> float:
 def _latest(strain: bool, elastic: Elastic) -> float:
     """The s with which a joint begins to yield at nearly 3 dR."""
     grid = np.geomspace(0.05, 5.0, 200)
-    return float(np.interp(2.95, first_yield(elastic_model(), strain, elastic, grid), grid))
+    return float(np.interp(2.95, first_yield(earlier_model(), strain, elastic, grid), grid))
 
 
 def training() -> Iterator[Row]:

@@ -46,12 +46,10 @@ CLEARANCES = (1e-3, 0.02)
 RATIOS = (1 / 3, 10.0)
 SMALLEST_S = {"strain": 0.15, "stress": 0.2}
 _LAST_DIGITS = 1e-3  # of the bounds, and of moduli that a scene has rounded
-# of P, relative, which 9 in 10 joints keep: of small x; and else of what is elastic, with p m up to
-# the first of these, and from the second on
+# of P, relative, which 9 in 10 joints keep: of small x, and else of what is elastic
 _EARLY_ERROR = 1e-3
 _SMALL = 0.1
-_CORNER = (0.45, 0.55)
-_CORNER_ERRORS = (4e-4, 8e-4)
+ELASTIC_ERROR = 1.5e-4
 LARGEST_GAIN = 3.2  # of s_eff/s at 3 dR; solved joints reach 2.6
 # secant of the way back over the elastic joint's steepest slope: then it is a straight line
 _STEEPEST = 0.999
@@ -288,7 +286,7 @@ def reduce_joint(
     ratio = np.ones_like(y)
     toe = np.zeros_like(y)
     back_error: Array = np.zeros(len(NODES))
-    error[x >= _SMALL] = elastic_error(joint)
+    error[x >= _SMALL] = ELASTIC_ERROR
     if lost is not None:
         y = base.y * np.exp(lost.force)
         dy = (base.slope / base.y + lost.slope) * y
@@ -331,11 +329,6 @@ def reduce_joint(
         error=_from(error[0], error),
         back_error=back_error,
     )
-
-
-def elastic_error(joint: Elastic) -> float:
-    """The expected error of P of what is elastic of ``joint``, relative, but for small x."""
-    return float(np.interp(joint.p * joint.m, _CORNER, _CORNER_ERRORS))
 
 
 def _raised(x: Array, y: Array, dy: Array, added: Gain) -> tuple[Array, Array]:

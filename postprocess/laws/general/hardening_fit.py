@@ -20,7 +20,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
-from archord.postprocess.laws.general.general_law import elastic_error, joint_numbers
+from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
     BODIES,
     TABLE,
@@ -223,10 +223,9 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, fl
     for joint, model in zip(joints, models, strict=True):
         found, lost = joint.state(model)
         usual = (joint.x >= _USUAL[0]) & (joint.x <= _USUAL[1])
-        of_elastic = elastic_error(Elastic(*joint.numbers[1:5]))
         told = [
             lost.force - joint.force,
-            np.hypot(lost.deviation, of_elastic),
+            np.hypot(lost.deviation, ELASTIC_ERROR),
             unsure(rises_of(joint.given, found), lost),
         ]
         by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])

@@ -64,9 +64,10 @@ from archord.postprocess.laws.general.yield_model import (
 from archord.postprocess.run import Run
 from archord.report.table import Table
 
-# degree in the joint's numbers, and in x/(1 + x)
-_TERMS = {"F": (4, 5), "peak": (2, 4), "angle": (2, 4)}
+# degrees in the joint's numbers and in x/(1 + x), and how many of these terms are taken
+_TERMS = {"F": (6, 8, 260), "peak": (6, 8, 120), "angle": (6, 8, 120)}
 _STEPS_COUNT_BELOW = {"strain": 0.6, "stress": np.inf}  # s of joints that yield
+_DEPENDENT = 1e-6  # what is left of a column that other columns tell
 SOFT = 0.5  # p m of soft pins in plane strain
 # shares of errors that expected errors are to contain
 WITHIN = {"force": 0.91, "shape": 0.9, "back": 0.9}
@@ -111,14 +112,37 @@ def fit_elastic(joints: Elastic, x: Array, y: Array, peak: Array, angle: Array) 
 
 
 def _polynomials(
-    joints: Elastic, x: Array, values: Array, weights: Array, degree: int, order: int
+    joints: Elastic, x: Array, values: Array, weights: Array, degree: int, order: int, number: int
 ) -> Polynomials:
     powers = exponents(degree)
     shapes = products(joints, powers)
     series = np.polynomial.chebyshev.chebvander(depth(x), order)
     design = np.einsum("mt,kc,mk->mktc", shapes, series, weights).reshape(values.size, -1)
-    found, *_ = np.linalg.lstsq(design, (values * weights).ravel(), rcond=1e-13)
-    return Polynomials(powers, found.reshape(len(powers), -1))
+    right = (values * weights).ravel()
+    chosen = most_telling(design, right, number)
+    found = np.zeros(design.shape[1])
+    found[chosen], *_ = np.linalg.lstsq(design[:, chosen], right, rcond=1e-13)
+    coefficients = found.reshape(len(powers), -1)
+    used = coefficients.any(axis=1)
+    return Polynomials(powers[used], coefficients[used])
+
+
+def most_telling(design: Array, right: Array, number: int) -> list[int]:
+    """Places of ``number`` columns of ``design`` ``(n, m)``, of which each brings least squares
+    nearest to ``right`` ``(n,)`` beside those before it (Chen, Billings and Luo 1989)."""
+    rest = design / np.linalg.norm(design, axis=0)
+    missed = right.copy()
+    chosen: list[int] = []
+    for _ in range(number):
+        length = np.linalg.norm(rest, axis=0)
+        tells = np.abs(missed @ rest) / np.maximum(length, _DEPENDENT)
+        tells[length < _DEPENDENT] = 0.0
+        best = int(tells.argmax())
+        chosen.append(best)
+        direction = rest[:, best] / length[best]
+        missed -= direction * (direction @ missed)
+        rest -= np.outer(direction, direction @ rest)
+    return chosen
 
 
 @dataclass(frozen=True)

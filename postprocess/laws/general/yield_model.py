@@ -49,7 +49,7 @@ _AT = np.log([ELASTIC_BELOW, *MULTIPLES])  # ln u, between which curves are cubi
 # Parts by which the other body is stronger, within which it matters by how much: beyond the last it
 # stays elastic. In plane stress the first is the part for a contact at the largest pressure of
 # plastic flow, 2/sqrt(3) sigY.
-_STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}
+_STRONGER = {"strain": (0.5, 0.8), "stress": (1 - np.sqrt(0.75), 0.2)}
 # Kinds of joints whose errors scatter unlike: the other body is as strong, stronger, or elastic.
 KINDS = ("both", "weaker", "alone")
 _APART = (0.0, 0.1, 0.9, 1.0)  # parts of `_STRONGER` between which a joint goes over to the next
@@ -67,6 +67,8 @@ _EXCESS_BEGINS = 1.5  # u
 _EXCESS_GROWS = 0.5  # in ln u
 _CURVES = ("force", "peak", "angle")
 _NINE_IN_TEN = 1.645  # standard deviations
+_DIGITS = 17  # binary ones of the numbers in yield_model.npz, five decimal ones
+_DIGITS_BACK = 14  # of ways back, four decimal ones
 # of stored logarithms, and what stands for nan
 CURVE_STEP = 1e-4
 _UNKNOWN = -32768
@@ -401,10 +403,11 @@ class SolvedJoints:
         return SolvedJoints(**_numbers(self.compact()))
 
     def compact(self) -> dict[str, Array]:
-        """Arrays for a small file: curves in steps of `CURVE_STEP`."""
-        found = {name: np.asarray(value, np.float32) for name, value in vars(self).items()}
+        """Arrays for a small file: curves in steps of `CURVE_STEP`, and numbers in few digits."""
+        found = {name: _rounded(value, _DIGITS) for name, value in vars(self).items()}
+        found["back"] = _rounded(self.back, _DIGITS_BACK)
         for name in _CURVES:
-            steps = np.round(found[name] / CURVE_STEP)
+            steps = np.round(getattr(self, name) / CURVE_STEP)
             found[name] = np.where(np.isnan(steps), _UNKNOWN, steps).astype(np.int16)
         return found
 
@@ -457,6 +460,13 @@ def telling_side(strain: bool, pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.
 
 def _alike(pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.NDArray[np.bool_]:
     return np.isclose(pin, block, rtol=1e-4)
+
+
+def _rounded(values: Array, digits: int) -> Array:
+    """``values`` in so many binary digits, as numbers of single precision, which compress well."""
+    mantissa, exponent = np.frexp(values)
+    steps = np.round(np.ldexp(mantissa, digits))
+    return np.ldexp(steps, exponent - digits).astype(np.float32)
 
 
 def _numbers(compact: Mapping[str, Array]) -> dict[str, Array]:

@@ -22,7 +22,7 @@ from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.general_law import general_law, outside
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.identification.measured import MeasuredCurve
@@ -88,6 +88,10 @@ class Model:
         for unknown, at in zip(self.unknowns, z, strict=True):
             found.update(dict.fromkeys(unknown.keys, float(unknown.value(at))))
         return changed(self.scene, found)
+
+    def is_outside(self, z: Array) -> bool:
+        """Whether the joint with these values is outside the range of the law."""
+        return bool(outside(LawJoint.from_scene(self.scene_at(z))))
 
     def predicted(self, z: Array) -> Predicted:
         """The forces at the readings of the curve."""
@@ -244,7 +248,8 @@ def identify(
 
 def _begun(model: Model) -> Array:
     """Where the best of some fits is after a few iterations; they begin with the best of some
-    points around the values of the scene."""
+    points around the values of the scene. A joint outside the range of the law has to be better by
+    far."""
     of_scene = [unknown for unknown in model.unknowns if unknown.keys and unknown.unit is None]
     factors = _FACTORS if len(of_scene) <= _ALL_FACTORS else _FACTORS[:3]
     tried: list[Sequence[float]] = []
@@ -258,7 +263,8 @@ def _begun(model: Model) -> Array:
     low, high = model.bounds
     points = [np.clip(z, low, high) for z in itertools.product(*tried)]
     points.sort(key=lambda z: float(np.square(model.residuals(z)).sum()))
-    best, *others = (model.fit(z, most=_FIRST_ITERATIONS) for z in points[:_FITS])
+    fits = [model.fit(z, most=_FIRST_ITERATIONS) for z in points[:_FITS]]
+    best, *others = sorted(fits, key=lambda fit: model.is_outside(fit.x))
     for other in others:
         if other.cost < _BETTER * best.cost:
             best = other

@@ -276,7 +276,7 @@ function gaussianProcess(kernel, points, values) {
 
 const GRID = geomspace(0.03, 3.8, 300); // x, among which first yield is found
 const ELASTIC_BELOW = 0.8; // x/x0: nothing has yielded
-const STRONGER = { strain: [0.5], stress: [1 - Math.sqrt(0.75), 0.2] }; // parts within which the other body matters
+const STRONGER = { strain: [0.5, 0.8], stress: [1 - Math.sqrt(0.75), 0.2] }; // parts within which the other body matters
 const FELT = 0.3; // exponent of what a yielded pin leaves
 const DEEPER = 3; // x/x0 where that is asked
 const BLENDED = 0.05; // ln of the block's s over the pin's, up to which the processes of two sides are mixed
@@ -608,11 +608,10 @@ const yielded = (loss, felt) => clip((1 - Math.exp(loss)) / felt, 0, 1);
 // --- the law of one joint
 
 const NODES = [0, ...geomspace(0.02, 3, 60)]; // x = delta/dR
-// Of P, relative: of small x; and else of what is elastic, with p m up to the first of these, and from the second on.
+// Of P, relative: of small x, and else of what is elastic.
 const EARLY_ERROR = 1e-3;
 const SMALL_X = 0.1;
-const CORNER = [0.45, 0.55];
-const CORNER_ERRORS = [4e-4, 8e-4];
+const ELASTIC_ERROR = 1.5e-4;
 const STEEPEST = 0.999; // secant of the way back over the elastic joint's steepest slope: then it is a straight line
 
 /** A number as Python's `g` prints it, in this many digits. */
@@ -743,8 +742,7 @@ function reduced(elastic, lost, added, ofElastic) {
     let dy = steep;
     let peak = base.map((state) => state.peak);
     let angle = base.map((state) => state.angle);
-    const corner = straight(elastic.p * elastic.m, CORNER, CORNER_ERRORS);
-    let error = x.map((place) => (place < SMALL_X ? EARLY_ERROR : corner));
+    let error = x.map((place) => (place < SMALL_X ? EARLY_ERROR : ELASTIC_ERROR));
     let ratio = x.map(() => 1);
     let toe = x.map(() => 0);
     let backError = x.map(() => 0);
