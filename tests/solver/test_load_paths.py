@@ -203,6 +203,20 @@ def write(folder, load):
     return path
 
 
+def test_a_bushing_that_yields_with_friction_turns_back_in_few_iterations(tmp_path):
+    """From where it is: 12. What slid and yielded, taken back by the guess, took 26."""
+    data = {
+        "bushing": {"radius": 10.0, "element_size": 1.5},
+        "pin": {"E": 210e3, "nu": 0.3},
+        "sleeve": [{"bore": 10.05, "outer": 14.0, "E": 110e3, "nu": 0.34, "yield_stress": 150.0}],
+        "housing": {"bore": 13.98, "outer": 30.0, "E": 70e3, "nu": 0.33},
+        "load": {"displacement": [0.3, 0.25], "steps": [4, 1]},
+        "analysis": {"friction": 0.2},
+    }
+    run = archord.solve(data, tmp_path / "run")
+    assert run.columns["iterations"][-1] < 20
+
+
 def test_paths_from_a_csv_file(tmp_path):
     """One step a row, or as many as steps says; the resolved scene holds the numbers."""
     (tmp_path / "cycle.csv").write_text("displacement\n1\n0.5\n2\n", encoding="utf-8")
