@@ -84,7 +84,7 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
     >>> law = general_law(joint)
     >>> print(f"{law.at(0.05).load:.0f}")
-    6341
+    6342
     """
     plane_and_nu(joint)
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)

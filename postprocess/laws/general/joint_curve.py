@@ -100,7 +100,7 @@ class JointCurve:
     >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
     >>> law = general_law(joint)
     >>> law.at([0.02, 0.05]).load.round()
-    array([1967., 6341.])
+    array([1968., 6342.])
     >>> print(f"{law.displacement(6340.5):.4f}")
     0.0500
     >>> law.yields
