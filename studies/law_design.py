@@ -44,8 +44,8 @@ from archord.scene.sections.errors import toml_value
 
 Row = dict[str, Any]
 # How many joints of each kind. A kind is the plane, what yields, whether the other body is stronger
-# ("weaker"), and whether by little ("alike"), or the pin is soft, or yields early, or is as
-# compliant as the block or more.
+# ("weaker"), and whether by little ("alike"), or the pin is soft, or yields early, or has at most
+# 0.8 of the block's modulus ("compliant").
 JOINTS = {
     "strain both": 220,
     "strain block": 170,

@@ -9,7 +9,7 @@ all of ``y = P/(E* dR)``:
 
 F is constant at first touch, where the contact is a line contact's (Johnson 1985, eq. 5.57), and a
 compliance at depth. Each is a sum of Chebyshev polynomials of x/(1 + x) times products of p, p m, q
-n and dR/R: elastic_model.json, which law_fit.py fits.
+n and dR/R. elastic_model.json has those that tell most, which law_fit.py chooses and fits.
 """
 
 from __future__ import annotations

@@ -128,13 +128,16 @@ def _polynomials(
 
 
 def most_telling(design: Array, right: Array, number: int) -> list[int]:
-    """Places of ``number`` columns of ``design`` ``(n, m)``, of which each brings least squares
-    nearest to ``right`` ``(n,)`` beside those before it (Chen, Billings and Luo 1989)."""
+    """Places of ``number`` columns of ``design`` ``(n, m)``, or of all that are independent. Each
+    brings least squares nearest to ``right`` ``(n,)`` beside the columns before it (Chen, Billings
+    and Luo 1989)."""
     rest = design / np.linalg.norm(design, axis=0)
     missed = right.copy()
     chosen: list[int] = []
     for _ in range(number):
         length = np.linalg.norm(rest, axis=0)
+        if length.max() < _DEPENDENT:
+            break
         tells = np.abs(missed @ rest) / np.maximum(length, _DEPENDENT)
         tells[length < _DEPENDENT] = 0.0
         best = int(tells.argmax())
