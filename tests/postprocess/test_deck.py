@@ -549,7 +549,7 @@ def test_ranks_write_one_deck_of_a_whole_mesh(comm, tmp_path):
 @pytest.mark.parametrize("held", ["low bottom", "all nodes", "drives"])
 @pytest.mark.parametrize("contacts", [("lower", "upper"), ("c 1", "c-1")])
 def test_names_that_a_deck_takes_for_one_are_refused(held, contacts, tmp_path):
-    """A support on "all nodes" held every node; of two laws of one name the last one counted."""
+    """A support on "all nodes" would hold every node; of two laws of one name one would count."""
     bodies = ("low", "middle", "top")
     blocks = {name: (0.0, float(k), 2.0, 1.0) for k, name in enumerate(bodies)}
     tagged = rectangles(blocks, 1.0, MPI.COMM_SELF)
