@@ -100,6 +100,17 @@ class Process:
         return found
 
     @cached_property
+    def coefficients(self) -> Array:
+        """The means' coefficients ``(n, outputs)`` of the covariances with the data: the inverse
+        of the factor's transpose times the weights."""
+        found = np.zeros_like(self.weights)
+        for i, inverse in reversed(list(enumerate(self.inverses))):
+            rows = slice(i * _BLOCK, (i + 1) * _BLOCK)
+            below = self.factor[rows.stop :, rows].T @ found[rows.stop :]
+            found[rows] = inverse.T @ (self.weights[rows] - below)
+        return found
+
+    @cached_property
     def likelihood(self) -> float:
         """Logarithm of the likelihood of all data."""
         known = self.count > 0
@@ -111,15 +122,15 @@ class Process:
 
     def means(self, points: Array) -> Array:
         """Means ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
-        reduced = self._reduced(self.kernel.between(self.points, points))
-        return reduced.T @ self.weights
+        return self.kernel.between(self.points, points).T @ self.coefficients
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
-        reduced = self._reduced(self.kernel.between(self.points, points))
+        between = self.kernel.between(self.points, points)
+        reduced = self._reduced(between)
         told = (reduced**2).T @ self.known
         left = np.maximum(self.kernel.at(points)[:, None] - told, 0.0) + self.kernel.noise
-        return reduced.T @ self.weights, np.sqrt(left * self.size)
+        return between.T @ self.coefficients, np.sqrt(left * self.size)
 
     def left_out(self) -> tuple[Array, Array]:
         """Errors ``(n, outputs)`` of each point's values as the other points predict them, and the

@@ -350,7 +350,7 @@ def _touch(joint: Elastic, y: float, dy: float) -> Array:
 
 def _from(first: float, values: Array) -> Array:
     """``values`` ``(n,)`` with the ``first`` one, at zero, before them."""
-    return np.insert(values, 0, first)
+    return np.append(first, values)
 
 
 def _rising(x: Array, y: Array, dy: Array) -> tuple[Array, Array]:
@@ -359,7 +359,7 @@ def _rising(x: Array, y: Array, dy: Array) -> tuple[Array, Array]:
     secants beside them."""
     y = np.maximum.accumulate(y)
     secants = np.diff(y) / np.diff(x)
-    before = np.insert(secants, 0, secants[0])
+    before = np.append(secants[0], secants)
     after = np.append(secants, secants[-1])
     return y, np.clip(dy, 0.0, 3 * np.minimum(before, after))
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -117,7 +117,7 @@ def yield_places(
     model: ElasticModel, strain: bool, joint: Elastic, left: Array | float = 1.0
 ) -> Callable[[npt.ArrayLike], Array]:
     """`first_yield` of a joint by s."""
-    pressure = left * model.pressure(joint, _GRID) / _pressure_at_yield(strain, _GRID)
+    pressure = left * elastic_pressure(model, joint) / _pressure_at_yield(strain, _GRID)
     rising = np.maximum.accumulate(pressure)
     over = np.log(rising)
 
@@ -126,6 +126,13 @@ def yield_places(
         return np.where(np.isfinite(s), np.exp(found), np.inf)
 
     return place
+
+
+@lru_cache(maxsize=16)
+def elastic_pressure(model: ElasticModel, joint: Elastic) -> Array:
+    """p0 R/(E* dR) on the grid among which first yield is found: the law of one joint asks for it
+    some five times."""
+    return model.pressure(joint, _GRID)
 
 
 def onset(
@@ -350,7 +357,7 @@ def total_loss(
 def _curves(nodes: Array, u: Array) -> Array:
     """The first of four curves of ``nodes`` ``(1 or k, known, 4)`` at ``ln(x/x0) = u`` ``(k,)``,
     its slope by u, and the others ``(k, 5)``: smooth between nodes."""
-    values = np.insert(nodes, 0, 0.0, axis=1)
+    values = np.concatenate([np.zeros_like(nodes[:, :1]), nodes], axis=1)
     at = _AT[: values.shape[1]]
     slopes = _spline(len(at)) @ values
     i = interval(at, u)
