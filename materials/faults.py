@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
@@ -22,13 +25,41 @@ def fault_of(material: Material) -> str:
         value = getattr(material, key, low)
         if hasattr(material, key) and not (is_number(value) and low < value < high):
             return f"{key} = {shown(value)} must be a number between {low:g} and {high:g}"
+    if not isinstance(material.elastic_tangent, np.ndarray):
+        return f"elastic_tangent = {shown(material.elastic_tangent)} must be an array"
     hardening: Any = getattr(material, "hardening", None)
     if hardening is None:
         return ""
     if not hasattr(hardening, "stress"):
         return f"hardening = {shown(hardening)} must be a hardening law, such as LinearHardening"
-    stress = np.asarray(hardening.stress(hardening.knots()))
+    knots = np.array(hardening.knots(), dtype=float)
+    given = knots.copy()
+    stress = np.array(hardening.stress(given))
+    slope = hardening.slope(given)
+    if not np.array_equal(given, knots):
+        return "hardening: stress and slope must not change the array of PEEQ that they get"
+    if stress.shape != knots.shape or np.shape(slope) not in ((), knots.shape):
+        return "hardening: stress and slope must give one number for each PEEQ"
     grows = (stress[1:] >= stress[:-1]).all()
     if not (grows and stress[0] > 0):
         return "hardening: yield stresses must be positive and must not decrease with PEEQ"
     return ""
+
+
+def overwrites(answer: Callable[..., Any], *inputs: Sequence[Any]) -> bool:
+    """Whether arrays of an ``answer`` to the first of the ``inputs`` change with later answers, as
+    where all are written into one buffer."""
+    first = answer(*inputs[0])
+    kept = deepcopy(first)
+    for others in inputs[1:]:
+        answer(*others)
+    return not _is_same(first, kept)
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    """Whether two answers, of arrays and dataclasses of arrays, have the same numbers."""
+    if is_dataclass(one):
+        one, other = (tuple(vars(state).values()) for state in (one, other))
+    if isinstance(one, tuple):
+        return all(map(_is_same, one, other))
+    return one is other or np.array_equal(one, other, equal_nan=True)

@@ -205,6 +205,11 @@ class LargeStrain(Material):
         return isinstance(self.inner, Elastic) and self.inner.kinematics.is_thin
 
 
+def of_small_strain(material: Material) -> Material:
+    """The inner material of one at large strain, any other material itself."""
+    return material.inner if isinstance(material, LargeStrain) else material
+
+
 def _normals(working: Sequence[int]) -> Array:
     """Takes strains ``(n, k)``, whose components have these places in a stress, to their trace."""
     return np.array([float(place < 3) for place in working])

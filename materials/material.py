@@ -148,6 +148,11 @@ class Points:
         self.n = n
         self.acting = material
         self.state = self.trial = material.state(n)
+        if self.state is not None and not _is_of_points(self.state, n):
+            raise ValueError(
+                f"the state of a {type(material).__name__} must be None or a dataclass of arrays "
+                f"whose first axis are its {n} points"
+            )
         self.yields = bool(getattr(material, "yields", False))
 
     def update(self, *strain: Array) -> tuple[Array, Array]:
@@ -173,3 +178,11 @@ class Points:
     def commit(self) -> None:
         """Make the state of the last strain seen the committed one."""
         self.state = self.trial
+
+
+def _is_of_points(state: State, n: int) -> bool:
+    """Whether a ``state`` is a dataclass of arrays ``(n, ...)``."""
+    return is_dataclass(state) and all(
+        isinstance(values, np.ndarray) and values.shape[:1] == (n,)
+        for values in vars(state).values()
+    )

@@ -219,8 +219,9 @@ def radial_return(
     stress = np.empty((n, n_stress))
     tangent = np.empty((n, k, k))
     new = PlasticState(np.empty((n, n_stress)), np.empty(n))
-    strain = np.ascontiguousarray(strain, dtype=float)
-    given = map(pointer, (places, strain, old.plastic_strain, old.peeq))
+    numbers = (strain, old.plastic_strain, old.peeq)
+    own = (np.ascontiguousarray(array, dtype=float) for array in numbers)
+    given = map(pointer, (places, *own))
     constants = *m.lame, yield_stress, modulus, pointer(m.elastic_tangent)
     found = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
     kernel = library(_SOURCE).radial_return

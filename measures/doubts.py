@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
+from archord.materials.finite import of_small_strain
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt
@@ -178,8 +179,8 @@ def gamma_doubts(system: System) -> list[str]:
         factor = interface.interaction.gamma_factor
         for pair in interface.pairs:
             material = pair.surface.material
-            of_small_strain = getattr(material, "inner", material)
-            is_known = isinstance(of_small_strain, Elastic) or of_small_strain.finite
+            inner = of_small_strain(material)
+            is_known = isinstance(inner, Elastic) or inner.finite
             if is_known or not material.yields:
                 continue
             ratio = system.comm.allreduce(pair.stiffening(), MPI.MAX)

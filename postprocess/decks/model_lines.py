@@ -8,6 +8,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.materials.elasticity import Elastic, contact_modulus
+from archord.materials.finite import of_small_strain
 from archord.materials.j2 import J2Material
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.model import DeckModel
@@ -125,7 +126,7 @@ def _apart(x: Array) -> list[int]:
 
 
 def _material(name: str, material: Any) -> list[str]:
-    material = material.inner if material.finite else material
+    material = of_small_strain(material)
     if type(material) not in (Elastic, J2Material):
         raise ValueError(
             f"the material of {name!r} cannot be exported: decks know no such law (back stresses "

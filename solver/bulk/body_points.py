@@ -91,7 +91,8 @@ class BodyPoints:
 
     def forces(self) -> Array:
         """What of the stress does work on the strain ``(n, q, k)``."""
-        return self.stress[:, self._working].reshape(*self.weight.shape, self.measure.k)
+        working = self.stress[:, self._working].reshape(*self.weight.shape, self.measure.k)
+        return np.ascontiguousarray(working)
 
     def energies(self) -> tuple[float, float]:
         """Elastic energy and plastic dissipation at the last update."""

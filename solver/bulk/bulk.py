@@ -9,6 +9,8 @@ stored.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +20,8 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.cell_rules import CellRule, cell_rules
 from archord.geometry.strain import strain_terms
+from archord.materials.faults import overwrites
+from archord.materials.finite import of_small_strain
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
 from archord.materials.material import Material, Points
 from archord.solver.bulk.assembly import assemble, matrix
@@ -203,35 +207,58 @@ def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:
     """Raise ValueError for what would be assembled wrongly: an elastic tangent that is not
     symmetric or of other kinematics, or a response that is not that tangent's though the material
     does not yield."""
-    material = getattr(material, "inner", material)
+    material = of_small_strain(material)
     working = list(kinematics.working)
     C = material.elastic_tangent
     if C.shape != (len(working), len(working)):
         raise ValueError(
-            f"elastic_tangent of a material must be {len(working)} by {len(working)} "
+            f"elastic_tangent of a material must be {len(working)} "
             f"in a problem whose kinematics are {kinematics.name!r}"
         )
     if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
         raise ValueError("elastic_tangent of a material must be symmetric")
-    n_strain = len(working)
-    n_stress = kinematics.n_stress
-    if material.finite:
-        n_strain = n_stress = len(kinematics.gradient)
-    at_rest = material.update(np.zeros((2, n_strain)), material.state(2))[0]
-    stress = np.asarray(at_rest)
-    shape = (2, n_stress)
-    if stress.shape != shape or stress.dtype.kind != "f":
-        raise ValueError(
-            f"update of a material must give real stresses of the shape {shape} at 2 points, not "
-            f"{stress.dtype} of the shape {stress.shape}"
-        )
-    if material.yields or material.finite:
-        return
     strains = [[3.0, -1.0, 4.0, 2.0, -3.0, 1.0], [-20.0, 5.0, 7.0, 10.0, 8.0, -6.0]]
     probe = 1e-3 * np.array(strains)[:, working]
+    if material.finite:
+        n_stress = len(kinematics.gradient)
+        _check_answers(material, 1e-3 * np.eye(2, n_stress), n_stress)
+    else:
+        _check_answers(material, probe, kinematics.n_stress)
+    if material.yields or material.finite:
+        return
     expected = probe @ C
     found = material.update(probe, material.state(2))[0][:, working]
     if np.abs(found - expected).max() > 1e-9 * np.abs(expected).max():
         raise ValueError(
             "a material whose update is not its elastic_tangent's must say yields = True"
+        )
+
+
+def _check_answers(material: Material, probe: Array, n_stress: int) -> None:
+    """Raise ValueError for answers of a ``material`` that would be read wrongly: of other shapes or
+    types, or in arrays that later answers, as at the strain ``probe`` ``(2, k)``, change."""
+    state = material.state(2)
+
+    def answer_at(strain: Array) -> tuple[Array, Array, Any]:
+        return material.update(strain.copy(), deepcopy(state))
+
+    at_rest = np.zeros_like(probe)
+    stress, tangent, _ = answer_at(at_rest)
+    shape = (2, n_stress)
+    found = np.asarray(stress)
+    if found.shape != shape or found.dtype != float:
+        raise ValueError(
+            f"update of a material must give float64 stresses of the shape {shape} at 2 points, "
+            f"not {found.dtype} of the shape {found.shape}"
+        )
+    k = probe.shape[1]
+    if np.shape(tangent) != (2, k, k):
+        raise ValueError(
+            f"update of a material must give tangents of the shape {(2, k, k)} at 2 points, not "
+            f"{np.shape(tangent)}"
+        )
+    if overwrites(answer_at, [at_rest], [probe]):
+        raise ValueError(
+            "update of a material must give new arrays, and not write into arrays that it gave "
+            "before"
         )

@@ -234,9 +234,11 @@ class Pair:
         return float(np.abs(apart).max(initial=0.0))
 
     def _answer(self, opening: Array, trial: Array) -> None:
-        """Let the law answer; points without a partner carry nothing."""
+        """Let the law answer, which may write into what it gets; points without a partner carry
+        nothing."""
         points = self.points
-        response = points.acting.respond(opening, trial, self.gamma, points.given(), self.dt)
+        own = (array.copy() for array in (opening, trial, self.gamma))
+        response = points.acting.respond(*own, points.given(), self.dt)
         points.trial = response.state
         with_partner = self.projection.found
         self.traction = _where(with_partner, response.traction)
@@ -369,11 +371,11 @@ class Pair:
 
 def _where(chosen: np.ndarray, values: Array) -> Array:
     """The ``values`` ``(m, ...)`` of ``chosen`` points ``(m,)``, zero at the others, in contiguous
-    memory."""
+    memory of float64."""
     if not chosen.all():
         shape = len(chosen), *(1 for _ in values.shape[1:])
         values = np.where(chosen.reshape(shape), values, 0.0)
-    return np.ascontiguousarray(values)
+    return np.ascontiguousarray(values, dtype=float)
 
 
 def _flat(at_facets: Array) -> Array:

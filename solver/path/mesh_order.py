@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
+from copy import copy
 from functools import cached_property
 
 import basix
@@ -228,13 +229,16 @@ class MeshOrder:
         """The inverse of `collect_history`: give every point its history. Collective."""
         stored: Arrays = self.system.comm.bcast(whole)
         for place, points, number in self._points():
-            state = points.material.state(len(number))
+            state = copy(points.material.state(len(number)))
             known = stored[f"history/{place}/point"]
             _, here, there = np.intersect1d(number, known, assume_unique=True, return_indices=True)
             for name, values in vars(state).items():
                 key = f"history/{place}/{name}"
                 if key in stored or name not in _NEWER:
-                    values[here] = stored[key][there]
+                    # own classes may give one array for all, of integers or read-only
+                    own = values.astype(np.result_type(values, stored[key]))
+                    own[here] = stored[key][there]
+                    vars(state)[name] = own
             points.state = points.trial = state
 
     def _points(self) -> Iterator[tuple[str, Points, np.ndarray]]:

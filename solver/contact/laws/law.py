@@ -10,12 +10,14 @@ and a slip.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from archord.geometry.basis import Array
+from archord.materials.faults import overwrites
 
 State = Any
 Branches = npt.NDArray[np.integer]
@@ -196,11 +198,18 @@ class ContactLaw(Protocol):
 
 
 def fault_of(law: ContactLaw, d: int) -> str:
-    """What is wrong with the shapes of a ``law``'s answer at points with ``d`` components; empty if
-    nothing is. Arrays of other shapes could be spread over the points without a word."""
+    """What is wrong with the arrays of a ``law``'s answers at points with ``d`` components; empty
+    if nothing is. Arrays of other shapes could be spread over the points without a word."""
     trial = np.zeros((2, d))
     trial[:, 0] = [1.0, -1.0]
-    answer = law.respond(np.zeros((2, d)), trial, np.ones((2, d)), law.state(2), 1.0)
+    gamma = np.ones((2, d))
+    closed = np.zeros((2, d))
+    state = law.state(2)
+
+    def answer_at(opening: Array, trial: Array) -> Response:
+        return law.respond(opening, trial, gamma.copy(), deepcopy(state), 1.0)
+
+    answer = answer_at(closed.copy(), trial.copy())
     if not isinstance(answer, Response):
         return f"must answer a Response, not {type(answer).__name__}"
     shapes = {"traction": (2, d), "by_trial": (2, d, d), "by_opening": (2, d, d), "branch": (2,)}
@@ -208,4 +217,17 @@ def fault_of(law: ContactLaw, d: int) -> str:
         found = getattr(answer, name)
         if found is not None and np.shape(found) != shape:
             return f"must answer a {name} of the shape {shape} at 2 points, not {np.shape(found)}"
+    if np.asarray(answer.traction).dtype != float:
+        return f"must answer a traction of float64, not {np.asarray(answer.traction).dtype}"
+    densities = {
+        "stored energy": law.stored(closed, answer.state),
+        "dissipation": law.dissipation(answer.state),
+    }
+    densities |= {name: told.density for name, told in law.quantities(answer.state).items()}
+    for name, density in densities.items():
+        if np.shape(density) not in ((), (2,)):
+            shape = np.shape(density)
+            return f"must have a density of {name!r} of the shape (2,) at 2 points, not {shape}"
+    if overwrites(answer_at, (closed.copy(), trial.copy()), (closed + 1, trial + 1)):
+        return "must answer new arrays, and not write into arrays that it gave before"
     return ""
