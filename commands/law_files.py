@@ -39,16 +39,20 @@ def exports_of(
     law: JointCurve | FittedLaw, targets: Iterable[Path], contact: Contact | None = None
 ) -> list[Text]:
     """The files ``targets`` with a law, for `write`; ``contact`` of its force element."""
-    from archord.postprocess.laws.exports.export import export_law
+    return [(target, partial(_exported, law, target, contact)) for target in targets]
+
+
+def _exported(law: JointCurve | FittedLaw, target: Path, contact: Contact | None) -> str | bytes:
+    """The content of the file ``target``. Raises `InputError` for a suffix of no language."""
+    from archord.postprocess.laws.exports.export import FILE_FORMS, export_law
     from archord.postprocess.laws.exports.fmu import export_fmu
 
-    texts: list[Text] = []
-    for target in targets:
-        if target.suffix == ".fmu":
-            texts.append((target, partial(export_fmu, law, target, contact)))
-        else:
-            texts.append((target, partial(export_law, law, target, contact)))
-    return texts
+    known = [*FILE_FORMS, ".fmu", ".json"]
+    if target.suffix not in known:
+        raise InputError(f"{target}: must end in {', '.join(known[:-1])} or {known[-1]}.")
+    if target.suffix == ".fmu":
+        return export_fmu(law, target, contact)
+    return export_law(law, target, contact)
 
 
 def write(texts: list[Text], inputs: list[Path], force: bool) -> list[Path]:

@@ -196,13 +196,13 @@ def solve_and_report(
     from archord.output.folder import claim_folder
     from archord.output.ranks import agreed
 
-    def claimed() -> tuple[AnyScene, bool]:
+    def claimed() -> tuple[AnyScene, list[Path]]:
         scene = load()
-        new = not folder.exists()
+        made = [path for path in (folder, *folder.parents) if not path.exists()]
         claim_folder(folder, force)
-        return scene, new
+        return scene, made
 
-    scene, new = agreed(comm, claimed)
+    scene, made = agreed(comm, claimed)
     from archord.report.timer import Timer
     from archord.studies.accuracy import (
         solve_to_accuracy,
@@ -220,9 +220,10 @@ def solve_and_report(
         with report.moving or nullcontext():
             outcome = solve_to_accuracy(scene, folder, comm, start=start, **options)
     except InputError:  # found by the mesh: nothing is left of a scene that is refused
-        if new and comm.rank == 0:
+        if comm.rank == 0:
             with suppress(OSError):
-                folder.rmdir()
+                for path in made:
+                    path.rmdir()
         raise
     if report.by_mesh:
         report.headings()

@@ -246,8 +246,8 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
     """Set a key of scene ``data``, or drop it if ``value`` is `ABSENT`; what it is an alternative
     to goes, too.
 
-    Raises `InputError`, beginning with ``said``, if there can be no such section, or no such key to
-    drop.
+    Raises `InputError`, beginning with ``said``, if there can be no such section, or no such key
+    where one is dropped.
     """
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
@@ -257,14 +257,14 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
     for other in (*instead, *_BROUGHT.get(name, ())):
         table.pop(other, None)
     if value == ABSENT and not there:
-        _require_known(section, name, said)
+        require_key(section, name, said)
     if (section, name, value) == ("pin", "rigid", True):
         table.clear()
     if value != ABSENT:
         table[name] = value
 
 
-def _require_known(section: str, name: str, said: str) -> None:
+def require_key(section: str, name: str, said: str) -> None:
     """Raise `InputError`, beginning with ``said``, unless a kind of scene has the key ``name`` in
     this ``section``."""
     kinds: list[Any] = [Scene, ProblemScene, *PRESETS.values()]
@@ -273,7 +273,7 @@ def _require_known(section: str, name: str, said: str) -> None:
         return
     near = difflib.get_close_matches(name, known, 1)
     meant = "".join(f"; did you mean {section}.{found}?" for found in near) or "."
-    raise InputError(f"{said}: there is no key {section}.{name} to drop{meant}")
+    raise InputError(f"{said}: there is no key {section}.{name}{meant}")
 
 
 def _value(text: str) -> Any:

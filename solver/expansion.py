@@ -99,13 +99,28 @@ class _Expansion:
         return replace(stated, interactions=interactions, **changes)
 
     def _require_known(self) -> None:
-        """Raise ValueError for a place that is no set, coupling or disc."""
-        known = [*self.edges, *self.mesh.cell_sets, *self.couplings, *self.discs]
-        places = [support.on for support in self.given_supports]
-        places += [load.on for load in self.given_loads]
-        for on in places:
-            if on not in known:
-                raise ValueError(unknown("set or coupling", on, known))
+        """Raise ValueError for a name that is no set of the mesh, coupling or disc."""
+        facets = [*self.mesh.facet_sets]
+        cells = [*self.mesh.cell_sets]
+        places = [*self.edges, *cells, *self.couplings, *self.discs]
+        stated = self.stated
+        named: list[tuple[str, str, str, list[str]]] = []
+        for body in stated.bodies:
+            named.append((f'body "{body.name}".cells', "cell set", body.cells, cells))
+        for part in stated.interactions:
+            key = f'interaction "{part.name}".surfaces'
+            sides = [side for side in part.surfaces if isinstance(side, str)]
+            named += [(key, "facet set", side, facets) for side in sides]
+        for coupling in stated.couplings:
+            key = f'coupling "{coupling.name}".facets'
+            named.append((key, "facet set", coupling.facets, facets))
+        for support in self.given_supports:
+            named.append((f'support "{support.name}".on', "set or coupling", support.on, places))
+        for load in self.given_loads:
+            named.append((f'load "{load.name}".on', "set or coupling", load.on, places))
+        for key, kind, name, known in named:
+            if name not in known:
+                raise ValueError(f"{key}: {unknown(kind, name, known)}")
         self._require_directions()
 
     def _require_directions(self) -> None:

@@ -38,6 +38,7 @@ from archord.scene.file import (
     put,
     read_targets,
     read_toml,
+    require_key,
     resolved,
 )
 from archord.scene.sections.errors import toml_value
@@ -352,6 +353,8 @@ def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
                 raise InputError(
                     f"{source} {key}: cannot vary; all cases of a table have the same units."
                 )
+            if "." not in name:
+                require_key(section, name, f"{source} {key}")
             # of alternative keys a scene holds one
             first = next(
                 (names[0] for names in ALTERNATIVES.get(section, []) if name in names), name

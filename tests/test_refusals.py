@@ -12,6 +12,7 @@ from tests.output.run_files import rewrite_report
 from tests.test_cli import SCENE, archord, run_on_two_ranks
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
+SCENES = Path(SCENE).parent
 RUN = "{coarse}"
 OTHER = "{elastic}"
 
@@ -28,6 +29,10 @@ OTHER = "{elastic}"
         (
             ["picture", RUN, "-o", f"{RUN}/history.csv"],
             f"{RUN}/history.csv: cannot be written: it belongs to ",
+        ),
+        (
+            ["report", RUN, "-o", "x.docx"],
+            "x.docx: must end in .pdf, as a report is a PDF file.",
         ),
         (["compare", RUN], "compare: needs two runs or more."),
         (["export", RUN], "export: give --vtk DIR, --csv DIR or both."),
@@ -61,6 +66,10 @@ OTHER = "{elastic}"
         ),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
         (["mesh", "nowhere.msh"], "nowhere.msh: No such file or directory."),
+        (
+            ["solve", f"{SCENES}/ball.toml", "--set", "mesh.file=nowhere.msh"],
+            f"{SCENES}/nowhere.msh: No such file or directory.",
+        ),
         (
             ["mesh", "empty"],
             "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf, .npz, .step, "
@@ -101,6 +110,10 @@ OTHER = "{elastic}"
         (["law", "paper", *JOINT, "--set", "joint.radius=1"], "--set: changes a scene"),
         (["law", "paper", "--scene", "nowhere.toml"], "nowhere.toml: cannot be read"),
         (["law", "paper", *JOINT, "--plot", "laws.xyz"], "laws.xyz: must end in one of "),
+        (
+            ["law", "--scene", SCENE, "--export", "law.cpp"],
+            "law.cpp: must end in .py, .h, .mo, .mjs, .m, .fmu or .json.",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, arguments, said):

@@ -28,7 +28,9 @@ from archord.postprocess.tables import (
     peaks_of,
     spread,
 )
+from archord.report.errors import InputError
 from archord.report.figure import new_figure
+from archord.report.files import is_device
 from archord.report.version import VERSION
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
     from matplotlib.backends.backend_pdf import PdfPages
 
     run.number(None)
+    if target.suffix.lower() != ".pdf" and not is_device(target):
+        raise InputError(f"{target}: must end in .pdf, as a report is a PDF file.")
     check_target(target, force=force)
     # all is drawn before the file is begun: what a run lacks is told first
     figures = list(_pages_of(run))

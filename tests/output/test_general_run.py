@@ -199,11 +199,11 @@ def test_another_core_is_refused(tmp_path):
     [
         (
             {"support": [{"name": "clamp", "on": "clam", "fixed": ["x"]}]},
-            "there is no .* 'clam' .did you mean 'clamp'",
+            "support \"clamp\".on: there is no .* 'clam' .did you mean 'clamp'",
         ),
         (
             {"interaction": [{"name": "contact", "surfaces": ["pin", "bore"]}]},
-            "there is no facet set 'bore'",
+            "interaction \"contact\".surfaces: there is no facet set 'bore'",
         ),
     ],
 )

@@ -267,7 +267,7 @@ def test_a_key_that_no_scene_has_cannot_be_dropped(tmp_path, typo, meant):
     """The misspelled key was dropped, and the one that was meant kept its value."""
     path = tmp_path / "scene.toml"
     path.write_text(resolved(parse_scene(basic())))
-    said = f"--set {typo}=none: there is no key {typo} to drop; did you mean {meant}?"
+    said = f"--set {typo}=none: there is no key {typo}; did you mean {meant}?"
     with pytest.raises(InputError) as refusal:
         load_scene(path, [f"{typo}=none"])
     assert str(refusal.value) == said

@@ -194,6 +194,11 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
             "[grid] clearance: must read section.key, like joint.clearance.",
         ),
         (
+            "[grid]\njoint.relative_clearence = [0.002, 0.005]",
+            "[grid] joint.relative_clearence: there is no key joint.relative_clearence; did you "
+            "mean joint.relative_clearance?",
+        ),
+        (
             "grid.units.length = ['m']",
             "[grid] units.length: cannot vary; all cases of a table have the same units.",
         ),

@@ -61,7 +61,12 @@ def units_of(found: Identification) -> dict[str, str]:
         unknown = estimate.unknown
         heading = scene.heading(unknown.keys[0]) if unknown.keys else ""
         units[unknown.name] = heading.partition("[")[2].rstrip("]")
-    return units | {OFFSET: length, COMPLIANCE: f"{length}/({force})"}
+    return units | {OFFSET: length, COMPLIANCE: f"{length}/{_whole(force)}"}
+
+
+def _whole(unit: str) -> str:
+    """A ``unit`` beside a slash: in brackets if it is a quotient or a product."""
+    return f"({unit})" if "/" in unit or " " in unit else unit
 
 
 def estimates_table(found: Identification) -> Table:
@@ -98,7 +103,7 @@ def notes(found: Identification) -> list[str]:
     softness = next((one for one in found.estimates if one.unknown.name == COMPLIANCE), None)
     if softness is not None and softness.value > 0 and not softness.is_bound:
         units = units_of(found)
-        stiffness = f"{1 / softness.value:.4g} ({units['force']})/{units['displacement']}"
+        stiffness = f"{1 / softness.value:.4g} {_whole(units['force'])}/{units['displacement']}"
         said.append(f"machine stiffness: {stiffness}")
     return said
 

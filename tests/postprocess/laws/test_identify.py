@@ -4,6 +4,7 @@ import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from archord.postprocess.laws.identification.identify_report import (
     as_json,
     doubts,
     estimates_table,
+    units_of,
 )
 from archord.postprocess.laws.identification.measured import MeasuredCurve, read_curve
 from archord.postprocess.laws.identification.unknowns import COMPLIANCE, OFFSET
@@ -281,6 +283,14 @@ def test_one_column_is_not_displacement_and_force(tmp_path, names):
     path.write_text("F,u\n" + "".join(f"{k},{2 * k}\n" for k in range(9)))
     with pytest.raises(InputError, match="is taken for displacement and force"):
         read_curve(path, **names)
+
+
+@pytest.mark.parametrize(
+    ("thickness", "unit"), [({}, "mm/(N/mm)"), ({"analysis.thickness": 30.0}, "mm/N")]
+)
+def test_the_unit_of_a_compliance_has_brackets_for_a_force_per_length_alone(thickness, unit):
+    found = SimpleNamespace(scene=archord.load_scene(STEEL, thickness), estimates=[])
+    assert units_of(found)[COMPLIANCE] == unit
 
 
 def test_units_of_headings_are_compared_with_those_of_the_scene(tmp_path, capsys):
