@@ -109,6 +109,8 @@ def _column(path: Path, heads: list[str], name: str | None, default: int) -> int
         return default
     plain = [re.split(r"[\[(]", head)[0].strip() for head in heads]
     for known in (heads, plain):
+        if known.count(name) > 1:
+            raise InputError(f"{path}: has {known.count(name)} columns headed {name!r}.")
         if name in known:
             return known.index(name)
     there = f"its headings are {', '.join(heads)}" if heads else "it has no headings"
@@ -133,6 +135,9 @@ def _require_one_reading(
         cure = "a decimal comma needs columns that are separated by semicolons or tabs"
         raise InputError(f"{path}: {fault}, and no more than {width} before; {cure}.")
     if separator == ",":
+        if begin == 0 and width > 2:
+            fault = f"has no headings and {width} columns between commas"
+            raise InputError(f"{path}: {fault}, which may be decimal ones; give it headings.")
         return
     given = [line.split(separator) for line in lines[begin:]]
     numbers = [row[column] for row in given for column in columns if column < len(row)]

@@ -241,6 +241,8 @@ def test_files_without_a_curve_are_refused(tmp_path, text, words):
         ("u,F\n" + "".join(f"{k},05,{2 * k},5\n" for k in range(9)), "has 4 cells in the line"),
         ("u,F\n" + "".join(f"{k},1,{k}00\n" for k in range(9)), "has 3 cells in the line"),
         ("".join(f"{k},{k}\n" for k in range(9)) + '"9","1,000"\n', "has 3 cells in the line"),
+        ("".join(f"{k},25,{2 * k},5\n" for k in range(9)), "has no headings and 4 columns"),
+        ("".join(f'"{k},25","{2 * k}"\n' for k in range(9)), "has no headings and 3 columns"),
         ("u\tF\n" + "".join(f"0.0{k}\t1,{k}00\n" for k in range(9)), "a comma and numbers with a"),
         ("u;F\n" + "".join(f"0,0{k};1.{k}00\n" for k in range(9)), "a comma and numbers with a"),
     ],
@@ -278,10 +280,14 @@ def test_units_below_the_headings_are_compared(tmp_path):
 
 @pytest.mark.parametrize("names", [{"delta": "u"}, {"load": "F"}])
 def test_one_column_is_not_displacement_and_force(tmp_path, names):
-    """Where one of two columns is named, and the other is taken by its place."""
+    """Where one of two columns is named, and the other is taken by its place; nor is one name two
+    columns."""
     path = tmp_path / "curve.csv"
     path.write_text("F,u\n" + "".join(f"{k},{2 * k}\n" for k in range(9)))
     with pytest.raises(InputError, match="is taken for displacement and force"):
+        read_curve(path, **names)
+    path.write_text("u,F,u,F\n" + "".join(f"{k},{2 * k},{k},{k}\n" for k in range(9)))
+    with pytest.raises(InputError, match="has 2 columns headed '[uF]'"):
         read_curve(path, **names)
 
 
