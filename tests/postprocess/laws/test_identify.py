@@ -287,7 +287,7 @@ def test_one_column_is_not_displacement_and_force(tmp_path, names):
     with pytest.raises(InputError, match="is taken for displacement and force"):
         read_curve(path, **names)
     path.write_text("u,F,u,F\n" + "".join(f"{k},{2 * k},{k},{k}\n" for k in range(9)))
-    with pytest.raises(InputError, match="has 2 columns headed '[uF]'"):
+    with pytest.raises(InputError, match=r"has 2 columns headed '[uF]'"):
         read_curve(path, **names)
 
 
