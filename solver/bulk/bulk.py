@@ -212,7 +212,7 @@ def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:
     C = material.elastic_tangent
     if C.shape != (len(working), len(working)):
         raise ValueError(
-            f"elastic_tangent of a material must be {len(working)} "
+            f"elastic_tangent of a material must be {len(working)} by {len(working)} "
             f"in a problem whose kinematics are {kinematics.name!r}"
         )
     if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
