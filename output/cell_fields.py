@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -109,7 +110,18 @@ def own_rows(own: Mapping[str, Callable[[Any], Array]]) -> list[CellField]:
             raise InputError(f"archord.solve: own_fields: {name!r} is the name of another field.")
         if not _NAME.fullmatch(name):
             raise InputError(f"archord.solve: own_fields: {name!r} is no name: {_ALLOWED}.")
-    return [CellField(name, name, "", values) for name, values in own.items()]
+    return [CellField(name, name, "", _of_copies(values)) for name, values in own.items()]
+
+
+def _of_copies(values: Callable[[Any], Array]) -> Callable[[Any], Array]:
+    """A user's function of `PointFields`, which may write into what it gets: the arrays themselves
+    are the history, the weights and the stresses of other fields."""
+
+    def of_copies(at: PointFields) -> Array:
+        arrays = {name: a.copy() for name, a in at._asdict().items() if isinstance(a, np.ndarray)}
+        return values(at._replace(state=deepcopy(at.state), **arrays))
+
+    return of_copies
 
 
 def cell_means(

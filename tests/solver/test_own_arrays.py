@@ -283,3 +283,28 @@ def test_a_hardening_law_answers_each_point_in_another_array(law, said):
     metal = archord.J2Material(1000.0, 0.3, hardening=law(5.0, 50.0))
     with pytest.raises(archord.InputError, match=said):
         slab(bodies=[archord.Body("slab", metal)])
+
+
+def test_own_fields_may_write_into_what_they_get(tmp_path):
+    """Written into stresses, plastic strains and weights, fields and later forces were others."""
+
+    def first(at):
+        return at.stress[..., 0]
+
+    def written(at):
+        for array in (at.stress, at.plastic_strain, at.weight, at.state.peeq):
+            array *= 2
+        return at.stress[..., 0] / 2
+
+    press = archord.Load("press", on="slab top", direction="y", displacement=-0.02)
+    runs = []
+    for own in (first, written):
+        problem = slab(bodies=[archord.Body("slab", steel())], loads=[press], steps=3)
+        fields = {"one": own, "other": first}
+        runs.append(archord.solve(problem, tmp_path / own.__name__, own_fields=fields))
+    for name in ("press force", "slab peeq_max", "elastic_energy"):
+        np.testing.assert_allclose(runs[1].columns[name], runs[0].columns[name], rtol=1e-12)
+    one, other = (run.fields() for run in runs)
+    np.testing.assert_allclose(other.stress, one.stress, rtol=1e-12, atol=1e-12)
+    for name in ("one", "other"):
+        np.testing.assert_allclose(other.cell[name], one.cell[name], rtol=1e-12)
