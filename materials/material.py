@@ -158,12 +158,17 @@ class Points:
     def update(self, *strain: Array) -> tuple[Array, Array]:
         """Stress ``(n, n_stress)`` and consistent tangent ``(n, k, k)`` at ``strain`` ``(n, k)``,
         from the committed state."""
-        stress, tangent, self.trial = self.acting.update(*strain, self.given())
+        own = (array.copy() for array in strain)
+        stress, tangent, self.trial = self.acting.update(*own, self.given())
         return stress, tangent
 
     def given(self) -> State:
         """The committed state for a trial: a copy, as own classes may write into what they get."""
         return deepcopy(self.state)
+
+    def told(self) -> State:
+        """The state of the last strain seen, to ask the material of it: a copy as well."""
+        return deepcopy(self.trial)
 
     @property
     def flows(self) -> npt.NDArray[np.bool_]:
@@ -173,7 +178,7 @@ class Points:
     @property
     def peeq(self) -> Array:
         """PEEQ ``(n,)`` at the last strain seen."""
-        return np.broadcast_to(self.material.peeq(self.trial), self.n)
+        return np.broadcast_to(self.material.peeq(self.told()), self.n)
 
     def commit(self) -> None:
         """Make the state of the last strain seen the committed one."""

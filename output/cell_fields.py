@@ -118,8 +118,9 @@ def _of_copies(values: Callable[[Any], Array]) -> Callable[[Any], Array]:
     are the history, the weights and the stresses of other fields."""
 
     def of_copies(at: PointFields) -> Array:
-        arrays = {name: a.copy() for name, a in at._asdict().items() if isinstance(a, np.ndarray)}
-        return values(at._replace(state=deepcopy(at.state), **arrays))
+        given = at._asdict()
+        own: dict[str, Any] = {k: v.copy() for k, v in given.items() if isinstance(v, np.ndarray)}
+        return values(at._replace(state=deepcopy(at.state), **own))
 
     return of_copies
 

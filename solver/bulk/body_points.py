@@ -97,17 +97,17 @@ class BodyPoints:
     def energies(self) -> tuple[float, float]:
         """Elastic energy and plastic dissipation at the last update."""
         material = self.points.material
-        trial = self.points.trial
         weight = self.weight.ravel()
-        stored = material.stored(self.strain, self.stress, trial)
-        dissipated = np.broadcast_to(material.dissipation(trial), weight.shape)
+        stored = material.stored(self.strain.copy(), self.stress.copy(), self.points.told())
+        dissipated = np.broadcast_to(material.dissipation(self.points.told()), weight.shape)
         return float(weight @ stored), float(weight @ dissipated)
 
     def fields(self) -> PointFields:
         """The fields at the last update."""
         shape = self.weight.shape
-        trial = self.points.trial
-        stress = self.points.material.true_stress(self.strain, self.stress, trial)
+        trial = self.points.told()
+        strain_and_stress = self.strain.copy(), self.stress.copy()
+        stress = self.points.material.true_stress(*strain_and_stress, self.points.told())
         plastic_strain = getattr(trial, "plastic_strain", np.zeros_like(stress))
         return PointFields(
             self.cells,

@@ -220,7 +220,7 @@ class Contact:
 
     def dissipated(self) -> float:
         """Energy that the laws dissipated so far, this rank's part."""
-        return sum(pair.integral(pair.law.dissipation(pair.points.trial)) for pair in self.pairs)
+        return sum(pair.integral(pair.law.dissipation(pair.points.told())) for pair in self.pairs)
 
     def n_active(self) -> int:
         """Number of points under pressure, over all ranks."""

@@ -255,7 +255,7 @@ class Interface:
         name: at the last evaluation. Collective."""
         found: dict[str, tuple[float, str]] = {}
         for pair in self.pairs:
-            for name, quantity in pair.law.quantities(pair.points.trial).items():
+            for name, quantity in pair.law.quantities(pair.points.told()).items():
                 before, _ = found.get(name, (0.0, ""))
                 found[name] = before + pair.integral(quantity.density), quantity.unit
         comm = self.pairs[0].surface.comm

@@ -344,7 +344,7 @@ class Pair:
 
     def stored(self) -> float:
         """This rank's part of the energy that the law stores at points that touch."""
-        density = self.law.stored(self.opening, self.points.trial)
+        density = self.law.stored(self.opening.copy(), self.points.told())
         return self.integral(np.where(self.active, density, 0.0))
 
     @property

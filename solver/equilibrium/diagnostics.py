@@ -47,6 +47,6 @@ class Diagnostics:
         """How far PEEQ has grown in the step at most, over all ranks."""
         grown = 0.0
         for points in self.evaluation.plastic_points():
-            increments = points.peeq - points.material.peeq(points.state)
+            increments = points.peeq - points.material.peeq(points.given())
             grown = max(grown, float(increments.max(initial=0.0)))
         return self.unknowns.comm.allreduce(grown, op=MPI.MAX)

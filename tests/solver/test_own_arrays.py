@@ -74,9 +74,25 @@ class WritesIntoAll(Wear):
             array *= 0
         return answer._replace(by_trial=answer.by_trial.astype(int))
 
+    def quantities(self, state):
+        told = super().quantities(state)["worn volume"]
+        volume = told.density.copy()
+        told.density[:] *= 1000
+        return {"worn volume": told._replace(density=volume)}
+
+    def stored(self, opening, state):
+        opening *= 0
+        state.depth[:] *= 2
+        return 0.0
+
+    def dissipation(self, state):
+        state.depth[:] *= 2
+        return 0.0
+
 
 def test_a_law_may_write_into_what_it_gets(tmp_path):
-    """Written into Nitsche's gamma, all later forces were 0."""
+    """Written into Nitsche's gamma, all later forces were 0; a depth that became another unit for
+    the history of the run was a thousand times as deep in the next step."""
     laws = (Wear, WritesIntoAll)
     runs = [archord.solve(sliding(MPI.COMM_SELF, law=law), tmp_path / law.__name__) for law in laws]
     for name in ("press force", "slide force", "rub worn volume"):
@@ -208,6 +224,47 @@ def test_arrays_of_a_material_are_told_of(material, said):
     """With one history for all answers PEEQ was half as large again."""
     with pytest.raises(ValueError, match=said):
         archord.System(slab(bodies=[archord.Body("slab", material())]))
+
+
+class InPercent(OfSteel):
+    """It writes into all that it is asked about, as PEEQ becomes percent in place."""
+
+    def update(self, strain, state):
+        answer = super().update(strain.copy(), state)
+        strain *= 2
+        return answer
+
+    def energy(self, stress):
+        energy = super().energy(stress.copy())
+        stress *= 2
+        return energy
+
+    def peeq(self, state):
+        peeq = state.peeq
+        peeq *= 100
+        return peeq
+
+    def true_stress(self, strain, stress, state):
+        found = stress.copy()
+        for array in (strain, stress, state.peeq, state.plastic_strain):
+            array *= 2
+        return found
+
+
+def test_a_material_may_write_into_what_it_is_asked_about(tmp_path):
+    """PEEQ became percent of percent, and the metal an elastic one."""
+    press = archord.Load("press", on="slab top", direction="y", displacement=-0.02)
+    runs = []
+    for material in (OfSteel(), InPercent()):
+        problem = slab(bodies=[archord.Body("slab", material)], loads=[press], steps=3)
+        runs.append(archord.solve(problem, tmp_path / type(material).__name__))
+    of_steel, in_percent = (run.columns for run in runs)
+    for name in ("press force", "elastic_energy"):
+        np.testing.assert_allclose(in_percent[name], of_steel[name], rtol=1e-12)
+    peeq = np.array(of_steel["slab peeq_max"])
+    np.testing.assert_allclose(in_percent["slab peeq_max"], 100 * peeq, rtol=1e-12)
+    one, other = (run.fields().stress for run in runs)
+    np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-12)
 
 
 class InFortranOrder(OfSteel):
