@@ -23,7 +23,9 @@ _E = "Young's modulus, unless a material brings it"
 _NU = "Poisson's ratio, unless a material brings it"
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 _SOFTEST = 1e-8  # ratio of the moduli
-_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
+# yield stress over E: below, nothing elastic is left but round-off; above, units are mixed
+_WEAKEST = 1e-7
+_STRONGEST = 0.5
 
 
 class Solid(Section):
@@ -179,11 +181,11 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
             "unit"
         )
         require(stiffest <= solid.E / _SOFTEST, modulus, said)
-        strong = strength is None or strength >= _WEAKEST * solid.E
+        strong = strength is None or _WEAKEST <= strength / solid.E <= _STRONGEST
         require(
             strong,
             (*place, "yield_stress"),
-            f"must be at least {_WEAKEST:g} times E, in the same unit",
+            f"must be {_WEAKEST:g} to {_STRONGEST:g} times E, {solid.E:g}, in the same unit",
         )
         allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
         require(

@@ -95,7 +95,13 @@ def basic() -> dict:
         ),
         ("block", "back_stresses", [[1.0, 1.0]], "need a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
-        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times E, in the same unit."),
+        ("block", "yield_stress", 1e-30, "must be 1e-07 to 0.5 times E, 210000, in the same unit."),
+        (
+            "block",
+            None,
+            {"E": 210.0, "nu": 0.3, "yield_stress": 300.0},  # GPa beside MPa
+            "block.yield_stress = 300.0 must be 1e-07 to 0.5 times E, 210, in the same unit.",
+        ),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         (
@@ -343,9 +349,8 @@ def test_a_material_brings_what_is_not_given(tmp_path):
     text = resolved(scene)
     assert "material" not in text
     assert parse_scene(tomllib.loads(text)).block.law == scene.block.law
-    assert (
-        parse_scene(data | {"units": {"length": "m", "stress": "Pa"}}).block.yield_stress == 355e6
-    )
+    in_pascal = {"units": {"length": "m", "stress": "Pa"}, "pin": {"material": "S460"}}
+    assert parse_scene(data | in_pascal).block.yield_stress == 355e6
     own = (
         {"hardening": 0.0},
         {"yield_stress": 300.0},
