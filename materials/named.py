@@ -36,10 +36,9 @@ def metal(name: str, unit: str) -> dict[str, Any]:
     0.2 % proof) and ``tensile``, and ``hardening``, points (PEEQ, true stress) from first yield on.
     Raises ValueError for a name or a unit that is not known."""
     if name not in metals():
-        hint = "".join(
-            f"did you mean {near}? " for near in difflib.get_close_matches(name, metals(), 1)
-        )
-        raise ValueError(f"is not a known material; {hint}Materials are {', '.join(metals())}")
+        near = difflib.get_close_matches(name, metals(), 1)
+        said = f"did you mean {near[0]}? Materials" if near else "materials"
+        raise ValueError(f"is not a known material; {said} are {', '.join(metals())}")
     if unit not in _PER_MPA:
         raise ValueError(f"needs a units.stress that is one of {', '.join(_PER_MPA)}, not {unit}")
     found = metals()[name]

@@ -154,9 +154,10 @@ def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
         difflib.get_close_matches(place[-1], known, 1)
     )
     hint = f"did you mean {near}? " if near else ""
+    kind = "sections" if len(place) == 1 else "keys"
     return {
         "known": ", ".join(known),
-        "kind": "Sections" if len(place) == 1 else "Keys",
+        "kind": kind.capitalize() if near else kind,
         "hint": hint,
         "near": near,
     }

@@ -107,7 +107,7 @@ def test_stresses_are_in_the_unit_asked_for(unit, scale):
             "MPa",
             r"is not a known material; did you mean S355\? Materials are S235, .*, C63000$",
         ),
-        ("cheese", "MPa", "is not a known material; Materials are S235"),
+        ("cheese", "MPa", "is not a known material; materials are S235"),
         (
             "S355",
             "bar",

@@ -202,7 +202,7 @@ def test_radii_of_a_bushing_make_its_fits():
             "whole",
             "is not a known key; did you mean pin.whole? Keys are radius, element_size, growth, cl",
         ),
-        (LUG, "lug.kind", "lug", 'lug.kind = "lug" is not a known key; Keys are '),
+        (LUG, "lug.kind", "lug", 'lug.kind = "lug" is not a known key; keys are '),
         (CLEVIS, "outer.thickness", None, "outer.thickness is missing."),
         (
             CLEVIS,
