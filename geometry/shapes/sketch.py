@@ -1,6 +1,8 @@
 """A joint in a plane as gmsh is to draw it: points, lines, arcs, faces, and the sets of lines.
 
-Lengths are in radii of the pin whatever the units of the scene, so meshes do not depend on them.
+Lengths are in radii of the pin whatever the units of the scene, so meshes depend on them by
+round-off alone. In space gmsh may make a few other tetrahedra of it, where a length over the radius
+rounds in another way: results then differ by the error of the mesh.
 """
 
 from __future__ import annotations
