@@ -41,6 +41,7 @@ _PHRASES = {
     "less_than_equal": "must be at most {le:g}",
     "literal_error": "must be {expected}",
     "list_type": "must be a list",
+    "list_of_tables": "must be a list of tables, [[{name}]]",
     "union_tag_invalid": "must have a kind among {expected_tags}",
     "union_tag_not_found": "must have a kind",
     "too_short": "must have {min_length} or more entries",
@@ -122,6 +123,8 @@ def _sentence(
     else:
         context |= _known_keys(model, error["loc"])
         kind = "string_too_short" if context.get("min_length") == 1 else error["type"]
+        if kind == "list_type" and len(place) == 1:
+            kind = "list_of_tables"
         said = _PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
         said = said.replace("must be False", "must be false")
     given_by = (by for name, by in origin.items() if f"{name}.".startswith(f"{key}."))

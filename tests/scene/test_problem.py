@@ -134,7 +134,7 @@ def test_an_interference_has_a_stage_of_its_own():
             [[0.0, 300.0], [0.1, 200.0]],
             'body "lug".hardening = .* is no hardening law',
         ),
-        ("body", 5, "body = 5 must be a list"),
+        ("body", 5, r"body = 5 must be a list of tables, \[\[body\]\]\."),
         ("body", None, "body is missing"),
         ("support.0.fixed", ["up"], 'support "clamp".fixed = ."up".: entry 1 must be'),
         ("analysis", {"plane": "flat"}, "analysis.plane = .* must be 'strain', 'stress', 'axi"),
