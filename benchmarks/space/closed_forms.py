@@ -35,27 +35,17 @@ from archord.benchmarks.axisymmetric.case import (
     solved,
 )
 from archord.benchmarks.space import planes
-from archord.benchmarks.space.revolved import of_quadrilaterals, revolved
-from archord.geometry.meshes.refine import Circle
-from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.benchmarks.space.revolved import revolved
+from archord.benchmarks.space.sockets import AXIS, layer, pressed, socket_sketch
 from archord.geometry.shapes.joint_mesh import mesh_joint
-from archord.geometry.shapes.layers import layered
-from archord.geometry.shapes.sketch import Sketch
 from archord.materials.elasticity import Elastic
 from archord.materials.material import Material
 from archord.postprocess.run import Run
 from archord.report.table import Table
-from archord.solver.path.system import System
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
 
 FRICTION = 0.2
 _PUSHED = 0.6  # by this part of the displacement at which the ball would slide
-_BALL = 10.0
-_SOCKET = 10.05
-_WIDTH = 20.0
-_DEPTH = 30.0
-_PRESSED = 0.05
-_LAYER = 0.5
 _THIN = 0.05  # thickness over R
 _QUARTER = (Support("start", fixed="z"), Support("end", fixed="x"))
 _HALF = (Support("start", fixed="z"), Support("end", fixed="z"))
@@ -149,73 +139,14 @@ def mindlin(size: float) -> Iterator[Compared]:
         yield Compared("displacement", expected, "Mindlin", aside)
 
 
-def socket_sketch(size: float) -> Sketch:
-    """The lower half of a ball, or of a pin, that touches a recess from within."""
-    names = ["ball", "ball top", "ball axis", "socket", "block top", "axis", "outside"]
-    sketch = Sketch(["ball body", "block"], names)
-    up = _BALL - _SOCKET
-    around = Circle("ball", (0.0, up), _BALL)
-    sides = {
-        "ball": sketch.path("ball body", (0.0, up - _BALL), (_BALL, up), on=around),
-        "ball top": sketch.path("ball body", (_BALL, up), (0.0, up)),
-        "ball axis": sketch.path("ball body", (0.0, up), (0.0, up - _BALL)),
-    }
-    sketch.face("ball body", **sides)
-    recess = Circle("socket", (0.0, 0.0), _SOCKET)
-    corners = [(_WIDTH, 0.0), (_WIDTH, -_DEPTH), (0.0, -_DEPTH)]
-    sides = {
-        "socket": sketch.path("block", (0.0, -_SOCKET), (_SOCKET, 0.0), on=recess),
-        "block top": sketch.path("block", (_SOCKET, 0.0), corners[0]),
-        "outside": sketch.path("block", *corners),
-        "axis": sketch.path("block", corners[-1], (0.0, -_SOCKET)),
-    }
-    sketch.face("block", **sides)
-    grown = f"{size!r} + 0.3 * Abs(Sqrt(x*x + y*y) - {_SOCKET!r})"
-    sketch.sizes |= {"ball body": grown, "block": grown}
-    return sketch
-
-
-def _socket(mesh: TaggedMesh, held: Sequence[Support], **how: Any) -> Problem:
-    """The ball is pressed into its socket."""
-    top = "xy" if mesh.dimension == 2 else "xyz"
-    return Problem(
-        mesh,
-        [Body("ball body", elastic()), Body("block", elastic())],
-        [Interaction("contact", ("ball", "socket"))],
-        [*held, Support("block top", fixed=top)],
-        [Load("press", on="ball top", direction="y", displacement=-_PRESSED)],
-        steps=1,
-        **how,
-    )
-
-
-_AXIS = (Support("ball axis", fixed="x"), Support("axis", fixed="x"))
-
-
 def socket(size: float) -> Iterator[Compared]:
     """A quarter of a ball in a conforming socket beside the same around an axis."""
     sketch = socket_sketch(size / 6)
     axial = mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
-    with _run_of(_socket(axial, _AXIS, kinematics="axisymmetric")) as run:
+    with _run_of(pressed(axial, AXIS, kinematics="axisymmetric")) as run:
         expected = run.columns["press force"][-1]
-    with _run_of(_socket(revolved(socket_sketch(size), 1), _QUARTER, symmetry=4)) as run:
+    with _run_of(pressed(revolved(socket_sketch(size), 1), _QUARTER, symmetry=4)) as run:
         yield Compared("P", expected, "axisymmetric", run.columns["press force"][-1])
-
-
-def layer(size: float) -> Iterator[Compared]:
-    """One layer of a joint between held faces beside plane strain, on elements of third degree,
-    whose bases are the same in the plane."""
-    flat = of_quadrilaterals(socket_sketch(size))
-    heights = dict.fromkeys(("ball body", "block"), (0.0, _LAYER))
-    faces = [
-        Support(f"{name} {face}", fixed="z") for name in heights for face in ("below", "above")
-    ]
-    forces = []
-    for mesh, held in ((flat, _AXIS), (layered(flat, heights), (*_AXIS, *faces))):
-        system = System(_socket(mesh, held, degree=3))
-        system.solve([1.0])
-        forces.append(system.drive_force("press"))
-    yield Compared("P", _LAYER * forces[0], "plane strain", forces[1])
 
 
 def thin(size: float) -> Iterator[Compared]:
@@ -233,7 +164,7 @@ FORMS = {
     "balls": Form(hertz, 0.12, (0.01, 0.01, 0.01)),
     "pushed ball": Form(mindlin, 0.2, (0.02, 0.02)),
     "socket": Form(socket, 1.5, (2e-3,)),
-    "layer": Form(layer, 3.0, (1e-9,)),
+    "layer": Form(layer, 3.0, (1e-9, 1e-3)),
     "thin joint": Form(thin, 0.1, (2e-3,)),
 }
 

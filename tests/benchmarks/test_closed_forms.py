@@ -6,6 +6,7 @@ import pytest
 
 from archord.benchmarks.space.closed_forms import FORMS
 from archord.benchmarks.space.equal_error import Point, add_panel, quickest
+from archord.benchmarks.space.sockets import layer
 
 # element sizes, and what they leave
 COARSE = {"elastic sphere": (0.4, 5e-3), "balls": (0.35, 0.02)}
@@ -16,6 +17,15 @@ def test_solids_come_near_closed_forms(name):
     size, within = COARSE[name]
     for found in FORMS[name].compare(size):
         assert found.ours == pytest.approx(found.reference, rel=within)
+
+
+@pytest.mark.parametrize(("size", "friction"), [(10.0, 0.0), (6.0, 0.2)])
+def test_a_layer_is_plane_strain(size, friction):
+    """To round-off with the contact points and the trace constants of the plane, by its own up to
+    the error of the coarse mesh."""
+    alike, own = layer(size, friction)
+    assert alike.ours == pytest.approx(alike.reference, rel=1e-9)
+    assert own.ours == pytest.approx(own.reference, rel=0.02)
 
 
 def test_the_quickest_mesh_within_an_error_counts():
