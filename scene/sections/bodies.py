@@ -23,9 +23,8 @@ _E = "Young's modulus, unless a material brings it"
 _NU = "Poisson's ratio, unless a material brings it"
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 _SOFTEST = 1e-8  # ratio of the moduli
-# yield stress over E: below, nothing elastic is left but round-off; above, units are mixed
-_WEAKEST = 1e-7
-_STRONGEST = 0.5
+_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
+_STRONGEST = 0.5  # the same; above it no body yields, and units may be mixed
 
 
 class Solid(Section):
@@ -181,11 +180,11 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
             "unit"
         )
         require(stiffest <= solid.E / _SOFTEST, modulus, said)
-        strong = strength is None or _WEAKEST <= strength / solid.E <= _STRONGEST
+        strong = strength is None or strength >= _WEAKEST * solid.E
         require(
             strong,
             (*place, "yield_stress"),
-            f"must be {_WEAKEST:g} to {_STRONGEST:g} times E, {solid.E:g}, in the same unit",
+            f"must be at least {_WEAKEST:g} times E, in the same unit",
         )
         allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
         require(
@@ -193,3 +192,15 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
             (*place, "hardening"),
             f"must not exceed {1 / _WEAKEST:g} times E, in the same unit",
         )
+
+
+def strength_doubts(solids: Mapping[str, Solid]) -> list[str]:
+    """A warning of each of the ``solids``, by their names, that is too strong for its E to
+    yield."""
+    return [
+        f"the yield stress of {name!r}, {solid.yield_stress:g}, is "
+        f"{solid.yield_stress / solid.E:.2g} times its E, {solid.E:g}: it does not yield; look "
+        "whether both have the same unit"
+        for name, solid in solids.items()
+        if solid.yield_stress is not None and solid.yield_stress > _STRONGEST * solid.E
+    ]

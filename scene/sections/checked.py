@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from pydantic import ValidationError
 
 from archord.report.errors import InputError
+from archord.scene.sections.bodies import strength_doubts
 from archord.scene.sections.faults import in_sentences
 from archord.scene.sections.keys import Section, plain, require
 
@@ -102,7 +103,7 @@ class Checked(Section):
     @property
     def doubts(self: Any) -> list[str]:
         """What to warn of before anything is solved."""
-        return [*self.units.doubts, *self.analysis.doubts]
+        return [*self.units.doubts, *self.analysis.doubts, *strength_doubts(self.solids)]
 
     @property
     def materials(self: Any) -> dict[str, dict[str, Any]]:
