@@ -21,7 +21,7 @@ _ELSEWHERE = {
     "bushing.pin": "pin.whole",
     "bushing.rings": "[[sleeve]] and [housing]",
 }
-_ELSEWHERE |= {"load.steps": "path.steps"}
+_ELSEWHERE |= {"load.steps": "path.steps", "path": "load.steps"}
 # kinds of values, in pydantic's places; no key is called so
 _TAGS = {"number", "list", "a law"}
 _PHRASES = {

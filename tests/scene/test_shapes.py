@@ -195,6 +195,7 @@ def test_radii_of_a_bushing_make_its_fits():
             "needs pin.whole = true, as half a pin cannot be pressed in.",
         ),
         (LUG, "block", STEEL, "block is not a known key"),
+        (LUG, "path", {"steps": 5}, "is not a known key; did you mean load.steps? Sections are"),
         (LUG, "pin", {"rigid": True, "whole": True}, "pin.whole = true is not for a rigid pin."),
         (
             LUG,
