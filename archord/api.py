@@ -105,7 +105,7 @@ def solve(
     """Solve a problem into a run folder.
 
     All ranks of ``comm`` take part. Of a run that could not reach its end (status "stopped") the
-    logger "archord" warns.
+    logger "archord" warns; `Run.warnings` has what else there is to warn of.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ def solve(
     own_fields : dict
         More fields of the cells by name, functions of the state at a body's integration points,
         ``lambda at: at.stress[..., 0]``, which return an array ``(n, q)``: the run has the mean of
-        each cell. `PointFields` in archord/solver/body_points.py says what ``at`` has. A restart
-        takes them again.
+        each cell. `PointFields` in archord/solver/bulk/body_points.py says what ``at`` has. A
+        restart takes them again.
     progress : bool
         Report steps as ``archord solve`` does.
     comm : MPI.Comm
