@@ -342,4 +342,4 @@ def test_runs_of_steel_that_hardens_become_laws(tmp_path, capsys, refused) -> No
     assert module["force"](0.15, 0.2)[0] == pytest.approx(written.at(0.15, 0.2).load, rel=1e-12)
     assert refused(words).startswith(f"{file}: is there already")
     assert "takes one run" in refused([*words, "--range", "0.1", "1"])
-    assert "files that end in" in refused([*words[:-1], str(tmp_path / "law.f90")])
+    assert "law.f90: must end in .py, .h" in refused([*words[:-1], str(tmp_path / "law.f90")])
