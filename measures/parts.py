@@ -82,7 +82,8 @@ def part_measures(scene: ProblemScene) -> list[Measure]:
     measures = []
     spread = {part.name: part for part in scene.coupling if part.kind == "distributing"}
     for section, part, what, unit in part_columns(scene):
-        value = partial(_value, _VALUES[section].get(what) or _of_law(what), part)
+        tell = _of_law(what) if section == "law" else _VALUES[section][what]
+        value = partial(_value, tell, part)
         if section == "coupling" and part in spread:
             value = partial(_mean_motion, spread[part], what)
         measures.append(Measure(f"{part} {what}", unit, value))

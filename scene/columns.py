@@ -39,8 +39,8 @@ class Parts(Protocol):
 
 
 def part_columns(scene: Parts) -> Iterator[Column]:
-    """The columns of loads, supports, couplings, interactions and bodies of ``scene``, in
-    order."""
+    """The columns of loads, supports, couplings, interactions, their laws and bodies of ``scene``,
+    in order."""
     units = scene.units
     length = units.length
     plane = scene.analysis.plane
@@ -86,8 +86,10 @@ def part_columns(scene: Parts) -> Iterator[Column]:
         measured |= touching
         if interaction.has_friction:
             measured |= turned | {"largest shear": units.stress}
-        for what, unit in (measured | interaction.quantities).items():
+        for what, unit in measured.items():
             yield "interaction", interaction.name, what, unit
+        for what, unit in interaction.quantities.items():
+            yield "law", interaction.name, what, unit
     for body in scene.body:
         if body.plastic:
             for what, unit in ({"peeq_max": ""} | dict.fromkeys(places, length)).items():
@@ -112,7 +114,9 @@ def require_different(scene: Parts) -> None:
             f"makes the column {column!r} of history.csv, as the {other[0]} {other[1]!r} does: "
             "rename one of them"
         )
-        require(other == (section, part), (section, part, "name"), said)
+        key = ("own", "quantities") if section == "law" else ("name",)
+        place = "interaction" if section == "law" else section
+        require(other == (section, part), (place, part, *key), said)
     motions = {
         f"{c.name} {freedom}": c.name for c in scene.coupling for freedom in _motions(scene, c)
     }

@@ -132,7 +132,7 @@ class OwnLaw(OwnSection):
     """A contact law of a class of one's own."""
 
     friction: bool = key("whether it has shear", default=False)
-    quantities: dict[str, str] = key("units of what the law tells, by name", default={})
+    quantities: dict[PartName, str] = key("units of what the law tells, by name", default={})
 
 
 class BodySection(Solid):

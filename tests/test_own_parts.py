@@ -327,6 +327,28 @@ def test_a_quantity_of_a_law_is_of_the_whole(run, tmp_path):
         np.testing.assert_allclose(twice.columns[name], 2 * np.array(run.columns[name]), rtol=1e-9)
 
 
+def named(quantity):
+    """A law of `Wear` that calls its depth so."""
+
+    class Named(Wear):
+        def quantities(self, state):
+            return {quantity: archord.Quantity(state.depth, "mm2")}
+
+    return Named
+
+
+def test_a_quantity_of_a_law_has_its_own_column(run, tmp_path):
+    """Or none: a name that archord has for an interaction told what archord tells of it."""
+    area = archord.solve(sliding(MPI.COMM_SELF, law=named("contact area")), tmp_path / "run")
+    np.testing.assert_array_equal(area.columns["rub contact area"], run.columns["rub worn volume"])
+    for name, said in (
+        ("largest pressure", "makes the column 'rub largest pressure' of history.csv"),
+        ("worn [mm]", 'must not hold " \\["'),
+    ):
+        with pytest.raises(archord.InputError, match=said):
+            archord.solve(sliding(MPI.COMM_SELF, law=named(name)), tmp_path / "refused")
+
+
 def test_the_halted_step_keeps_its_contact(tmp_path, monkeypatch):
     """A law that takes its wear from the beginning of the step has another pressure where the
     accepted state is evaluated once more."""
