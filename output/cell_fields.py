@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 # what else fields.h5 and exports have
 _TAKEN = ("accepted", "load", "mesh", "edges", "points", "cells", "body", "displacement")
+# what probes and pictures make of fields, and call so
+_MADE = ("ux", "uy", "uz", "p1", "p2", "p3", "principal_angle", "hoop", "along", "normal", "shear")
+_OF_CONTACT = ("pressure", "facet_pressure", "gap", "contact_shear")
 _COMPONENTS = ("nodal", *SPACE.names, *AXISYMMETRIC.names)  # of a plane, too
 _NAME = re.compile(r"\w[\w .()-]*")
 _ALLOWED = "it may have letters, digits, spaces and any of _ . ( ) -"
@@ -106,7 +109,7 @@ def own_rows(own: Mapping[str, Callable[[Any], Array]]) -> list[CellField]:
     """The rows of fields that are given as functions of `PointFields` by name. Raises
     `InputError`."""
     for name in own:
-        if name in _TAKEN or row_of(name):
+        if name in (*_TAKEN, *_MADE, *_OF_CONTACT) or row_of(name):
             raise InputError(f"archord.solve: own_fields: {name!r} is the name of another field.")
         if not _NAME.fullmatch(name):
             raise InputError(f"archord.solve: own_fields: {name!r} is no name: {_ALLOWED}.")

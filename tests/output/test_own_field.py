@@ -11,8 +11,9 @@ from matplotlib.image import imread
 import archord
 from archord.cli import run as command
 from archord.materials.elasticity import mean_stress, von_mises
-from archord.output.cell_fields import CELL_FIELDS, CellField
-from archord.postprocess.pictures.problems import field_words
+from archord.output.cell_fields import CELL_FIELDS, CellField, own_rows
+from archord.postprocess.pictures.problems import _NAMED, OF_EDGES, field_words
+from archord.postprocess.probes import ask
 from tests.postprocess.vtk_reader import VtkFile
 
 
@@ -47,8 +48,8 @@ def _xdmf_names(folder):
 def test_a_row_of_the_table_is_written_read_drawn_probed_and_exported(tmp_path, monkeypatch):
     """Of a bar under tension a third, in each cell, at each node and along each line."""
     row = CellField("triaxiality", "stress triaxiality", "-", triaxiality, nodal=True)
-    monkeypatch.setattr("archord.output.cell_fields.CELL_FIELDS", [*CELL_FIELDS, row])
     monkeypatch.setattr("archord.output.fields.CELL_FIELDS", [*CELL_FIELDS, row])
+    monkeypatch.setattr("archord.output.cell_fields.CELL_FIELDS", [*CELL_FIELDS, row])
     run = archord.solve(bar(), tmp_path / "run", fields="points")
     fields = run.fields()
     np.testing.assert_allclose(fields.cell["triaxiality"], 1 / 3, rtol=1e-8)
@@ -107,6 +108,19 @@ def test_all_ranks_together_write_what_one_writes(comm, tmp_path):
     np.testing.assert_allclose(fields.cell["triaxiality"], 1 / 3, rtol=1e-8)
     middle = fields.coordinates[fields.cells[:, :3], 0].mean(axis=1)
     np.testing.assert_allclose(fields.cell["far"], middle, rtol=1e-10)
+
+
+def test_names_that_probes_and_pictures_know_are_refused(tmp_path):
+    """A probe told what archord calls so, not the field of the user."""
+    known = {*ask._OF_LENGTH, *ask._OF_STRESS, *OF_EDGES, *_NAMED, *archord_names(tmp_path)}
+    for name in known:
+        with pytest.raises(archord.InputError, match=f"'{name}' is the name of another field"):
+            own_rows({name: triaxiality})
+
+
+def archord_names(folder):
+    """The fields of the nodes of a run."""
+    return archord.solve(bar(), folder / "run", fields="nodes").fields().nodal_fields()
 
 
 @pytest.mark.parametrize("name", ["peeq", "stress_xx", "displacement", "a/b", ""])
