@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.curve import RigidCircle
+from archord.geometry.curve import ProjectionError, RigidCircle
 from archord.geometry.meshes.formats.source import CHANGES, Mesh, circles_in
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.rigid_in_space import RigidBall, RigidCylinder
@@ -71,13 +71,13 @@ def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
 
 @contextmanager
 def as_input_error(source: str) -> Iterator[None]:
-    """Raise the ValueError of a mesh or a problem as `InputError` that names the ``source`` of the
-    mesh."""
+    """Raise the ValueError of a mesh or a problem, and the ProjectionError of its surfaces, as
+    `InputError` that names the ``source`` of the mesh."""
     try:
         yield
     except InputError:
         raise
-    except ValueError as error:
+    except (ValueError, ProjectionError) as error:
         said = str(error)
         if not said.startswith(source):
             said = f"{source}: {said}"

@@ -13,6 +13,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, displacement_element, lagrange_element
+from archord.geometry.curve import ProjectionError
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.report.timer import Timer
 from archord.solver.bulk.bulk import Bulk
@@ -162,7 +163,11 @@ class System(Totals):
 
     def _interface(self, interaction: Interaction) -> Interface:
         surfaces = [self._surface(given, interaction.name) for given in interaction.surfaces]
-        return Interface(interaction, surfaces)
+        try:
+            return Interface(interaction, surfaces)
+        except ProjectionError as error:
+            said = f'interaction "{interaction.name}": its surfaces do not lie opposite each other'
+            raise ProjectionError(f"{said}: {error}") from None
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):

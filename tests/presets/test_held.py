@@ -4,10 +4,12 @@ import gmsh
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.curve import ProjectionError
 from archord.measures.account import Account
 from archord.presets.account import account_of
 from archord.report.errors import InputError
 from archord.scene.file import parse_any
+from archord.solver.path import system
 
 STEEL = {"E": 210000.0, "nu": 0.3}
 
@@ -95,6 +97,18 @@ def test_a_fault_is_said(squares, changes, said):
     with pytest.raises(InputError, match=said) as fault:
         account(squares, **changes)
     assert len(str(fault.value).splitlines()) == 1
+
+
+def test_surfaces_that_find_no_partners_are_refused(squares, monkeypatch):
+    """Two sides of a quarter of a ball, say: it was a traceback."""
+
+    def lost(*_):
+        raise ProjectionError("1 contact point found no closest point, the first at (0, 10)")
+
+    monkeypatch.setattr(system, "Interface", lost)
+    said = 'interaction "contact": its surfaces do not lie opposite each other: 1 contact point'
+    with pytest.raises(InputError, match=said):
+        account(squares)
 
 
 @pytest.mark.parametrize("turned", [False, True])
