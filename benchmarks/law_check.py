@@ -253,7 +253,8 @@ def _paper(numbers: Numbers, x: Array, k: float, c: float = 1.0) -> Array:
 
 def _paper_fitted(numbers: Numbers, x: Array, y: Array) -> Array:
     """y of the paper's law with this joint's best k, and c where it yields."""
-    starts = [[0.8]] if np.isinf(min(numbers[5:])) else [[0.8, c] for c in (0.8, 1.2, 2.0)]
+    is_elastic = np.isinf(min(numbers[5:]))
+    starts = [[0.8]] if is_elastic else [[0.8, c] for c in (0.8, 1.2, 2.0)]
     best, _ = fit(lambda values: _paper(numbers, x, *map(float, values)), starts, y)
     return _paper(numbers, x, *best)
 

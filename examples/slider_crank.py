@@ -129,7 +129,9 @@ def simulate(law, start, steps=STEPS, turns=TURNS):
         (Fx, Fy, T), _ = law.element(memory, e, v, spin)
         (Qx, Qy, _), _ = law.element(memory, e)
         memory = law.advance_element(memory, *e)
-        lost = -WIDTH * ((Fx - Qx) * v[0] + (Fy - Qy) * v[1] + T * spin)
+        along_x = (Fx - Qx) * v[0]
+        along_y = (Fy - Qy) * v[1]
+        lost = -WIDTH * (along_x + along_y + T * spin)
         stored = WIDTH * law.stored_energy(memory, *e)
         torque = -mbs.GetObjectOutput(drive, kinds.Force)
         velocities = mbs.systemData.GetODE2Coordinates_t()

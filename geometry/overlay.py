@@ -129,10 +129,15 @@ def polygon_rule(triangles: Array, polygon: Index) -> tuple[Array, Array]:
     across = np.sqrt(np.maximum(tt - aside**2, least))
     s = x[..., 0] / along[polygon, None]
     t = (x[..., 1] - s * aside[polygon, None]) / across[polygon, None]
-    third = mean(s**3 - 3 * s * t**2) + 1j * mean(3 * s**2 * t - t**3)
-    turn = np.where(np.abs(third) > _EVEN, np.angle(third), 0.0) / 3
-    angle = turn[:, None] + 2 * np.pi / 3 * np.arange(3)
-    s, t = np.sqrt(2) * np.cos(angle), np.sqrt(2) * np.sin(angle)
+    by_s = mean(s**3 - 3 * s * t**2)
+    by_t = mean(3 * s**2 * t - t**3)
+    third = by_s + 1j * by_t
+    is_odd = np.abs(third) > _EVEN
+    turn = np.where(is_odd, np.angle(third), 0.0) / 3
+    corners = 2 * np.pi / 3 * np.arange(3)
+    angle = turn[:, None] + corners
+    s = np.sqrt(2) * np.cos(angle)
+    t = np.sqrt(2) * np.sin(angle)
     stretched = s * along[:, None], s * aside[:, None] + t * across[:, None]
     weights: Array = np.repeat(size[:, None] / 3, 3, axis=1)
     return middle[:, None] + np.stack(stretched, axis=2), weights
@@ -152,13 +157,17 @@ def without_slivers(triangles: Array, polygon: Index, facet: Index) -> Index:
     from scipy.spatial import cKDTree  # a plane problem does not pay for it
 
     size, middle = measured(triangles, polygon)
-    on_facet = facet[np.unique(polygon, return_index=True)[1]]
-    mean = np.bincount(on_facet, size) / np.bincount(on_facet).clip(1)
+    _, first = np.unique(polygon, return_index=True)
+    on_facet = facet[first]
+    n_polygons = np.bincount(on_facet)
+    mean = np.bincount(on_facet, size) / n_polygons.clip(1)
     is_sliver = size < _SLIVER * mean[on_facet]
     kept = np.flatnonzero(~is_sliver)
     at = np.column_stack([middle, _APART * on_facet])
     _, nearest = cKDTree(at[kept]).query(at)
-    return np.where(is_sliver, nearest, np.cumsum(~is_sliver) - 1)[polygon]
+    number_of_kept = np.cumsum(~is_sliver) - 1
+    joined = np.where(is_sliver, nearest, number_of_kept)
+    return joined[polygon]
 
 
 def quartered(triangles: Array) -> Array:

@@ -94,7 +94,8 @@ class PatchRecovery:
         square = np.where(is_point, (ray**2).sum(axis=-1), 0.0)
         size = np.maximum.reduceat(square.max(axis=1), self._first)
         self._scale = np.sqrt(size)
-        near = 1 / (_CORE + square / size[patch][:, None])
+        relative = square / size[patch][:, None]
+        near = 1 / (_CORE + relative)
         weight = np.where(wide[:, None], near, 1.0) * is_point
         scale = self._scale[patch]
         monomials = self._monomials(ray / scale[:, None, None])
@@ -117,7 +118,9 @@ class PatchRecovery:
         n_vertices = len(self._patch)
         groups = [np.arange(n_vertices)[:, None], *between]
         end = np.concatenate([group.ravel() for group in groups])
-        n_ends = np.concatenate([np.full(len(group), group.shape[1]) for group in groups])
+        n_nodes = [len(group) for group in groups]
+        of_each = [group.shape[1] for group in groups]
+        n_ends = np.repeat(of_each, n_nodes)
         place, source = _joined(end, wanted, source)
         node = np.repeat(np.arange(len(nodes)), n_ends)[place]
         n_sources = np.bincount(wanted)[end[place]]

@@ -286,7 +286,8 @@ def _beam_compliance(shape: Any, pin: Any, arm: float) -> float:
     inertia = math.pi * (R**4 - bore**4) / 4
     area = math.pi * (R**2 - bore**2)
     shear_modulus = pin.E / (2 * (1 + pin.nu))
-    bent = (8 * span**3 - 4 * span * loaded**2 + loaded**3) / (384 * pin.E * inertia)
+    stiffness = pin.E * inertia
+    bent = (8 * span**3 - 4 * span * loaded**2 + loaded**3) / (384 * stiffness)
     sheared = arm / (2 * shear_factor(bore / R, pin.nu) * shear_modulus * area)
     return bent + sheared
 

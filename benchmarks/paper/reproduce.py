@@ -74,7 +74,8 @@ def report(runs: Runs, claims: str, pictures: list[str]) -> str:
     for joint, plane in product(JOINTS, PLANES):
         fine, coarse = (runs.curve(joint, plane, mesh) for mesh in ("fine", "coarse"))
         late = fine.delta >= 0.2 * fine.dR
-        errors[f"{joint}, plane {plane}"] = float(np.abs(coarse.P / fine.P - 1)[late].max())
+        off = np.abs(coarse.P / fine.P - 1)
+        errors[f"{joint}, plane {plane}"] = float(off[late].max())
     worst, error = max(errors.items(), key=lambda item: item[1])
     shown = "\n".join(f"![{name}]({name})\n" for name in pictures)
     return f"""# The claims of Hu et al., judged

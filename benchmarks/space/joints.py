@@ -91,7 +91,9 @@ def _symmetry(*bodies: str) -> list[Support]:
 def axis_displacement(z: float, system: System) -> float:
     """Displacement along y of the pin's axis at this ``z``."""
     nodes = system.V.tabulate_dof_coordinates()[: system.V.dofmap.index_map.size_local]
-    off = np.hypot(nodes[:, 0], nodes[:, 1] + CLEARANCE) + np.abs(nodes[:, 2] - z)
+    x, y, heights = nodes.T
+    from_axis = np.hypot(x, y + CLEARANCE)
+    off = from_axis + np.abs(heights - z)
     found = system.equilibrium.displacement()[: len(nodes), _Y][off < 1e-6]
     return float(np.concatenate(system.comm.allgather(found)).mean())
 

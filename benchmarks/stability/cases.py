@@ -145,7 +145,9 @@ def _drawn(blocks: str, triangles: bool) -> Path:
                 x = radius * np.cos(np.pi * y)
                 y = radius * np.sin(np.pi * y)
             ids = start + np.arange(x.size).reshape(x.shape)
-            corners = [ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]]
+            lower = ids[:-1]
+            upper = ids[1:]
+            corners = [lower[:, :-1], lower[:, 1:], upper[:, 1:], upper[:, :-1]]
             cells = np.stack(corners, axis=2).reshape(-1, 4)
             if triangles:
                 cells = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])

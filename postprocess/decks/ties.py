@@ -130,7 +130,10 @@ def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:
     nearest = distance.argmin(axis=1)
     every = np.arange(len(x))
     at = t[every, nearest]
-    weights = np.stack([at * (at - 1) / 2, at * (at + 1) / 2, 1 - at**2], axis=1)
+    first = at * (at - 1) / 2
+    last = at * (at + 1) / 2
+    middle = 1 - at**2
+    weights = np.stack([first, last, middle], axis=1)
     return np.where(np.isfinite(distance[every, nearest]), nearest, -1), weights
 
 

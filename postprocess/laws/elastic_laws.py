@@ -112,8 +112,10 @@ def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array
     c = np.sqrt(1 + b**2)
     s = np.sqrt(np.maximum(b**2 - y**2, 0.0))
     of_root = 2 / (np.pi * c) * s / (1 + y**2)
-    of_logarithm = np.arctanh(s / c) / (np.pi * b**2 * (1 + b**2))
-    pressure = (of_root + of_logarithm) * P / joint.radius
+    logarithm_of_roots = np.arctanh(s / c)
+    of_logarithm = logarithm_of_roots / (np.pi * b**2 * c**2)
+    mean = P / joint.radius
+    pressure = (of_root + of_logarithm) * mean
     return np.where(np.abs(phi) < eps, pressure, 0.0)
 
 
@@ -134,5 +136,7 @@ def persson(joint: LawJoint, P: Array) -> LawState:
     no load."""
     half = rising_root(lambda b: persson_load(joint, 2 * np.arctan(b)), P, 1.0)
     eps = 2 * np.arctan(half)
-    p0 = persson_pressure(joint, P, np.where(P > 0, eps, 1.0), np.zeros_like(eps))
+    any_angle = np.where(P > 0, eps, 1.0)
+    middle = np.zeros_like(eps)
+    p0 = persson_pressure(joint, P, any_angle, middle)
     return LawState(NOTHING, P, NOTHING, p0, eps)

@@ -305,7 +305,9 @@ def _cubic(x: Array, f: Array, touching: bool = False) -> _Cubic:
     last = (f[-1] - f[-2]) / (x[-1] - x[-2])
     df[-1] = max(df[-1], _LEAST * last, key=abs)
     if touching:
-        power = np.log(f[2] / f[1]) / np.log(x[2] / x[1])
+        grown = np.log(f[2] / f[1])
+        farther = np.log(x[2] / x[1])
+        power = grown / farther
         bend = 8 * (0.5**power - 0.5)
         steeper = bend * f[1] / x[1]
         df[0] = max(df[1] + steeper, 0.0)

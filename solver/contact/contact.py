@@ -224,7 +224,8 @@ class Contact:
 
     def n_active(self) -> int:
         """Number of points under pressure, over all ranks."""
-        return self.comm.allreduce(sum(int((pair.traction[:, 0] > 0).sum()) for pair in self.pairs))
+        of_pairs = [int((pair.traction[:, 0] > 0).sum()) for pair in self.pairs]
+        return self.comm.allreduce(sum(of_pairs))
 
     def pair_of(self, surface: Surface) -> Pair | None:
         """The points of ``surface`` against its opposite; None if it is not integrated."""

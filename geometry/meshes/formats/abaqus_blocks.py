@@ -147,7 +147,9 @@ def _instance(name: str, index: int, rows: Rows) -> Scope:
         )
     x, y, z = (end - start) / length
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross  # Rodrigues
+    of_sine = np.sin(angle) * cross
+    of_cosine = (1 - np.cos(angle)) * cross @ cross
+    turn = np.eye(3) + of_sine + of_cosine  # Rodrigues
     return Scope(name, index, shift, turn, start)
 
 

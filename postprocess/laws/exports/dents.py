@@ -60,7 +60,8 @@ def shift(curve: JointCurve) -> tuple[Array, Array]:
     back, dback = curve._curve(curve.back, curve.dback, h)
     rises = dback > 0
     dh = np.ones_like(h)
-    np.divide(curve.dy - dr * back, r * dback, out=dh, where=rises)
+    left = curve.dy - dr * back
+    np.divide(left, r * dback, out=dh, where=rises)
     z = curve.x - r * h
     dz = 1 - dr * h - r * dh
     return _losing(curve, z, dz, h)
@@ -73,9 +74,11 @@ def fall(curve: JointCurve) -> float:
     x = np.linspace(0.0, curve.x[-1], _PLACES)
     ratio, _ = hermite(curve.x, curve.ratio, curve.dratio, x)
     opens, _ = hermite(curve.x, shifts, slopes, x)
-    force = ratio * curve._curve(curve.back, curve.dback, np.maximum((x - opens) / ratio, 0.0))[0]
+    beyond = np.maximum(x - opens, 0.0)
+    back, _ = curve._curve(curve.back, curve.dback, beyond / ratio)
     wanted, _ = curve._curve(curve.y, curve.dy, x)
-    return float((wanted - force).max() / wanted.max())
+    missing = wanted - ratio * back
+    return float(missing.max() / wanted.max())
 
 
 def _losing(curve: JointCurve, z: Array, dz: Array, h: Array) -> tuple[Array, Array]:
@@ -85,11 +88,14 @@ def _losing(curve: JointCurve, z: Array, dz: Array, h: Array) -> tuple[Array, Ar
     between = _MARGIN * np.maximum(h[:-1], h[1:])
     phi = _largest_phi(curve, between)  # (n - 1,)
     # at the nodes
-    at_nodes = np.maximum(np.append(0.0, phi), np.append(phi, 0.0))
+    before = np.append(0.0, phi)
+    after = np.append(phi, 0.0)
+    at_nodes = np.maximum(before, after)
     least_slope = np.maximum(-dr * at_nodes, 0.0)
     dz = np.maximum(dz, least_slope)
     # between them
-    steepest = 3 * np.diff(curve.ratio) / width - dr[:-1] - dr[1:]
+    rise_of_ratio = np.diff(curve.ratio) / width
+    steepest = 3 * rise_of_ratio - dr[:-1] - dr[1:]
     least_middle = np.maximum(-steepest * phi, 0.0)
     least_rise = width / 3 * (dz[:-1] + dz[1:] + least_middle)
     raised = z.copy()
@@ -104,8 +110,10 @@ def _largest_phi(curve: JointCurve, h: Array) -> Array:
     u = np.geomspace(_FIRST * curve.x[-1], end, _SAMPLES)
     back, _ = curve._curve(curve.back, curve.dback, u)
     first = u[0] * back[0] / 2
-    pieces = np.diff(u) * (back[1:] + back[:-1]) / 2
+    mean = (back[1:] + back[:-1]) / 2
+    pieces = np.diff(u) * mean
     energy = np.cumsum(np.append(first, pieces))
-    largest = np.maximum.accumulate(u - 2 * energy / back)
+    phi = u - 2 * energy / back
+    largest = np.maximum.accumulate(phi)
     sample = np.minimum(np.searchsorted(u, h), _SAMPLES - 1)
     return largest[sample]

@@ -60,7 +60,9 @@ class Changed:
     def of(cls, joint: LawJoint, without: NodeRun, with_: NodeRun) -> Changed:
         """The joint of two runs to the same displacements."""
         loading = slice(without.loading)
-        inside = (without.nodes[loading, 0] >= _RANGE[0]) & (without.nodes[loading, 0] <= _RANGE[1])
+        begin, end = _RANGE
+        at = without.nodes[loading, 0]
+        inside = (at >= begin) & (at <= end)
         return cls(
             joint,
             without.nodes[loading][inside],

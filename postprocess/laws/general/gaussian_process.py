@@ -143,6 +143,8 @@ class Process:
             inverse = every[:count, :count]
             precision = (inverse**2).sum(0)
             columns = np.flatnonzero(self.count == count)
-            off[:count, columns] = -(inverse.T @ self.weights[:count, columns]) / precision[:, None]
-            deviation[:count, columns] = np.sqrt(self.size[columns] / precision[:, None])
+            precisions = precision[:, None]
+            weights = self.weights[:count, columns]
+            off[:count, columns] = -(inverse.T @ weights) / precisions
+            deviation[:count, columns] = np.sqrt(self.size[columns] / precisions)
         return off, deviation

@@ -61,7 +61,8 @@ class Exponential(ContactLaw):
         traction = np.zeros((m, d))
         traction[:, 0] = scale * h * np.expm1(h)
         by_opening = np.zeros((m, d, d))
-        by_opening[:, 0, 0] = -scale / self.clearance * (np.expm1(h) + h * np.exp(h))
+        slope = np.expm1(h) + h * np.exp(h)
+        by_opening[:, 0, 0] = -scale / self.clearance * slope
         branch = np.where(h == 0, OPEN, SLIDE)
         return Response(traction, np.zeros((m, d, d)), by_opening, branch, state)
 
