@@ -42,7 +42,7 @@ from archord.scene.file import (
     resolved,
 )
 from archord.scene.sections.errors import toml_value
-from archord.scene.sections.faults import shortened
+from archord.scene.sections.faults import PHRASES, shortened
 from archord.scene.sections.keys import Section
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
@@ -55,6 +55,11 @@ DEFAULTS = {
     "output.checkpoint": False,
 }
 _MOST_SENTENCES = 20
+_SAID = {
+    "extra_forbidden": "is not a known key",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+}  # of faults of the sweep file, where a scene's are told otherwise
 _TABLES = ("hardening", "parameters", "core")  # keys whose values are tables
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
 _SOLVED_ALIKE_SINCE = (
@@ -209,8 +214,15 @@ def _absolute(value: Any, folder: Path) -> Any:
 def _sentence(error: Any, path: Path) -> str:
     """One sentence for one fault that pydantic found."""
     key = ".".join(f"entry {part + 1}" if isinstance(part, int) else part for part in error["loc"])
-    own = {"missing": "is missing", "extra_forbidden": "is not a known key"}.get(error["type"])
-    said = own or str(error.get("ctx", {}).get("error", error["msg"]))
+    kind = error["type"]
+    context = error.get("ctx", {})
+    said = str(context.get("error", "")) or _SAID.get(kind)
+    if kind == "model_type" and "ranges" in error["loc"]:
+        said = "must be [low, high], or a table with from and to"
+    elif kind == "extra_forbidden" and len(error["loc"]) == 1:
+        said = f"{said}; keys are base, list, zip, grid, latin_hypercube"
+    elif said is None:
+        said = PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"])
     given = (
         "" if isinstance(error["input"], dict) else f" = {shortened(toml_value(error['input']))}"
     )

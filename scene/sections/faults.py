@@ -24,7 +24,7 @@ _ELSEWHERE = {
 _ELSEWHERE |= {"load.steps": "path.steps", "path": "load.steps"}
 # kinds of values, in pydantic's places; no key is called so
 _TAGS = {"number", "list", "a law"}
-_PHRASES = {
+PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",
     "model_type": "must be a section, [{name}]",
@@ -125,7 +125,7 @@ def _sentence(
         kind = "string_too_short" if context.get("min_length") == 1 else error["type"]
         if kind == "list_type" and len(place) == 1:
             kind = "list_of_tables"
-        said = _PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
+        said = PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
         said = said.replace("must be False", "must be false")
     given_by = (by for name, by in origin.items() if f"{name}.".startswith(f"{key}."))
     where = next(given_by, source)
