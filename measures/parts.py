@@ -82,10 +82,12 @@ def part_measures(scene: ProblemScene) -> list[Measure]:
     measures = []
     spread = {part.name: part for part in scene.coupling if part.kind == "distributing"}
     for section, part, what, unit in part_columns(scene):
-        tell = _of_law(what) if section == "law" else _VALUES[section][what]
-        value = partial(_value, tell, part)
         if section == "coupling" and part in spread:
             value = partial(_mean_motion, spread[part], what)
+        elif section == "law":
+            value = partial(_value, _of_law(what), part)
+        else:
+            value = partial(_value, _VALUES[section][what], part)
         measures.append(Measure(f"{part} {what}", unit, value))
     return measures
 
