@@ -113,7 +113,7 @@ class _Expansion:
             named += [(key, "facet set", side, facets) for side in sides]
         for coupling in stated.couplings:
             key = f'coupling "{coupling.name}".facets'
-            named.append((key, "facet set", coupling.facets, facets))
+            named.append((key, "set", coupling.facets, [*self.edges, *cells]))
         for support in self.given_supports:
             named.append((f'support "{support.name}".on', "set or coupling", support.on, places))
         for load in self.given_loads:

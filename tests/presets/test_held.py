@@ -1,5 +1,7 @@
 """What is said of a general scene on a mesh file that cannot be right."""
 
+from pathlib import Path
+
 import gmsh
 import pytest
 from mpi4py import MPI
@@ -8,9 +10,10 @@ from archord.geometry.curve import ProjectionError
 from archord.measures.account import Account
 from archord.presets.account import account_of
 from archord.report.errors import InputError
-from archord.scene.file import parse_any
+from archord.scene.file import load_scene, parse_any
 from archord.solver.path import system
 
+LUG = Path(__file__).parents[2] / "scenes" / "lug.toml"
 STEEL = {"E": 210000.0, "nu": 0.3}
 
 
@@ -109,6 +112,15 @@ def test_surfaces_that_find_no_partners_are_refused(squares, monkeypatch):
     said = 'interaction "contact": its surfaces do not lie opposite each other: 1 contact point'
     with pytest.raises(InputError, match=said):
         account(squares)
+
+
+def test_a_coupling_may_take_a_point():
+    """Here the centre of a pin, which is a set of points."""
+    data = load_scene(LUG).general()
+    data["coupling"] = [{"name": "grip", "facets": "centre", "point": [0.1, 0.0]}]
+    data["support"] += [{"name": "turn", "on": "grip", "fixed": ["y", "rotation"]}]
+    data["load"] = [{"name": "pull", "on": "grip", "direction": "x", "displacement": 0.1}]
+    assert account_of(parse_any(data), MPI.COMM_SELF).warnings == []
 
 
 @pytest.mark.parametrize("turned", [False, True])
