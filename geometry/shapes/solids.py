@@ -1,8 +1,13 @@
 """Joints in space: the faces of a sketch, each extruded along z, meshed by gmsh with curved
-tetrahedra of second order."""
+tetrahedra of second order.
+
+gmsh gets lengths over the radius of the pin in `_DIGITS` decimals, so that meshes do not depend on
+units: a last bit may decide which tetrahedra it makes.
+"""
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,6 +31,8 @@ MIDDLE = "mid-plane"  # the set of facets at z = 0
 FACES = "faces"  # the set of the other flat facets across z
 RIM = "rim"  # the set of the chamfers and fillets
 _SAME = 1e-6  # distance of places that are one, in radii of the pin
+_DIGITS = 12
+_NUMBER = re.compile(r"\d+\.?\d*(e[-+]?\d+)?")
 _OF_FILLET = 0.75  # largest element at a fillet over its radius
 _OPTIONS = {"ElementOrder": 2, "HighOrderOptimize": 0}
 
@@ -168,6 +175,10 @@ def draw_solids(sketch: Sketch, slabs: Sequence[Slab], rims: Rims, gmsh: Any) ->
     set_mesh_options(gmsh, _OPTIONS)
 
 
+def _rounded(length: float) -> float:
+    return round(length, _DIGITS)
+
+
 class _Drawing:
     """A model of gmsh in which profiles of a ``sketch`` are extruded."""
 
@@ -183,7 +194,7 @@ class _Drawing:
         """The volumes of a ``slab``, one over each face."""
         places = self.sketch.points.items()
         point = {
-            number: self.occ.addPoint(*place, slab.bottom)
+            number: self.occ.addPoint(*map(_rounded, (*place, slab.bottom)))
             for (profile, place), number in places
             if profile == slab.profile
         }
@@ -195,14 +206,15 @@ class _Drawing:
                 add = self.occ.addCircleArc if centre else self.occ.addLine
                 curves.append(add(start, *centre, stop))
             surfaces.append((2, self.occ.addPlaneSurface([self.occ.addCurveLoop(curves)])))
-        made = self.occ.extrude(surfaces, 0, 0, slab.top - slab.bottom)
+        height = _rounded(slab.top - slab.bottom)
+        made = self.occ.extrude(surfaces, 0, 0, height)
         self.occ.synchronize()
         return [tag for dim, tag in made if dim == 3]
 
     def blunted(self, volume: int, slab: Slab) -> int:
         """The ``volume`` with a chamfer or a fillet where its bore ends."""
         rims = self.rims
-        length = rims.chamfer or rims.fillet
+        length = _rounded(rims.chamfer or rims.fillet)
         if not (length and slab.rims):
             return volume
         bore = bore_of(self.sketch, slab.profile)
@@ -301,7 +313,8 @@ class _Drawing:
 
     def _size(self, expression: str) -> int:
         field = self.field.add("MathEval")
-        self.field.setString(field, "F", expression)
+        size = _NUMBER.sub(lambda number: repr(_rounded(float(number[0]))), expression)
+        self.field.setString(field, "F", size)
         return field
 
     def use_smallest(self, fields: Sequence[int]) -> None:

@@ -158,3 +158,16 @@ def test_a_clevis_has_its_volumes():
     pinned = {name: nodes_of(mesh, name)[:, 2] for name in ("inner pin", "outer pin")}
     assert pinned["inner pin"].max() == pytest.approx(6.25)
     assert pinned["outer pin"].min() == pytest.approx(6.25)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3, 1 / 25.4])
+def test_meshes_do_not_depend_on_units(unit):
+    """Of lengths that are no round parts of the radius: in another last bit gmsh would make other
+    tetrahedra."""
+    lengths = [9.9, 0.1, 40.0, 20.0, 60.0, 3.4]
+    depths = {"thickness": T, "pin_length": LONG, "chamfer": CHAMFER}
+    one = gathered(made(lug, *lengths, 0.4, **depths))
+    scaled = {name: depth * unit for name, depth in depths.items()}
+    other = gathered(made(lug, *(length * unit for length in lengths), 0.4, **scaled))
+    np.testing.assert_array_equal(other.cells, one.cells)
+    np.testing.assert_allclose(other.x / unit, one.x, rtol=0, atol=1e-11)
