@@ -95,6 +95,11 @@ class LargeStrain(Material):
         return getattr(self.inner, name)
 
     @property
+    def of_small_strain(self) -> Material:
+        """The inner material."""
+        return self.inner
+
+    @property
     def yields(self) -> bool:  # type: ignore[override]
         """Whether the inner material does."""
         return self.inner.yields
@@ -203,11 +208,6 @@ class LargeStrain(Material):
     def _is_thin(self) -> bool:
         """Whether the thickness follows from the stress, by isotropic elasticity."""
         return isinstance(self.inner, Elastic) and self.inner.kinematics.is_thin
-
-
-def of_small_strain(material: Material) -> Material:
-    """The inner material of one at large strain, any other material itself."""
-    return material.inner if isinstance(material, LargeStrain) else material
 
 
 def _normals(working: Sequence[int]) -> Array:

@@ -134,6 +134,11 @@ class Material(Protocol):
         return 0.0
 
 
+def of_small_strain(material: Material) -> Material:
+    """The inner material of a `LargeStrain`, any other material itself."""
+    return getattr(material, "of_small_strain", material)
+
+
 class Points:
     """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the
     last strain seen.

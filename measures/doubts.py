@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
-from archord.materials.finite import of_small_strain
+from archord.materials.material import of_small_strain
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
 from archord.report.doubts import Doubt

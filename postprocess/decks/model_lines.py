@@ -8,8 +8,8 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.materials.elasticity import Elastic, contact_modulus
-from archord.materials.finite import of_small_strain
 from archord.materials.j2 import J2Material
+from archord.materials.material import of_small_strain
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.rows import block, number, pair

@@ -21,9 +21,8 @@ from archord.geometry.basis import Array
 from archord.geometry.cell_rules import CellRule, cell_rules
 from archord.geometry.strain import strain_terms
 from archord.materials.faults import overwrites
-from archord.materials.finite import of_small_strain
 from archord.materials.kinematics import PLANE_STRAIN, Kinematics
-from archord.materials.material import Material, Points
+from archord.materials.material import Material, Points, of_small_strain
 from archord.solver.bulk.assembly import assemble, matrix
 from archord.solver.bulk.body_points import BodyPoints, PointFields
 from archord.solver.bulk.distortion import DistortionMeter
