@@ -219,6 +219,25 @@ def test_a_ring_may_have_a_thin_wall():
         parse_scene(data | {"joint": ring | {"block_size": 10.2}})
 
 
+def test_a_block_that_yields_in_plane_stress_needs_large_strain_early():
+    """Unless its pin yields as early."""
+    data = basic() | {"analysis": {"plane": "stress"}, "load": {"displacement": 1.0}}
+    steel = {"E": 210000.0, "nu": 0.3, "yield_stress": 300.0}
+
+    def doubts(pin, **block):
+        return parse_scene(data | {"pin": steel | pin, "block": steel | block}).doubts_of_strain
+
+    stronger = {"yield_stress": 450.0}
+    (said,) = doubts(stronger)
+    assert "small-strain theory makes P about 2.8 % too low there" in said
+    assert doubts({}) == doubts(stronger, hardening=2000.0) == []
+    far = {"load": {"displacement": 2.6}}
+    (said,) = parse_scene(
+        data | far | {"pin": steel | stronger, "block": steel | {"hardening": 2000.0}}
+    ).doubts_of_strain
+    assert "about 1.3 % too low" in said
+
+
 def test_a_yield_stress_in_another_unit_than_the_modulus_is_doubted():
     """Which no body reaches: GPa beside MPa."""
     data = basic()

@@ -26,12 +26,13 @@ from archord.postprocess.laws.general.elastic_model import Elastic, elastic_mode
 from archord.postprocess.laws.general.factor_model import (
     FRICTION,
     LARGE_STRAIN,
-    PRODUCTS,
+    N_TERMS,
     TABLE,
     Plain,
     factor_model,
 )
-from archord.postprocess.laws.general.general_law import NODES, joint_numbers
+from archord.postprocess.laws.general.general_law import NODES, joint_numbers, within_range
+from archord.postprocess.laws.general.hardening_model import block_leads, flows
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
 from archord.report.table import Table
@@ -40,6 +41,7 @@ _RANGE = (0.05, 3.05)  # x of the data
 _USUAL = (0.099, 2.001)
 _PARTS = 5  # of the joints, each of which the other parts predict
 _WITHIN = 0.93  # share of errors that the expected error is to contain
+_LITTLE = 0.1  # lost to a block that leads
 _LIKELY = 3.0  # size of coefficients
 _SCATTER = 0.01  # of ln P, against which that counts
 
@@ -90,11 +92,13 @@ class Changed:
     @property
     def plain(self) -> Plain:
         """What decides it, as it was solved without."""
-        strain, *of_bodies, _, _ = joint_numbers(self.joint)
+        numbers = within_range(joint_numbers(self.joint))
+        strain, *of_bodies, _, _ = numbers
         x, y, _, angle = self.without.T
         elastic = Elastic(*of_bodies)
         lost = np.log(y / elastic_model().at(elastic, x).y)
-        return Plain(bool(strain), self.joint.friction, elastic, x, NODES[1], angle, lost)
+        leads = block_leads(numbers, flows(self.joint), x)
+        return Plain(bool(strain), self.joint.friction, elastic, x, NODES[1], angle, lost, leads)
 
     @property
     def way_changed(self) -> Array:
@@ -115,12 +119,17 @@ def changed_in(folder: Path) -> list[Changed]:
     return pairs
 
 
+def planes_of(joints: list[Changed]) -> list[str]:
+    """The planes in which ``joints`` were solved."""
+    return sorted({joint.joint.plane or "" for joint in joints})
+
+
 def fit_gain(joints: list[Changed]) -> dict[str, Array]:
-    """The coefficients of `PRODUCTS` ``(3, terms)`` by plane; each joint counts alike."""
+    """The coefficients of `Plain.terms` ``(3, N_TERMS)`` by plane; each joint counts alike."""
     found = {}
-    for plane in sorted({joint.plain.plane for joint in joints}):
-        rows = [np.eye(len(PRODUCTS)) / _LIKELY]
-        right = [np.zeros((len(PRODUCTS), 3))]
+    for plane in planes_of(joints):
+        rows = [np.eye(N_TERMS) / _LIKELY]
+        right = [np.zeros((N_TERMS, 3))]
         for joint in joints:
             plain = joint.plain
             if plain.plane == plane:
@@ -142,32 +151,52 @@ def predicted(joints: list[Changed]) -> Iterator[tuple[Changed, Array]]:
             yield joint, plain.scale(joint.kind) * (model[plain.plane] @ plain.terms())
 
 
-def errors_of(joints: list[Changed]) -> tuple[dict[str, float], Table]:
-    """The factors of the expected error by plane; and the errors from 0.1 to 2 dR, in per cent, of
+def errors_of(joints: list[Changed]) -> tuple[dict[str, list[float]], Table]:
+    """The numbers of the expected error by plane; and the errors from 0.1 to 2 dR, in per cent, of
     what friction or large strain does to joints that the others predict, beside the rms and the
     largest of what it does."""
     told = list(predicted(joints))
     factors = {}
     quantities = [f"{name}{what}" for name in ("P", "p0", "eps") for what in ("", ", error")]
     table = Table("plane", "joints", *quantities, "P inside", left=1)
-    for plane in ("strain", "stress"):
+    for plane in planes_of(joints):
         members = [(joint, said) for joint, said in told if joint.plain.plane == plane]
         added = np.concatenate([joint.added[:, joint.usual] for joint, _ in members], axis=1)
         said = np.concatenate([said[:, joint.usual] for joint, said in members], axis=1)
-        scale = np.concatenate([joint.plain.scale(joint.kind)[joint.usual] for joint, _ in members])
         off = said - added
-        factors[plane] = float(f"{np.quantile(np.abs(off[0]) / scale, _WITHIN):.3g}")
-        inside = np.abs(off[0]) <= factors[plane] * scale
+        plain = [joint.plain for joint, _ in members]
+        usual = [joint.usual for joint, _ in members]
+        kind = members[0][0].kind
+        scale = _joined([own.scale(kind) for own in plain], usual)
+        leading = _joined([np.abs(own.lost_to_leading) for own in plain], usual)
+        factors[plane] = _expected(np.abs(off[0]) / scale, leading)
+        expected = _joined([own.deviation(kind, factors[plane]) for own in plain], usual)
+        inside = np.abs(off[0]) <= expected
         cells = [rms_largest(100 * row) for pair in zip(added, off, strict=True) for row in pair]
         table.add(plane, len(members), *cells, f"{inside.mean():.0%}")
     return factors, table
+
+
+def _joined(values: list[Array], chosen: list[npt.NDArray[np.bool_]]) -> Array:
+    """The ``chosen`` values of all joints."""
+    return np.concatenate([own[at] for own, at in zip(values, chosen, strict=True)])
+
+
+def _expected(off: Array, leading: Array) -> list[float]:
+    """The numbers for `Plain.deviation` that errors ``off`` over the scale keep, where ``leading``
+    is lost to a block that leads."""
+    leads = leading > _LITTLE
+    usual = np.quantile(off[~leads], _WITHIN)
+    left = np.sqrt(np.maximum(off[leads] ** 2 - usual**2, 0.0)) / leading[leads]
+    more = np.quantile(left, _WITHIN) if leads.any() else 0.0
+    return [float(f"{value:.3g}") for value in (usual, more)]
 
 
 def back_factors(joints: list[Changed]) -> dict[str, float]:
     """The factors of the expected error on the way back by plane: the law lets P fall there as
     without friction or large strain."""
     factors = {}
-    for plane in ("strain", "stress"):
+    for plane in planes_of(joints):
         shares = []
         for joint in joints:
             plain = joint.plain
@@ -178,8 +207,10 @@ def back_factors(joints: list[Changed]) -> dict[str, float]:
 
 
 def store(kind: str, model: dict[str, Any]) -> None:
-    """Write the ``model`` of this ``kind`` beside this file, and use it from now on."""
-    table = json.loads(TABLE.read_text(encoding="utf-8")) | {kind: model}
+    """Write the ``model`` of this ``kind`` beside this file, and use it from now on. Of a plane
+    that it leaves out the numbers stay."""
+    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    table[kind] = {name: table[kind][name] | of_planes for name, of_planes in model.items()}
     TABLE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     factor_model.cache_clear()
 

@@ -6,9 +6,10 @@
 P_0 and eps are without them. ln of p0 and eps change likewise, each with a g of its own. Pressure
 on the sides of the hole hardly carries without friction. Its shear pushes the pin back: mu times a
 part of the force that grows with the semi-angle eps. g is a polynomial of the second degree in mu,
-eps, p, p m, q n (see elastic_model.py) and of what is lost to yielding, for each plane:
-factor_model.json, which factor_fit.py makes. Below the first node x_1 of the law friction adds
-nothing.
+eps, p, p m, q n (see elastic_model.py) and of what is lost to yielding, for each plane. In plane
+stress four terms follow for blocks that lead: of what is lost, times itself, and times ln of dR/R.
+factor_model.json has the coefficients, which factor_fit.py makes. Below the first node x_1 of the
+law friction adds nothing.
 """
 
 from __future__ import annotations
@@ -30,18 +31,21 @@ FRICTION = "friction"
 LARGE_STRAIN = "large strain"
 LARGEST = 0.3  # coefficient of friction that the law covers
 _N_INPUTS = 6
-# the products of inputs of which g is a sum
+_USUAL_CLEARANCE = 0.005  # over R
+# the products of inputs of which g is a sum, before the terms of blocks that lead
 PRODUCTS = [
     chosen
     for degree in range(3)
     for chosen in combinations_with_replacement(range(_N_INPUTS), degree)
 ]
+N_TERMS = len(PRODUCTS) + 4
 
 
 class Plain(NamedTuple):
     """A joint at ``x`` ``(k,)``, from ``first``, the first node of the law, on: its plane, its
     coefficient of ``friction``, its elastic numbers; and at small strain without friction its
-    semi-angle [rad] and ``ln(P/P_el)`` ``(k,)``."""
+    semi-angle [rad], ``ln(P/P_el)``, and how far the block leads (see `block_leads`), ``(k,)``
+    each."""
 
     strain: bool
     friction: float
@@ -50,6 +54,7 @@ class Plain(NamedTuple):
     first: float
     angle: Array
     lost: Array
+    leads: Array
 
     @property
     def plane(self) -> str:
@@ -63,8 +68,9 @@ class Plain(NamedTuple):
         return self.friction * self.angle * np.maximum(1 - self.first / self.x, 0.0)
 
     def terms(self) -> Array:
-        """The `PRODUCTS` ``(terms, k)`` of the inputs."""
-        p, m, n, _ = self.joint
+        """The terms ``(N_TERMS, k)`` of g: the `PRODUCTS` of the inputs, and those of a block that
+        leads."""
+        p, m, n, clearance = self.joint
         one = np.ones_like(self.x)
         inputs = np.stack(
             [
@@ -76,7 +82,23 @@ class Plain(NamedTuple):
                 self.lost,
             ]
         )
-        return np.stack([np.prod(inputs[list(chosen)], axis=0) for chosen in PRODUCTS])
+        products = [np.prod(inputs[list(chosen)], axis=0) for chosen in PRODUCTS]
+        by_clearance = np.log(clearance / _USUAL_CLEARANCE)
+        linear = self.lost_to_leading
+        squared = linear * self.lost
+        leading = [linear, squared, linear * by_clearance, squared * by_clearance]
+        return np.stack([*products, *leading])
+
+    @property
+    def lost_to_leading(self) -> Array:
+        """What is lost to a block that leads ``(k,)``."""
+        return self.leads * self.lost
+
+    def deviation(self, kind: str, errors: Sequence[float]) -> Array:
+        """The expected error of ``ln(P/P_0)`` ``(k,)`` by its ``errors``: over the `scale`, and
+        more of it for what is lost to a block that leads."""
+        usual, leading = errors
+        return self.scale(kind) * np.hypot(usual, leading * self.lost_to_leading)
 
 
 class Gain(NamedTuple):
@@ -111,7 +133,7 @@ def gain(plain: Plain, kind: str) -> Gain:
     force, peak, angle = scale * (table["gain"][plain.plane] @ plain.terms())
     return Gain(
         force,
-        table["error"][plain.plane] * scale,
+        plain.deviation(kind, table["error"][plain.plane]),
         peak,
         angle,
         table["back error"][plain.plane] * scale,
@@ -121,8 +143,8 @@ def gain(plain: Plain, kind: str) -> Gain:
 @cache
 def factor_model() -> dict[str, dict[str, Any]]:
     """The models of `FRICTION` and `LARGE_STRAIN` that come with archord, by plane: ``gain``, the
-    coefficients ``(3, terms)`` of `PRODUCTS` of P, p0 and eps; and ``error`` and ``back error``,
-    the factors on `Plain.scale` that 9 in 10 errors keep."""
+    coefficients ``(3, N_TERMS)`` of `Plain.terms` of P, p0 and eps; ``error``, two numbers for
+    `Plain.deviation`; and ``back error``, the factor on `Plain.scale`; 9 in 10 errors keep them."""
     table = json.loads(TABLE.read_text(encoding="utf-8"))
     for model in table.values():
         model["gain"] = {plane: np.array(values) for plane, values in model["gain"].items()}

@@ -23,6 +23,7 @@ from archord.postprocess.laws.general.factor_model import (
 )
 from archord.postprocess.laws.general.hardening_model import (
     Flows,
+    block_leads,
     flows,
     hardened_loss,
     largest_gain,
@@ -141,42 +142,52 @@ def law_of_numbers(
     """The law of a joint with these seven ``numbers`` (see `joint_numbers`) in units of dR, E* dR
     and E* dR/R, whose bodies harden as ``given``; a body that yields beyond the range is
     elastic. The coefficient of ``friction`` and ``large_strain`` add to it."""
-    strain, *of_bodies, pin, block = numbers
-    joint = Elastic(*of_bodies)
-    stresses = np.array([pin, block])
-    begins = first_yield(elastic_model(), bool(strain), joint, stresses)
-    stresses[ELASTIC_BELOW * begins >= NODES[-1]] = np.inf
+    numbers = within_range(numbers)
+    joint = Elastic(*numbers[1:5])
     lost = None
-    if np.isfinite(stresses).any():
-        lost = _lost(numbers, stresses, given)
+    if np.isfinite(numbers[5:]).any():
+        lost = _lost(numbers, given)
     kinds = [FRICTION] * bool(friction) + [LARGE_STRAIN] * large_strain
     if not kinds:
         return reduce_joint(joint, lost)
+    leads = block_leads(numbers, given, NODES[1:])
     added, of_elastic = (
         Gain.together([gain(plain, kind) for kind in kinds])
-        for plain in (_plain(bool(strain), friction, joint, own) for own in (lost, None))
+        for plain in (_plain(numbers, friction, leads, own) for own in (lost, None))
     )
     return reduce_joint(joint, lost, added, of_elastic)
 
 
-def _lost(numbers: Sequence[float], stresses: Array, given: Flows) -> Loss:
-    """What yielding at the ``stresses`` takes from a joint at the nodes."""
+def within_range(numbers: Sequence[float]) -> tuple[float, ...]:
+    """The ``numbers`` of a joint in which a body that yields beyond the range is elastic."""
+    strain, *of_bodies, pin, block = numbers
+    stresses = np.array([pin, block])
+    begins = first_yield(elastic_model(), bool(strain), Elastic(*of_bodies), stresses)
+    stresses[ELASTIC_BELOW * begins >= NODES[-1]] = np.inf
+    return (*numbers[:5], *stresses.tolist())
+
+
+def _lost(numbers: Sequence[float], given: Flows) -> Loss:
+    """What yielding takes from a joint at the nodes."""
     x = NODES[1:]
+    stresses = numbers[5:]
     hardens = [flow is not None and np.isfinite(s) for flow, s in zip(given, stresses, strict=True)]
     if any(hardens):
-        return hardened_loss([*numbers[:5], *stresses], given, x)
+        return hardened_loss(numbers, given, x)
     return loss(numbers, Yielding(*stresses), x)
 
 
-def _plain(strain: bool, friction: float, joint: Elastic, lost: Loss | None) -> Plain:
+def _plain(numbers: Sequence[float], friction: float, leads: Array, lost: Loss | None) -> Plain:
     """A joint at the nodes, which ``friction`` and large strain change."""
     x = NODES[1:]
+    strain, *of_bodies, _, _ = numbers
+    joint = Elastic(*of_bodies)
     angle = elastic_model().at(joint, x).angle
     fallen = np.zeros_like(x)
     if lost is not None:
         angle = angle * np.exp(lost.angle)
         fallen = lost.force
-    return Plain(strain, friction, joint, x, x[0], angle, fallen)
+    return Plain(bool(strain), friction, joint, x, x[0], angle, fallen, leads)
 
 
 def outside(joint: LawJoint) -> str:

@@ -72,6 +72,8 @@ _ALIKE = 0.5  # |ln| of the bodies' s, beyond which it does not matter which is 
 _SHARP = 0.12  # the same, within which the strain passes from one body to the other
 _NEARLY_ALIKE = 0.15  # the same, beyond which the curve of the weaker body alone tells of p0
 _TAKEN = 0.1  # of the rise of the pin's curve: ln of what it takes from the s of a stronger block
+_LEADS = 0.3  # part of the pin's s that the block's lacks, from which on the block leads
+_SPREADS = 0.07  # rise of the block's curve with which yielding spreads: e-fold less of it leads
 _LARGEST_GAIN = 0.6  # ln(s_eff/s) beyond which eps_rep does not depend on it
 _YIELDED = 0.02  # of P
 _PEAK_YIELDED = 0.1  # of p0
@@ -296,6 +298,20 @@ def rises_of(given: Flows, found: Strains) -> Array:
     for i, mean in mean_flows(given).items():
         rises[i] = curve_at(mean, found.strain[i]).rise
     return rises
+
+
+def block_leads(numbers: Sequence[float], given: Flows, x: Array) -> Array:
+    """How far a block that is weaker than the pin leads in plane stress at ``x`` ``(k,)``, from 0
+    to 1: then it yields in narrow bands where small strain leaves its thickness out. It leads less
+    where it hardens, as bands spread."""
+    strain, *_, block = numbers
+    if strain or np.isinf(block):
+        return np.zeros_like(x)
+    found = strains(tuple(numbers), tuple(given), tuple(x))
+    lacking = 1 - found.s[1] / found.s[0]
+    _, rise = rises_of(given, found)
+    leads: Array = np.clip(lacking / _LEADS, 0.0, 1.0) * np.exp(-rise / _SPREADS)
+    return leads
 
 
 def felt(numbers: Sequence[float], s: Array, rises: Array) -> Yielding:

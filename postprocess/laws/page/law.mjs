@@ -476,6 +476,8 @@ const BODIES = ["pin", "block"];
 const LITTLE = 1e-6; // of a difference quotient
 const WIDE = 3; // factor on a strain, up and down
 const LARGEST_GAIN = 0.6; // ln(s_eff/s) beyond which eps_rep does not depend on it
+const LEADS = 0.3; // part of the pin's s that the block's lacks, from which on the block leads
+const SPREADS = 0.07; // rise of the block's curve with which e-fold less of it leads
 const EARLIEST = 1.2; // x of first yield by s_eff over x, above which nothing has yielded
 const ALIKE = 0.5; // |ln| of the bodies' s, beyond which it does not matter which is weaker
 const SHARP = 0.12; // the same, within which the strain passes from one body to the other
@@ -598,8 +600,15 @@ function hardenedLoss(data, strain, elastic, begin, given, x) {
         const peak = state.peak + data.hardening.peak[plane] * rise * yielded(state.peak, 0.1);
         const deviation = Math.hypot(state.deviation, wrong);
         const wayError = Math.hypot(state.wayError, wrong);
-        return { ...state, slope: slopes[i] / x[i], deviation, peak, wayError };
+        const leads = blockLeads(strain, pin, block, rises[i][1]);
+        return { ...state, slope: slopes[i] / x[i], deviation, peak, wayError, leads };
     });
+}
+
+/** How far a block that is weaker than the pin leads in plane stress: less where its curve rises. */
+function blockLeads(strain, pin, block, rise) {
+    if (strain || block === Infinity) return 0;
+    return clip((1 - block / pin) / LEADS, 0, 1) * Math.exp(-rise / SPREADS);
 }
 
 /** How far a loss of P or p0 has got to where all of what hardening does is felt. */
@@ -721,7 +730,9 @@ export function generalLaw(data, joint) {
     let lost = null;
     if (flows.pin || flows.block) lost = hardenedLoss(data, numbers.strain, elastic, stresses, flows, x);
     else if (Math.min(stresses.pin, stresses.block) < Infinity) {
-        lost = lossOf(data, numbers.strain, elastic, x.map(() => stresses), x);
+        const leads = blockLeads(numbers.strain, stresses.pin, stresses.block, 0);
+        const states = lossOf(data, numbers.strain, elastic, x.map(() => stresses), x);
+        lost = states.map((state) => ({ ...state, leads }));
     }
     const [added, ofElastic] = [lost, null].map((own) => addedBy(data, joint, { elastic, lost: own }, x));
     const tables = reduced(elastic, lost, added, ofElastic);

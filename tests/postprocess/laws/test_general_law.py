@@ -29,6 +29,8 @@ from archord.postprocess.laws.general.general_law import (
     outside,
 )
 from archord.postprocess.laws.general.hardening_model import (
+    block_leads,
+    flows,
     hardened_loss,
     hardening_model,
     largest_gain,
@@ -149,17 +151,34 @@ def test_friction_adds_to_the_force(pin: LawJoint, friction: float, deepest: flo
 @given(joints())
 @settings(max_examples=25, deadline=None)
 def test_large_strain_changes_little(pin: LawJoint) -> None:
-    """P changes by a part of the size of delta/R, and by nothing at first touch; the error
+    """P changes by a part of the size of delta/R, and by nothing at first touch; by more where a
+    block leads in plane stress (a joint with dR/R = 0.11 % was solved with 11.3 delta/R); the error
     grows; with friction both change P."""
     small = general_law(pin)
     large = general_law(replace(pin, large_strain=True))
     x = X[X >= 0.02] * pin.clearance
     change = large.at(x).load / small.at(x).load - 1
-    assert (np.abs(change) <= 2 * x / pin.radius + 1e-12).all()
+    leads = block_leads(joint_numbers(pin), flows(pin), x / pin.clearance)
+    assert (np.abs(change) <= (2 + 10 * leads) * x / pin.radius + 1e-12).all()
     assert (large.at(x).error >= small.at(x).error * (1 + change) * (1 - 1e-12)).all()
     both = general_law(replace(pin, large_strain=True, friction=0.2)).at(x).load
     friction = general_law(replace(pin, friction=0.2)).at(x).load
     np.testing.assert_allclose(both, friction * (1 + change), rtol=0.02)
+
+
+def test_large_strain_counts_where_a_block_leads() -> None:
+    """As archord solves it on elements of 5 %R, to 0.5 % of P: P without it and with it."""
+    pin = LawJoint(1.0, 1.1e-3, 1.0, plane="stress", nu=0.3, pin_share=0.3, block_yield=2.64e-4)
+    for x, small, large in (
+        (1.0, 0.45255, 0.45704),
+        (2.0, 0.51605, 0.52951),
+        (3.0, 0.53463, 0.55492),
+    ):
+        of_small, of_large = (
+            general_law(replace(pin, large_strain=how)).at(x * pin.clearance).load / pin.clearance
+            for how in (False, True)
+        )
+        assert of_large / of_small == pytest.approx(large / small, rel=5e-3)
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
