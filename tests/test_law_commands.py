@@ -341,6 +341,28 @@ def test_options_beside_a_scene_change_the_scene(options, sets, tmp_path, capsys
     assert capsys.readouterr().out != outs[0][0]
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ([], "at 2 dR by about 5.7%: large strain has that"),
+        (["block.hardening=2000"], "at 2 dR by about 1.0%: large strain has that"),
+        (['analysis.strain="large"'], ""),
+        (["pin.yield_stress=300"], ""),
+        (['analysis.plane="strain"'], ""),
+        (["block.yield_stress=1e4"], ""),
+    ],
+)
+def test_a_block_that_thickens_is_told(changes, said, capsys):
+    """Where it yields in plane stress, its pin does not, and the law is of small strain."""
+    thin = ['analysis.plane="stress"', "pin.yield_stress=900", "block.yield_stress=300", *changes]
+    sets = [word for change in thin for word in ("--set", change)]
+    steel_pin = str(Path(SCENE).with_name("steel_pin.toml"))
+    assert run(["law", "archord", "--scene", steel_pin, "--points", "1", *sets]) == 0
+    warned = capsys.readouterr().err
+    assert said in warned
+    assert ("thickens" in warned) == bool(said)
+
+
 def test_fixed_pairs_of_points_are_told(capsys):
     """By the law of solved joints alone: their pairs follow the deformed curves."""
     words = ["law", "archord", "paper", "--scene", ELASTIC, "--points", "1"]

@@ -205,6 +205,8 @@ class Law:
                 "of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, 1.6 % "
                 "at 2 %"
             )
+        if self.solved:
+            said += joint.small_strain
         if joint.fixed_pairs and self.solved:
             said.append(FIXED_PAIRS)
         for kind in said:

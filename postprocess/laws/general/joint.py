@@ -26,6 +26,10 @@ FIXED_PAIRS = (
 )
 
 
+_LEADS = 0.7  # yield stress of a block that leads over its pin's, at most
+_LATEST = 1.3  # s of a block that yields before 3 dR
+
+
 class LawRangeWarning(UserWarning):
     """A law was asked outside its range; the message tells the range."""
 
@@ -265,6 +269,24 @@ class LawJoint:
                 "yield 10 %"
             )
         return said
+
+    @property
+    def small_strain(self) -> list[str]:
+        """What small strain leaves out where that is much, in words that follow "is a law": in
+        plane stress a block thickens where it yields and its pin hardly does (`docs/law.md`)."""
+        pin = self.pin_yield or math.inf
+        block = self.block_yield or math.inf
+        leads = self.plane == "stress" and block < min(
+            _LEADS * pin, _LATEST * self.unit / self.radius
+        )
+        if self.large_strain or not leads:
+            return []
+        clearance = self.clearance / self.radius
+        over_displacement = 1.0 if self.block_hardening else 0.4 / math.sqrt(clearance)
+        return [
+            "of small strain; where the block yields it thickens, and P is higher, at 2 dR by "
+            f"about {2 * clearance * over_displacement:.1%}: large strain has that"
+        ]
 
     @property
     def onset(self) -> float:

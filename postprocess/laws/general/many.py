@@ -124,11 +124,12 @@ def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:
     law's."""
     first: dict[str, str] = {}
     for row, given in enumerate(rows):
-        if not any(name in _OTHERS and value for name, value in given):
+        is_thin = ("plane", "stress") in given
+        if not (is_thin or any(name in _OTHERS and value for name, value in given)):
             continue
         with suppress(TypeError, ValueError):  # its row tells why it is no joint
             joint = LawJoint(**dict(given))
-            said = joint.other_shapes
+            said = [*joint.other_shapes, *joint.small_strain]
             if joint.fixed_pairs:
                 said.append(FIXED_PAIRS)
             for what in said:
