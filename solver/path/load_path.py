@@ -61,12 +61,11 @@ class LoadPath:
     if absent.
 
     The guess for a step extrapolates the last increment; where that fails elastic bodies start from
-    the last state itself, as bodies that can yield do where they turn back. Where the path starts
-    or turns, or another drive takes over, the guess comes from the elastic solution, at the start
-    from ``first_guess(load)``. The increment from a state without equilibrium (a press fit), or of
-    loose bodies, says nothing about the next. Where there is a ``coarse`` start, what a coarser
-    mesh found comes first, unless bodies yield and extrapolation leaves a residual of the same size
-    or less.
+    the last state itself. Where the path starts or turns, or another drive takes over, the guess
+    comes from the elastic solution, at the start from ``first_guess(load)``. The increment from a
+    state without equilibrium (a press fit), or of loose bodies, says nothing about the next. Where
+    there is a ``coarse`` start, what a coarser mesh found comes first, unless bodies yield and
+    extrapolation leaves a residual of the same size or less.
     """
 
     def __init__(
@@ -119,17 +118,13 @@ class LoadPath:
         if ratio is None:
             yield self.state, True
             return
-        plastic = self.equilibrium.bulk.plastic
-        turns = ratio < 0
         # bodies that can yield unload elastically, or nearly so
-        goes_back = turns or (self.at.unloads and plastic)
-        # what yielded and slid in the last step does not come back
-        stays = plastic and not self.at.unloads
-        if abs(ratio) > _PREDICTOR_LIMIT or (turns and stays):
+        goes_back = ratio < 0 or (self.at.unloads and self.equilibrium.bulk.plastic)
+        if abs(ratio) > _PREDICTOR_LIMIT:
             yield self.state, goes_back
             return
         yield self.state + self.at.increment * ratio, goes_back
-        if not goes_back and not plastic:
+        if not goes_back and not self.equilibrium.bulk.plastic:
             # an extrapolated state has a kink where the contact ended, which fine meshes resolve
             yield self.state, True
 
