@@ -27,9 +27,9 @@ def revolved(sketch: Sketch, quarters: int) -> TaggedMesh:
 
 
 def of_quadrilaterals(sketch: Sketch) -> TaggedMesh:
-    """The ``sketch`` in its plane. Collective."""
+    """The ``sketch`` in its plane, whole on every rank."""
     circles = [*sketch.circles.values()]
-    return gmsh_to_mesh(MPI.COMM_WORLD, partial(_draw_flat, sketch), circles, quads=True)
+    return gmsh_to_mesh(MPI.COMM_SELF, partial(_draw_flat, sketch), circles, quads=True)
 
 
 def _draw_faces(sketch: Sketch, gmsh: Any) -> dict[str, list[int]]:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from archord.materials.elasticity import contact_modulus
+from archord.materials.thickening import block_thickens, error_of_small_strain
 from archord.report.errors import InputError
 from archord.scene.presets.joint_geometry import JointGeometry
 from archord.scene.presets.preset import general_scene, require_solid
@@ -32,7 +33,6 @@ _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
 _SECONDS = {False: 1.7e-5, True: 2.8e-5}  # per dof of an elastic and of a plastic output step
 _LINEAR = 3e4  # dofs up to which a step costs in proportion to them
 _FAR = 0.1  # displacement over R beyond which small strain may be qualitatively wrong
-_LEADS = 0.7  # yield stress of a block that leads over its pin's, at most
 _STIFFEST = 1.6  # P over E* delta of no joint in a block: 1.53 where the clearance vanishes
 _STIFFEST_STUCK = (
     3.5  # the same with friction: 2.2 with a coefficient of 1, 3.15 where nothing slides
@@ -288,21 +288,18 @@ class Scene(Checked):
     def too_low(self) -> float:
         """By what part of itself P of small strain is about too low, over delta/R: of elastic
         joints 0.15 to 0.17, of yielding ones 0.2 to 0.8, of dR/R from 0.5 to 5 % and delta up to
-        R/10; of those whose block leads 4 to 11 without hardening (dR/R from 1.1 to 0.1 %), 0.3 to
-        2.5 with it."""
-        if self._block_leads:
-            free = 0.4 / math.sqrt(self.joint.dR / self.joint.radius)
-            return free if self.block.perfectly_plastic else 1.0
+        R/10; more of those whose block thickens."""
+        if self._block_thickens:
+            clearance = self.joint.dR / self.joint.radius
+            return error_of_small_strain(clearance, hardens=not self.block.perfectly_plastic)
         return 0.4 if self.plastic else 0.16
 
     @property
-    def _block_leads(self) -> bool:
-        """Whether in plane stress the block yields and its pin hardly does: small strain leaves out
-        that the block thickens where it yields."""
-        is_thin = self.analysis.plane == "stress" and self.space is None
-        pin = self.pin.yield_stress or math.inf
-        block = self.block.yield_stress or math.inf
-        return is_thin and block < _LEADS * pin
+    def _block_thickens(self) -> bool:
+        """Whether small strain leaves out that the block thickens; of rings that is not known."""
+        if self.space is not None or self.joint.is_ring:
+            return False
+        return block_thickens(self.analysis.plane, self.pin.yield_stress, self.block.yield_stress)
 
     @property
     def small(self) -> float:

@@ -238,6 +238,23 @@ def test_a_block_that_yields_in_plane_stress_needs_large_strain_early():
     assert "about 1.3 % too low" in said
 
 
+@pytest.mark.parametrize("clearance", [0.05, -0.02])
+def test_a_ring_in_plane_stress_is_told_nothing_of_thickening(clearance):
+    """Of rings it is not known; their clearance may be negative."""
+    steel = {"E": 210000.0, "nu": 0.3}
+    ring = parse_scene(
+        {
+            "joint": {"model": "ring", "radius": 10.0, "clearance": clearance, "block_size": 20.0},
+            "pin": steel,
+            "block": steel | {"yield_stress": 300.0},
+            "analysis": {"plane": "stress"},
+            "load": {"force": 100.0},
+        }
+    )
+    assert ring.too_low == 0.4
+    assert ring.doubts_of_strain == []
+
+
 def test_a_yield_stress_in_another_unit_than_the_modulus_is_doubted():
     """Which no body reaches: GPa beside MPa."""
     data = basic()

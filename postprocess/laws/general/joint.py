@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.materials.elasticity import contact_modulus
+from archord.materials.thickening import block_thickens, error_of_small_strain
 
 if TYPE_CHECKING:
     from archord.materials.hardening import Hardening
@@ -26,7 +27,6 @@ FIXED_PAIRS = (
 )
 
 
-_LEADS = 0.7  # yield stress of a block that leads over its pin's, at most
 _LATEST = 1.3  # s of a block that yields before 3 dR
 
 
@@ -271,21 +271,26 @@ class LawJoint:
         return said
 
     @property
-    def small_strain(self) -> list[str]:
-        """What small strain leaves out where that is much, in words that follow "is a law": in
-        plane stress a block thickens where it yields and its pin hardly does (`docs/law.md`)."""
-        pin = self.pin_yield or math.inf
-        block = self.block_yield or math.inf
-        leads = self.plane == "stress" and block < min(
-            _LEADS * pin, _LATEST * self.unit / self.radius
-        )
-        if self.large_strain or not leads:
-            return []
+    def missed_by_small_strain(self) -> float:
+        """The part of P by which it is too low at 2 dR, about, where a block thickens (see
+        materials/thickening.py); 0 otherwise, and at large strain."""
+        thickens = block_thickens(self.plane, self.pin_yield, self.block_yield)
+        latest = _LATEST * self.unit / self.radius
+        if self.large_strain or not thickens or (self.block_yield or 0.0) > latest:
+            return 0.0
         clearance = self.clearance / self.radius
-        over_displacement = 1.0 if self.block_hardening else 0.4 / math.sqrt(clearance)
+        hardens = self.block_hardening is not None
+        return 2 * clearance * error_of_small_strain(clearance, hardens=hardens)
+
+    @property
+    def small_strain(self) -> list[str]:
+        """What small strain leaves out where that is much, in words that follow "is a law"."""
+        missed = self.missed_by_small_strain
+        if not missed:
+            return []
         return [
             "of small strain; where the block yields it thickens, and P is higher, at 2 dR by "
-            f"about {2 * clearance * over_displacement:.1%}: large strain has that"
+            f"about {missed:.1%}: large strain has that"
         ]
 
     @property

@@ -685,6 +685,17 @@ function numbersOf(joint) {
     return { strain, p, m: p ? m : 0, n, clearance: joint.clearance / joint.radius, pin, block, unit };
 }
 
+/** The part of P by which small strain is too low at 2 dR, about, where a block thickens; else 0: thickening.py. */
+export function missedBySmallStrain(joint) {
+    const { plane, large_strain, clearance, radius, E_star, block_hardening } = joint;
+    const pin = joint.pin_yield ?? Infinity;
+    const block = joint.block_yield ?? Infinity;
+    const ratio = clearance / radius;
+    const thickens = plane === "stress" && block < 0.7 * pin && block <= 1.3 * E_star * ratio;
+    if (large_strain || !thickens) return 0;
+    return 2 * ratio * (block_hardening ? 1 : 0.4 / Math.sqrt(Math.max(ratio, 1e-3)));
+}
+
 /** What puts a joint outside the range of the law: parameter, value and range; empty inside. */
 export function outside(data, joint) {
     const { nu: ofNu, clearances, ratios, smallest, friction } = data.range;

@@ -2,7 +2,7 @@
 
 import { exportLaw } from "./exports.mjs";
 import { fitOf } from "./fits.mjs";
-import { generalLaw, inDigits, inflated, jointOf, lawData } from "./law.mjs";
+import { generalLaw, inDigits, inflated, jointOf, lawData, missedBySmallStrain } from "./law.mjs";
 
 const $ = (id) => document.getElementById(id);
 const POINTS = 300; // of a curve
@@ -141,10 +141,18 @@ function warn() {
     const plastic = ["pin", "block"].filter((body) => {
         return $(`${body}-metal`).value in data.metals && $(`${body}-flow`).value === "perfect";
     });
-    $("warned").hidden = !shown || plastic.length === 0;
-    $("warned").textContent =
-        `Taken as perfectly plastic at the listed yield stress: ${plastic.join(" and ")}. ` +
-        "The metals harden, so that beyond first yield the force is higher.";
+    const said = [];
+    if (plastic.length) {
+        said.push(`Taken as perfectly plastic at the listed yield stress: ${plastic.join(" and ")}.`);
+        said.push("The metals harden, so that beyond first yield the force is higher.");
+    }
+    const missed = shown ? missedBySmallStrain(shown.joint) : 0;
+    if (missed) {
+        said.push("Small strain leaves out that the block thickens where it yields.");
+        said.push(`At 2 dR the force is about ${inDigits(100 * missed, 2)} % higher: choose large strain.`);
+    }
+    $("warned").hidden = !shown || said.length === 0;
+    $("warned").textContent = said.join(" ");
 }
 
 // --- what is read off

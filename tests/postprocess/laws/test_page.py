@@ -29,7 +29,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "law.html"
 PEEQ = (0.0, 0.004, 0.03, 0.2)  # of the points of a hardening curve
 CLIENT = """
 import { readFileSync } from "node:fs";
-import { generalLaw, lawData } from "HERE/law.mjs";
+import { generalLaw, lawData, missedBySmallStrain } from "HERE/law.mjs";
 import { exportLaw } from "HERE/exports.mjs";
 import { fitOf } from "HERE/fits.mjs";
 const { cases, fits } = JSON.parse(readFileSync("asked.json", "utf8"));
@@ -44,7 +44,7 @@ function told({ joint, places, suffixes, about }) {
         });
         const sizes = { radius: joint.radius, length: 7 };
         const text = (suffix) => exportLaw(data, law, about, suffix, "a_law", sizes);
-        return { at, texts: suffixes.map(text) };
+        return { at, texts: suffixes.map(text), missed: missedBySmallStrain(joint) };
     } catch (error) {
         return { refused: error.message };
     }
@@ -137,15 +137,20 @@ def crossing_joints() -> list[dict[str, Any]]:
     return joints
 
 
-def law_or_reason(given: dict[str, Any]) -> JointCurve | str:
-    """The law of a joint, whose hardening is points, or the sentence that refuses it."""
+def joint_of(given: dict[str, Any]) -> LawJoint:
+    """A joint whose hardening is ``given`` as points."""
     curves = {
         name: TabularHardening(tuple((peeq, stress) for peeq, stress in points))
         for name, points in given.items()
         if name.endswith("hardening")
     }
+    return LawJoint(**given | curves)
+
+
+def law_or_reason(given: dict[str, Any]) -> JointCurve | str:
+    """The law of a joint, or the sentence that refuses it."""
     try:
-        return general_law(LawJoint(**given | curves))
+        return general_law(joint_of(given))
     except ValueError as error:
         return str(error)
 
@@ -175,6 +180,7 @@ def test_javascript_says_what_python_says(tmp_path):
         places[:10, 1] = 0.0
         cases.append(case(joint, places.tolist()))
     refused = 0
+    thickened = 0
     for asked, said in zip(cases, in_javascript(tmp_path, cases)["laws"], strict=True):
         delta, deepest = np.array(asked["places"]).T
         law = law_or_reason(asked["joint"])
@@ -182,6 +188,9 @@ def test_javascript_says_what_python_says(tmp_path):
             assert said == {"refused": law}
             refused += 1
             continue
+        missed = joint_of(asked["joint"]).missed_by_small_strain
+        thickened += missed > 0
+        assert said["missed"] == pytest.approx(missed, rel=1e-12)
         state = law.at(delta, deepest)
         told = np.array([*state, law.residual(deepest), law.displacement(state.load)])
         found = np.array(said["at"], float).T
@@ -194,6 +203,7 @@ def test_javascript_says_what_python_says(tmp_path):
         assert first.max() < (5e-11 if law.yields else 1e-12)
         assert off.max() < (1e-9 if law.yields else 1e-12)
     assert 0 < refused < 15
+    assert thickened > 0
 
 
 def test_a_body_that_hardens_too_much_is_refused_in_the_words_of_python(tmp_path):
