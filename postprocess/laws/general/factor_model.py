@@ -32,7 +32,7 @@ LARGE_STRAIN = "large strain"
 LARGEST = 0.3  # coefficient of friction that the law covers
 _N_INPUTS = 6
 _USUAL_CLEARANCE = 0.005  # over R
-# the products of inputs of which g is a sum, before the terms of blocks that lead
+# the products of inputs that g adds up, before the terms of blocks that lead
 PRODUCTS = [
     chosen
     for degree in range(3)
@@ -68,8 +68,8 @@ class Plain(NamedTuple):
         return self.friction * self.angle * np.maximum(1 - self.first / self.x, 0.0)
 
     def terms(self) -> Array:
-        """The terms ``(N_TERMS, k)`` of g: the `PRODUCTS` of the inputs, and those of a block that
-        leads."""
+        """The terms ``(N_TERMS, k)`` of g: the `PRODUCTS` of the inputs, then four terms of a block
+        that leads."""
         p, m, n, clearance = self.joint
         one = np.ones_like(self.x)
         inputs = np.stack(
