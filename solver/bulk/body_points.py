@@ -11,7 +11,8 @@ from dolfinx import fem
 from archord.geometry.basis import Array, cell_basis
 from archord.geometry.strain import PointStrain
 from archord.materials.kinematics import Kinematics
-from archord.materials.material import Material, Points
+from archord.materials.material import Material, Points, of_small_strain
+from archord.report.errors import InputError
 
 
 class PointFields(NamedTuple):
@@ -61,6 +62,7 @@ class BodyPoints:
         basis = cell_basis(V.mesh, V.element.basix_element.degree, cells, X)
         large = material.finite
         self.cells = cells
+        self.kinematics = kinematics
         self.point = basis.point
         self.weight = basis.measure * w * kinematics.measure(basis.point)
         self.measure = PointStrain(kinematics, basis, V.dofmap.list[cells], large=large)
@@ -99,16 +101,23 @@ class BodyPoints:
         material = self.points.material
         weight = self.weight.ravel()
         stored = material.stored(self.strain.copy(), self.stress.copy(), self.points.told())
+        stored = np.broadcast_to(stored, weight.shape)
         dissipated = np.broadcast_to(material.dissipation(self.points.told()), weight.shape)
         return float(weight @ stored), float(weight @ dissipated)
 
     def fields(self) -> PointFields:
-        """The fields at the last update."""
+        """The fields at the last update. Raises `InputError` for tensors of other shapes."""
         shape = self.weight.shape
         trial = self.points.told()
         strain_and_stress = self.strain.copy(), self.stress.copy()
         stress = self.points.material.true_stress(*strain_and_stress, self.points.told())
         plastic_strain = getattr(trial, "plastic_strain", np.zeros_like(stress))
+        wanted = self.weight.size, self.kinematics.n_stress
+        for name, tensor in (("true_stress", stress), ("state.plastic_strain", plastic_strain)):
+            if np.shape(tensor) != wanted:
+                kind = type(of_small_strain(self.points.material)).__name__
+                said = f"must have the shape {wanted}, not {np.shape(tensor)}"
+                raise InputError(f"archord.solve: {kind}.{name} {said}.")
         return PointFields(
             self.cells,
             self.point,

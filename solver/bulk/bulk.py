@@ -219,10 +219,9 @@ def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:
     strains = [[3.0, -1.0, 4.0, 2.0, -3.0, 1.0], [-20.0, 5.0, 7.0, 10.0, 8.0, -6.0]]
     probe = 1e-3 * np.array(strains)[:, working]
     if material.finite:
-        n_stress = len(kinematics.gradient)
-        _check_answers(material, 1e-3 * np.eye(2, n_stress), n_stress)
+        _check_answers(material, 1e-3 * np.eye(2, len(kinematics.gradient)), kinematics)
     else:
-        _check_answers(material, probe, kinematics.n_stress)
+        _check_answers(material, probe, kinematics)
     if material.yields or material.finite:
         return
     expected = probe @ C
@@ -233,31 +232,46 @@ def _check_elastic_tangent(material: Material, kinematics: Kinematics) -> None:
         )
 
 
-def _check_answers(material: Material, probe: Array, n_stress: int) -> None:
+def _check_answers(material: Material, probe: Array, kinematics: Kinematics) -> None:
     """Raise ValueError for answers of a ``material`` that would be read wrongly: of other shapes or
     types, or in arrays that later answers, as at the strain ``probe`` ``(2, k)``, change."""
     state = material.state(2)
+    name = type(material).__name__
 
     def answer_at(strain: Array) -> tuple[Array, Array, Any]:
         return material.update(strain.copy(), deepcopy(state))
 
     at_rest = np.zeros_like(probe)
-    stress, tangent, _ = answer_at(at_rest)
-    shape = (2, n_stress)
+    stress, tangent, new = answer_at(at_rest)
+    k = probe.shape[1]
+    shape = (2, k if material.finite else kinematics.n_stress)
     found = np.asarray(stress)
     if found.shape != shape or found.dtype != float:
         raise ValueError(
-            f"update of a material must give float64 stresses of the shape {shape} at 2 points, "
+            f"{name}.update must give float64 stresses of the shape {shape} at 2 points, "
             f"not {found.dtype} of the shape {found.shape}"
         )
-    k = probe.shape[1]
     if np.shape(tangent) != (2, k, k):
         raise ValueError(
-            f"update of a material must give tangents of the shape {(2, k, k)} at 2 points, not "
+            f"{name}.update must give tangents of the shape {(2, k, k)} at 2 points, not "
             f"{np.shape(tangent)}"
         )
     if overwrites(answer_at, [at_rest], [probe]):
         raise ValueError(
-            "update of a material must give new arrays, and not write into arrays that it gave "
-            "before"
+            f"{name}.update must give new arrays, and not write into arrays that it gave before"
         )
+    of_new = at_rest.copy(), np.array(stress), deepcopy(new)
+    told = {
+        "flows": material.flows(deepcopy(state), deepcopy(new)),
+        "peeq": material.peeq(deepcopy(new)),
+        "dissipation": material.dissipation(deepcopy(new)),
+    }
+    if material.yields or material.finite:
+        told["stored"] = material.stored(*of_new)
+    for method, answer in told.items():
+        found = np.asarray(answer)
+        if found.shape not in ((), (2,)) or found.dtype == object:
+            raise ValueError(
+                f"{name}.{method} must give numbers of the shape (2,) at 2 points, not "
+                f"{found.dtype} of the shape {found.shape}"
+            )

@@ -215,7 +215,7 @@ class FlatSteel(OfSteel):
 @pytest.mark.parametrize(
     ("material", "said"),
     [
-        (BufferedSteel, "must give new arrays"),
+        (BufferedSteel, "BufferedSteel.update must give new arrays"),
         (SingleSteel, "must give float64 stresses"),
         (FlatSteel, r"must give tangents of the shape \(2, 3, 3\) at 2 points, not \(2, 9\)"),
     ],
@@ -224,6 +224,39 @@ def test_arrays_of_a_material_are_told_of(material, said):
     """With one history for all answers PEEQ was half as large again."""
     with pytest.raises(ValueError, match=said):
         archord.System(slab(bodies=[archord.Body("slab", material())]))
+
+
+@pytest.mark.parametrize("method", ["flows", "peeq", "dissipation", "energy", "stored"])
+@pytest.mark.parametrize("strain", ["small", "large"])
+@pytest.mark.parametrize("answer", [np.zeros((2, 1)), np.zeros(3), None])
+def test_what_a_material_tells_is_of_each_point(tmp_path, method, strain, answer):
+    """They ended in tracebacks, or counted each point with every other one."""
+    material = type("Odd", (OfSteel,), {method: lambda *given: answer})()
+    problem = slab(bodies=[archord.Body("slab", material)], strain=strain)
+    told = "stored" if method == "energy" else method
+    said = rf"Odd\.{told} must give numbers of the shape \(2,\) at 2 points, not .* of the shape"
+    with pytest.raises(archord.InputError, match=said):
+        archord.solve(problem, tmp_path / "run")
+
+
+class ScalarStrain(OfSteel):
+    """Its history has one plastic strain for all components."""
+
+    def state(self, n):
+        return replace(self.inner.state(n), plastic_strain=np.zeros(n))
+
+    def update(self, strain, state):
+        stress, tangent, _ = self.inner.update(strain, self.inner.state(len(strain)))
+        return stress, tangent, state
+
+
+def test_tensors_of_fields_have_all_components(tmp_path):
+    problem = slab(bodies=[archord.Body("slab", ScalarStrain())], steps=1)
+    said = r"ScalarStrain\.state\.plastic_strain must have the shape \(\d+, 4\), not \(\d+,\)"
+    with pytest.raises(archord.InputError, match=said):
+        archord.solve(problem, tmp_path / "run")
+    problem = slab(bodies=[archord.Body("slab", ScalarStrain())], steps=1)
+    assert archord.solve(problem, tmp_path / "run", fields=False).status == "done"
 
 
 class InPercent(OfSteel):
