@@ -11,6 +11,7 @@ import numpy as np
 from archord.geometry.vectors import unit
 from archord.materials.material import Array
 from archord.measures.edge import PatchProfile
+from archord.report.errors import InputError, is_number, require_of, shown
 
 ORIGIN = (0.0, 0.0, 0.0)
 ALONG_Z = (0.0, 0.0, 1.0)
@@ -21,10 +22,19 @@ _NORMAL = 1 - 1e-9  # cosine of an axis that is normal to a plane
 @dataclass(frozen=True)
 class Axis:
     """A straight line through a ``point`` along a ``direction``. Angles about it count from the
-    first of x, y and z that is not along it."""
+    first of x, y and z that is not along it. Raises `InputError` for what is no line."""
 
     point: Sequence[float] = ORIGIN
     direction: Sequence[float] = ALONG_Z
+
+    def __post_init__(self) -> None:
+        """Check both; raise `InputError`."""
+        for name in ("point", "direction"):
+            given = getattr(self, name)
+            is_vector = np.shape(given) == (3,) and all(map(is_number, given))
+            require_of(self, is_vector, name, "must be three numbers, x, y and z")
+        has_length = 0 < np.linalg.norm(self.direction) < np.inf
+        require_of(self, bool(has_length), "direction", "must have a length, and not be zero")
 
     def cylindrical(self, x: Array) -> tuple[Array, Array, Array]:
         """Radius, angle in degrees and place along the axis ``(...)`` of the points ``x``
@@ -122,7 +132,7 @@ def line_load(
     """The load of an interaction with these ``profiles`` along an ``axis``. Their ``shares`` are
     negative where the force on the surface is opposite, and count the images in ``mirrors``, each
     number and place on one of x, y and z. A piece of a facet has its force spread evenly over the
-    length of the facet."""
+    length of the facet. Raises `InputError` for places ``along`` the axis that do not rise."""
     low = []
     high = []
     force = []
@@ -144,7 +154,12 @@ def line_load(
     begin = np.concatenate(low)[:, None]
     end = np.concatenate(high)[:, None]
     evenly = np.linspace(begin.min(), end.max(), _PIECES + 1)
-    edges = evenly if along is None else np.array(along)
+    edges = evenly if along is None else np.atleast_1d(along)
+    rises = len(edges) > 1 and all(map(is_number, edges)) and bool((np.diff(edges) > 0).all())
+    if not rises:
+        raise InputError(
+            f"line_load: along = {shown(along)} must be two numbers or more that rise."
+        )
     behind = (edges - begin) / np.maximum(end - begin, np.finfo(float).tiny)
     parts = np.diff(np.clip(behind, 0.0, 1.0), axis=1)
     return LineLoad(edges, parts.T @ np.concatenate(force) / np.diff(edges)[:, None])

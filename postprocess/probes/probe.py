@@ -134,7 +134,7 @@ class Probe:
                 "divide by the mean stress of the section's area."
             )
         force, by = self._chosen(of)
-        if not (force and length > 0):
+        if not (force and 0 < length < np.inf):
             section = f"a section of {length:g} under a force of {force:g}"
             raise InputError(f"{self.place}: has no factor over {section}.")
         return replace(

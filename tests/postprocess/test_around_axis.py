@@ -7,6 +7,7 @@ import pytest
 
 from archord.measures.edge import PatchProfile
 from archord.postprocess.around_axis import Axis, line_load, unrolled
+from archord.report.errors import InputError
 
 R = 2.0
 N = 12  # facets around
@@ -88,6 +89,30 @@ def test_a_cosine_pressure_has_the_line_load_of_the_handbook():
     fine = line_load([profile], [1.0], axis)
     assert len(fine.load) == 40
     np.testing.assert_allclose(np.diff(fine.along) @ fine.load, force, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"direction": (0, 0, 0)}, r"direction = \[0, 0, 0\] must have a length"),
+        ({"direction": np.full(3, 1e-200)}, "direction = .* must have a length"),
+        ({"direction": (0, 0, np.inf)}, "direction = .* must be three numbers"),
+        ({"direction": "z"}, "direction = .* must be three numbers"),
+        ({"point": (0, 0)}, "point = .* must be three numbers"),
+    ],
+)
+def test_an_axis_has_a_place_and_a_direction(given, said):
+    """A direction without a length ended in a traceback."""
+    with pytest.raises(InputError, match=rf"archord\.Axis: {said}"):
+        Axis(**given)
+
+
+@pytest.mark.parametrize("along", [[0.0, 1.0, 1.0], [1.0, 0.0], [0.5], 1.0, [0.0, np.nan], ["a"]])
+def test_places_along_an_axis_rise(along):
+    """Pieces without a length had loads that are no numbers, and backward ones their negative."""
+    profile = cylinder(lambda angle, along: 5.0 * np.cos(angle))
+    with pytest.raises(InputError, match=r"line_load: along = .* must be two numbers or more"):
+        line_load([profile], [1.0], Axis(POINT, DIRECTION), along)
 
 
 def test_the_largest_pressure_is_the_mean_of_a_facet():

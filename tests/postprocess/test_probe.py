@@ -128,6 +128,8 @@ def test_before_the_first_touch_there_is_nothing_to_see_and_nothing_breaks(
     assert "has no factor over a section of 20 under a force of 0" in refused(
         [*asked, "--over", "20"]
     )
+    with pytest.raises(archord.InputError, match="no factor over a section of inf under"):
+        run.probe("hole").over(np.inf)
     assert command(["compare", *2 * [str(run.folder)], "-o", str(tmp_path / "compare.png")]) == 0
     assert command(["show", str(run.folder), "-o", str(tmp_path / "show.png")]) == 0
 
