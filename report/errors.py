@@ -30,7 +30,8 @@ class InputError(ValueError):
 
 
 def in_sentences(cls: type) -> Any:
-    """Let a call of ``cls`` with wrong arguments raise `InputError`, a sentence."""
+    """Let a call of ``cls`` with wrong arguments raise `InputError`, a sentence; and let its objects
+    have arguments of their own: arrays, lists and dictionaries may be changed later."""
     build = cls.__init__  # type: ignore[misc]
     signature = inspect.signature(build)
     known = ", ".join([*signature.parameters][1:])
@@ -42,10 +43,20 @@ def in_sentences(cls: type) -> Any:
         except TypeError as error:
             said = f"{error}; its arguments are {known}"
             raise InputError(f"archord.{cls.__name__}: {said}.") from None
-        build(self, *values, **keys)
+        build(self, *_copied(values), **_copied(keys))
 
     cls.__init__ = checked  # type: ignore[misc]
     return cls
+
+
+def _copied(value: Any) -> Any:
+    """``value`` with copies of the arrays, lists and dictionaries in it."""
+    if type(value) in (list, tuple):
+        return type(value)(map(_copied, value))
+    if type(value) is dict:
+        return {key: _copied(of_key) for key, of_key in value.items()}
+    is_array = type(value).__module__ == "numpy" and hasattr(value, "shape")
+    return value.copy() if is_array else value
 
 
 def shown(value: Any) -> str:

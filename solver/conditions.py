@@ -10,11 +10,13 @@ from typing import Literal
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.report.errors import in_sentences
 
 Vector = Sequence[float] | Array  # (d,)
 Control = Literal["displacement", "force"]
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Drive:
     """A displacement or a force along the path, which moves sets and discs or multiplies loads.
@@ -67,6 +69,7 @@ class Dirichlet:
         return callable(self.rate) or self.rate != 0
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Turn:
     """A finite rotation in space of what the Dirichlet conditions of a ``name`` turn linearly.
@@ -81,6 +84,7 @@ class Turn:
     drives: Sequence[str]
 
 
+@in_sentences
 @dataclass(frozen=True)
 class DeadLoad:
     """A dead load on the cells or the facets of a set, times the value of the ``drive``.
@@ -107,6 +111,7 @@ class DeadLoad:
             )
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Mean:
     """The mean motion of a facet set: the motion of a reference ``point`` along an ``axis``, or its

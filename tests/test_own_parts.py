@@ -16,8 +16,11 @@ from archord.commands.progress import Progress
 from archord.materials.kinematics import Kinematics
 from archord.materials.material import Points
 from archord.output import run as run_module
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.run_steps import read_steps
 from archord.presets.words import words_of
+from archord.solver.conditions import DeadLoad, Drive, Mean, Turn
+from archord.solver.contact.interaction import Rigid
 
 Worn = make_dataclass("Worn", ["depth"])
 
@@ -318,6 +321,49 @@ def test_arrays_of_parts_may_be_changed_after_their_use():
     assert hardening.points == ((0.0, 200.0), (0.1, 300.0))
     assert metal.back_stresses == ((2e4, 50.0),)
     assert load.stages == (0.1, 0.2)
+
+
+PARTS = {
+    "load": lambda value: archord.Load("pull", direction="x", force=value[0]),
+    "core": lambda value: archord.Load("pull", direction="x", force=1.0, core=(value[1], 1.0)),
+    "support": lambda value: archord.Support("left", fixed=value[2]),
+    "interaction": lambda value: archord.Interaction("contact", value[3]),
+    "mesh": lambda value: archord.Mesh("lug.msh", circles=value[4], sets=value[4]),
+    "drive": lambda value: Drive("pull", path=value[1]),
+    "dead load": lambda value: DeadLoad(cells="lug", force=value[1]),
+    "mean": lambda value: Mean("mean", "flat", 0, point=value[1], mirrors=value[3]),
+    "turn": lambda value: Turn("turn", value[1], value[3]),
+    "disc": lambda value: Rigid(archord.RigidCircle((0.0, 0.0), 1.0), value[4]),
+    "law": lambda value: LawJoint(10.0, clearance=value[0], E_star=1e5),
+}
+
+
+@pytest.mark.parametrize("kind", PARTS)
+def test_what_a_part_is_made_of_may_be_changed_after_its_use(kind):
+    """Arrays, lists and dictionaries: the path of a drive followed them."""
+    values = np.array(0.1), np.array([0.0, 0.2]), ["x"], ["pin", "hole"], {"hole": [1.0, 2.0]}
+    part = PARTS[kind](values)
+    before = repr(part)
+    single, pair, fixed, names, rates = values
+    single *= 2
+    pair *= 2
+    for given in (fixed, names, rates["hole"]):
+        given.clear()
+    rates.clear()
+    assert repr(part) == before
+
+
+def test_a_problem_keeps_its_lists():
+    """A load that was added to the list of one problem acted in the other, too."""
+    loads = [archord.Load("press", on="slab top", direction="y", displacement=-1e-3)]
+    steps = [2]
+    stepping = {"first": 0.5}
+    problem = slab(loads=loads, steps=steps, stepping=stepping)
+    loads.append(archord.Load("shear", on="slab top", direction="x", force=1.0))
+    steps[0] = 7
+    stepping.clear()
+    assert (len(problem.loads), problem.targets) == (1, [0.5, 1.0])
+    assert problem.stepping == {"first": 0.5}
 
 
 def test_a_quantity_of_a_law_is_of_the_whole(run, tmp_path):

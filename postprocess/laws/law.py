@@ -164,7 +164,7 @@ class Law:
     ) -> Array:
         """``x`` with nan where the law has nothing to say; warns about points outside the range."""
         named, unit = ("dR", joint.clearance) if what == "delta" else ("E* dR", joint.unit)
-        x = np.asarray(x, dtype=float)
+        x = np.array(x, dtype=float)
         beyond = (x < 0) | (x > limit * (1 + ROUND_OFF))
         reason = self.unfit(joint)
         if not (beyond.any() or reason):

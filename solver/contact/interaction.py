@@ -33,6 +33,7 @@ Within = Callable[[Array], np.ndarray]  # whether points (m, d) are in a part
 GAMMA_FACTOR = 0.5
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Rigid:
     """A rigid disc displaced by ``rate`` times the displacement of the ``drive``, or by rates of

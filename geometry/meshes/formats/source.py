@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from archord.report.errors import InputError
+from archord.report.errors import InputError, in_sentences
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -25,6 +25,7 @@ CHANGES = ("scale", "order", "refine", "size", "sizes", "sets")  # but for the c
 Disc = tuple[tuple[float, ...], float] | tuple[tuple[float, ...], float, tuple[float, ...]]
 
 
+@in_sentences
 @dataclass(frozen=True)
 class Mesh:
     """A mesh for a problem.

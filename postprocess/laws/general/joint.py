@@ -122,7 +122,7 @@ class LawJoint:
     def __post_init__(self) -> None:
         """Check the values; numbers of numpy become Python's, which files can hold."""
         for name, value in vars(self).items():
-            if isinstance(value, np.generic):
+            if isinstance(value, (np.generic, np.ndarray)):
                 object.__setattr__(self, name, value.item())
         positive = "radius clearance E_star k c pin_yield block_yield length block_size"
         for name in positive.split():
