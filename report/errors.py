@@ -30,8 +30,8 @@ class InputError(ValueError):
 
 
 def in_sentences(cls: type) -> Any:
-    """Let a call of ``cls`` with wrong arguments raise `InputError`, a sentence; and let its objects
-    have arguments of their own: arrays, lists and dictionaries may be changed later."""
+    """Let a call of ``cls`` with wrong arguments raise `InputError`, a sentence; and let its
+    objects have arguments of their own: arrays, lists and dictionaries may be changed later."""
     build = cls.__init__  # type: ignore[misc]
     signature = inspect.signature(build)
     known = ", ".join([*signature.parameters][1:])
