@@ -129,6 +129,10 @@ class LawJoint:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value:g} must be a positive number.")
+        for name in ("kinematic", "ring", "whole", "large_strain", "fixed_pairs"):
+            value = getattr(self, name)
+            if value not in (False, True):
+                raise ValueError(f"{name} = {value!r} must be True or False.")
         if not 0 <= self.pin_share <= 1:
             raise ValueError(f"pin_share = {self.pin_share:g} must be between 0 and 1.")
         for name in ("nu", "pin_nu"):

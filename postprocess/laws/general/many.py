@@ -58,8 +58,8 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     Raises
     ------
     ValueError
-        For columns that no joint has, for arrays of different lengths, and for displacements that
-        are not of as many joints.
+        For columns that no joint has, for arrays of different lengths, for displacements that
+        are not of as many joints, and for tables of pandas whose indexes differ.
 
     Warns
     -----
@@ -77,6 +77,7 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     >>> found.reason[2]
     'archord: dR/R = 0.1 is outside 0.001 to 0.02'
     """
+    _require_one_index(joints, delta, deepest)
     rows = _rows(joints)
     n = len(rows)
     deltas, deepests = _of_joints(n, delta, deepest)
@@ -101,6 +102,22 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
         load[row] = state.load
         error[row] = state.error
     return Loads(load, error, reason)
+
+
+def _require_one_index(
+    joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLike
+) -> None:
+    """Raise ValueError for tables of pandas of which one has its rows in another order: rows are
+    taken one after the other, whatever their labels."""
+    given: dict[str, Any] = {"joints": joints, "delta": delta, "deepest": deepest}
+    if not hasattr(joints, "iloc"):
+        given |= joints
+    tables = {name: table for name, table in given.items() if hasattr(table, "iloc")}
+    first = next(iter(tables), "")
+    for name, table in tables.items():
+        if not table.index.equals(tables[first].index):
+            said = f"{name}: has another index than {first}"
+            raise ValueError(f"{said}, and rows count by their order; reindex one of them.")
 
 
 def _of_joints(n: int, delta: npt.ArrayLike, deepest: npt.ArrayLike) -> tuple[Array, Array]:

@@ -141,6 +141,12 @@ def _doubts_of(one: Estimate, found: Identification) -> list[str]:
         cure = "check the units of the curve and the values of the scene"
         said = f"{name} = {one.value:.4g}: is at a bound of what was allowed, {ends}"
         return [f"{said}, and taken as known in the intervals of the others; {cure}"]
+    bounds = ((one.low, one.unknown.low), (one.high, one.unknown.high))
+    cut = [f"{bound:.4g}" for end, bound in bounds if math.isclose(end, bound)]
+    if one.unknown.keys and cut:
+        where = " and ".join(cut)
+        said = f"{name}: its interval ends at {where}, where it was allowed to, not by the curve"
+        return [f"{said}; intervals of the others count on that"]
     half = (one.high - one.low) / 2
     if one.unknown.keys and half > _POOR * abs(one.value):
         return [f"{name}: is known to {half / one.value:.0%} only"]

@@ -53,9 +53,10 @@ def read_curve(
 
     Columns are separated by semicolons, tabs, commas or blanks; but for commas, numbers may have a
     decimal comma. Lines that begin with # are comments. Rows without one of the numbers are left
-    out. It is said where a heading has another unit in brackets than ``units``, of displacement and
-    force, or the line of units below the headings. Raises `InputError`, also for rows with more
-    cells than there are columns, and for commas beside points in numbers.
+    out, and a row that repeats the one before is counted once. It is said where a heading has
+    another unit in brackets than ``units``, of displacement and force, or the line of units below
+    the headings. Raises `InputError`, also for rows with more cells than there are columns, and
+    for commas beside points in numbers.
     """
     lines = [line for line in read_text(path).splitlines() if line.strip() and line[0] != "#"]
     separator = next((sign for sign in _SEPARATORS if lines and sign in lines[0]), None)
@@ -176,6 +177,16 @@ def _compressed(path: Path, displacement: Array, load: Array, said: list[str]) -
     """The curve with signs that are positive in compression."""
     if np.ptp(load) == 0 or np.ptp(displacement) == 0:
         raise InputError(f"{path}: its forces or its displacements are all the same.")
+    moves = (np.diff(displacement) != 0) | (np.diff(load) != 0)
+    is_new = np.append(True, moves)
+    if is_new.sum() < FEWEST:
+        fault = f"has {is_new.sum()} rows that differ from the row before"
+        raise InputError(f"{path}: {fault}, and a fit needs {FEWEST} and more.")
+    if not is_new.all():
+        repeated = (~is_new).sum()
+        said.append(f"{path}: {repeated} of {len(load)} rows repeat the row before; counted once")
+    displacement = displacement[is_new]
+    load = load[is_new]
     if -load.min() > load.max():
         load = -load
         said.append(f"{path}: its forces are negative, and are taken as compression")

@@ -179,6 +179,21 @@ def test_units_that_are_wrong_by_1000_end_at_a_bound():
     assert "check the units" in said(found)
 
 
+@pytest.mark.usefixtures("_begun_at_the_scene")
+def test_an_interval_that_ends_at_what_was_allowed_is_told():
+    """With 5 % noise the curve knows the yield stress to 15 MPa. Bounds of 226 and 236 MPa were
+    its 95 % interval, as if the curve had told it."""
+    curve = measured(STEEL, {}, 6, n=80, noise=0.05, soft=0.0)
+    scene = archord.load_scene(STEEL)
+    keys = ["joint.clearance", f"{BOTH}=226:236"]
+    found = identify(scene, curve, keys, stiffness=np.inf)
+    assert not found.estimates[1].is_bound
+    assert "yield_stress: its interval ends at 226" in said(found)
+    wide = identify(scene, curve, ["joint.clearance", BOTH], stiffness=np.inf)
+    assert wide.estimates[1].high - wide.estimates[1].low > 20
+    assert "its interval ends at" not in said(wide)
+
+
 @pytest.mark.parametrize(
     ("free", "words"),
     [
@@ -224,6 +239,7 @@ def test_files_of_many_kinds_are_read(tmp_path, text, expected, words):
         ("u\n1\n2\n", "has 0 rows with two numbers"),
         ("u,F\n1,many\n", 'not "many"'),
         ("u,F\n" + 9 * "1,2\n", "are all the same"),
+        ("u,F\n" + 9 * "1,2\n" + 9 * "2,3\n", "has 2 rows that differ from the row before"),
     ],
 )
 def test_files_without_a_curve_are_refused(tmp_path, text, words):
@@ -233,6 +249,19 @@ def test_files_without_a_curve_are_refused(tmp_path, text, words):
         read_curve(path)
     with pytest.raises(InputError, match="has no column 'force'"):
         read_curve(path, load="force")
+
+
+def test_a_row_that_repeats_the_row_before_is_counted_once(tmp_path):
+    """A logger that is faster than its sensor: every point twice told intervals of a curve of
+    twice as many points, 0.7 times as wide."""
+    path = tmp_path / "curve.csv"
+    rows = [f"{k},{2 * k}\n" for k in range(9)]
+    path.write_text("u,F\n" + "".join(2 * row for row in rows))
+    curve = read_curve(path)
+    np.testing.assert_array_equal(curve.load, 2.0 * np.arange(9))
+    assert "9 of 18 rows repeat the row before" in "\n".join(curve.said)
+    path.write_text("u,F\n" + "".join(rows) + "".join(rows))
+    assert len(read_curve(path).load) == 18
 
 
 @pytest.mark.parametrize(

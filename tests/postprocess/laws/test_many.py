@@ -78,6 +78,27 @@ def test_displacements_and_ways_back_belong_to_joints():
             loads(table, delta, wrong)
 
 
+def test_tables_whose_rows_have_another_order_are_refused():
+    """Rows count by their order: a series that was sorted gave each joint another joint's
+    displacement or yield stress."""
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(SAME | {"clearance": [0.05, 0.06]}, index=[5, 3])
+    delta = pandas.Series({5: 0.02, 3: 0.08})
+    assert loads(frame, delta).load[0] == loads(frame, [0.02, 0.08]).load[0]
+    with pytest.raises(ValueError, match="delta: has another index than joints"):
+        loads(frame, delta.sort_index())
+    columns = {"clearance": frame["clearance"], "block_yield": frame["clearance"].sort_index()}
+    with pytest.raises(ValueError, match="block_yield: has another index than clearance"):
+        loads(SAME | columns, 0.05)
+
+
+def test_a_flag_is_true_or_false():
+    """A large strain of 2 was counted twice."""
+    found = loads(SAME | {"clearance": 0.05, "large_strain": [1, 2]}, 0.05)
+    assert list(np.isnan(found.load)) == [False, True]
+    assert found.reason[1] == "large_strain = 2 must be True or False"
+
+
 def test_unknown_columns_and_lengths_are_refused():
     with pytest.raises(ValueError, match="gap: no parameter of a joint"):
         loads(SAME | {"clearance": 0.05, "gap": 1.0}, 0.05)
