@@ -33,12 +33,12 @@ from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.law_fit import (
     SOFT,
     NodeRun,
-    Numbers,
     by_joint,
     first_loading,
     rms_largest,
     solved_in,
 )
+from archord.postprocess.laws.general.yield_model import Numbers
 from archord.report.table import Table
 
 # x of the ranges of P that are told apart
@@ -110,15 +110,15 @@ def _within(x: Array, ends: tuple[float, float]) -> npt.NDArray[np.bool_]:
 def kind_of(numbers: Numbers) -> str:
     """Plane and what yields of the joint with these ``numbers``, in words; and whether the pin is
     soft."""
-    strain, p, m, _, _, pin, block = numbers
+    pin, block = numbers.yielding
     weaker = "pin" if pin < block else "block"
     body = f"{weaker} {'alone' if np.isinf(pin + block) else 'weaker'}"
     if np.isinf(min(pin, block)):
         body = "elastic"
     elif np.isclose(pin, block):
         body = "both"
-    soft = ", soft pin" if p * m > SOFT else ""
-    return f"{'strain' if strain else 'stress'} {body}{soft}"
+    soft = ", soft pin" if numbers.p * numbers.m > SOFT else ""
+    return f"{numbers.plane} {body}{soft}"
 
 
 def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
@@ -232,9 +232,8 @@ def other_laws(solved: dict[Numbers, list[NodeRun]]) -> Table:
     for name, law in laws.items():
         off = defaultdict(list)
         for numbers, x, y in data:
-            kind = "strain" if numbers[0] else "stress"
-            if np.isinf(numbers[5:]).all():
-                kind = "elastic"
+            is_elastic = np.isinf(numbers.yielding).all()
+            kind = "elastic" if is_elastic else numbers.plane
             off[kind].append(100 * (law(numbers, x, y) / y - 1))
         table.add(
             name, *(rms_largest(_joined(off[kind])) for kind in ("elastic", "strain", "stress"))
@@ -244,8 +243,8 @@ def other_laws(solved: dict[Numbers, list[NodeRun]]) -> Table:
 
 def _paper(numbers: Numbers, x: Array, k: float, c: float = 1.0) -> Array:
     """y of the paper's law, of the weaker body's yield stress."""
-    clearance = numbers[4]
-    s = min(numbers[5:])
+    clearance = numbers.clearance
+    s = min(numbers.yielding)
     stress = None if np.isinf(s) else s * clearance
     joint = LawJoint(1.0, clearance, 1.0, stress, stress, k=k, c=c)
     return plastic_winkler(joint, x * clearance).load / clearance
@@ -253,7 +252,7 @@ def _paper(numbers: Numbers, x: Array, k: float, c: float = 1.0) -> Array:
 
 def _paper_fitted(numbers: Numbers, x: Array, y: Array) -> Array:
     """y of the paper's law with this joint's best k, and c where it yields."""
-    is_elastic = np.isinf(min(numbers[5:]))
+    is_elastic = np.isinf(min(numbers.yielding))
     starts = [[0.8]] if is_elastic else [[0.8, c] for c in (0.8, 1.2, 2.0)]
     best, _ = fit(lambda values: _paper(numbers, x, *map(float, values)), starts, y)
     return _paper(numbers, x, *best)

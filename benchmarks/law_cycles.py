@@ -12,7 +12,7 @@ from scipy.integrate import trapezoid
 from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import law_of_numbers
 from archord.postprocess.laws.general.joint_curve import JointCurve
-from archord.postprocess.laws.general.yield_model import stored_joints
+from archord.postprocess.laws.general.yield_model import Numbers, stored_joints
 
 _EACH = 20  # of the joints
 _DEPTHS = np.linspace(0.1, 3.0, 59)  # dR
@@ -41,7 +41,7 @@ def _fall(values: Array) -> Array:
 def main() -> None:
     """Print the largest falls."""
     numbers = np.unique(stored_joints().numbers, axis=0)[::_EACH]
-    energy, residual = np.array([falls(law_of_numbers(each)) for each in numbers]).T
+    energy, residual = np.array([falls(law_of_numbers(Numbers(*each))) for each in numbers]).T
     print(f"{len(numbers)} joints: a deeper cycle loses less in {(energy > 1e-6).mean():.0%},")
     print(f"by up to {energy.max():.2%} of the work of loading, and opens earlier by up to")
     print(

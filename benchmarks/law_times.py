@@ -50,15 +50,15 @@ _OF_FIRST = dict(zip(BODIES, ("", _YIELDS, _YIELDS + _CURVES), strict=True))
 
 def law_joint(joint: Drawn) -> LawJoint:
     """What the laws know of a ``joint`` that hardens, with R = E* = 1."""
-    strain, p, m, n, clearance, *stresses = joint.numbers
-    pin_nu, nu = (value / (1 + value) if strain else value for value in (m, n))
-    given: dict[str, Any] = {}
-    for body, s in zip(("pin", "block"), stresses, strict=True):
+    numbers = joint.numbers
+    clearance = numbers.clearance
+    pin_nu, nu = numbers.poisson
+    given: dict[str, Any] = {"plane": numbers.plane, "pin_share": numbers.p}
+    for body, s in numbers.yielding._asdict().items():
         if f"{body}.hardening" in joint.own:
             law = hardening_law(s * clearance, joint.own[f"{body}.hardening"], 1.0)
             given |= {f"{body}_yield": s * clearance, f"{body}_hardening": law}
-    plane = "strain" if strain else "stress"
-    return LawJoint(1.0, clearance, 1.0, pin_share=p, plane=plane, nu=nu, pin_nu=pin_nu, **given)
+    return LawJoint(1.0, clearance, 1.0, nu=nu, pin_nu=pin_nu, **given)
 
 
 def forms(joint: LawJoint) -> list[LawJoint]:

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.law_fit import NodeRun, first_loading, solved_in
 from archord.postprocess.laws.general.yield_model import (
+    Numbers,
     Yielding,
     first_yield,
     mesh_excess,
-    telling_side,
+    sides_of,
 )
 from archord.report.files import replacing, write_rows
 from archord.studies.law_design import FRESH, Drawn, Row, joints, sweep_file
@@ -110,7 +111,7 @@ def checksums(files: Iterable[Path]) -> str:
     return "".join(f"{digest}  {name}\n" for digest, name in digests)
 
 
-def _curve(numbers: Sequence[float], runs: Sequence[NodeRun]) -> Iterable[dict[str, Any]]:
+def _curve(numbers: Numbers, runs: Sequence[NodeRun]) -> Iterable[dict[str, Any]]:
     """First loading of the joint with these ``numbers``, extrapolated to infinitely many steps
     where it was solved twice, and the way back."""
     nodes = first_loading(list(runs))
@@ -129,12 +130,12 @@ def _curve(numbers: Sequence[float], runs: Sequence[NodeRun]) -> Iterable[dict[s
             yield _row(f"back from {deepest:.4g}", delta, force, error)
 
 
-def _mesh_error(numbers: Sequence[float], x: Array) -> Array:
+def _mesh_error(numbers: Numbers, x: Array) -> Array:
     """The relative error of P by the mesh at ``x`` ``(k,)``: larger where a block yields in plane
     stress."""
-    strain, *of_bodies, pin, block = numbers
-    side = str(telling_side(bool(strain), pin, block))
-    begins = first_yield(elastic_model(), bool(strain), Elastic(*of_bodies), block)
+    side, *_ = sides_of(numbers)
+    block = numbers.block
+    begins = first_yield(elastic_model(), numbers.strain, numbers.elastic, block)
     excess = mesh_excess(side, Yielding(np.inf, block), x / begins)  # the most that it can be
     return np.hypot(_MESH_ERROR, _WHOLE_EXCESS * excess)
 

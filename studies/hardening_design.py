@@ -30,7 +30,7 @@ from archord.postprocess.laws.general.elastic_model import Elastic
 from archord.postprocess.laws.general.general_law import NODES, SMALLEST_S, law_of_numbers
 from archord.postprocess.laws.general.hardening_model import BODIES
 from archord.postprocess.laws.general.law_fit import steps_count
-from archord.postprocess.laws.general.yield_model import first_yield
+from archord.postprocess.laws.general.yield_model import Numbers, first_yield
 from archord.studies.law_design import (
     CHECK_SIZE,
     END,
@@ -111,7 +111,7 @@ def pair(metal_of: Mapping[str, Any], strain: bool, clearance: float) -> Drawn:
         own |= {f"{body}.yield_stress": float(points[0, 1]), f"{body}.hardening": points.tolist()}
         strengths.append(float(points[0, 1]) / clearance)
     first = float(first_yield(earlier_model(), strain, elastic, min(strengths)))
-    return Drawn(own, (float(strain), *elastic, *strengths), first, first, 0.5, 1.0)
+    return Drawn(own, Numbers(float(strain), *elastic, *strengths), first, first, 0.5, 1.0)
 
 
 def any_pair(_: Drawn) -> bool:
@@ -129,7 +129,7 @@ def is_soft(joint: Drawn) -> bool:
 
 def is_close(joint: Drawn) -> bool:
     """Whether the bodies of the pair ``joint`` yield at nearly one stress."""
-    *_, pin, block = joint.numbers
+    pin, block = joint.numbers.yielding
     return pin != block and abs(np.log(block / pin)) < _CLOSE
 
 
@@ -147,7 +147,7 @@ def pairs(
     while found < number:
         metal_of = {body: metals()[random.choice(names)] for body in BODIES}
         joint = pair(metal_of, plane == "strain", low * (high / low) ** random.random())
-        in_range = joint.first < _LATEST and min(joint.numbers[5:]) > SMALLEST_S[plane]
+        in_range = joint.first < _LATEST and min(joint.numbers.yielding) > SMALLEST_S[plane]
         if in_range and is_wanted(joint):
             found += 1
             yield joint
@@ -166,13 +166,13 @@ def all_pairs(plane: str) -> Iterator[Drawn]:
 def hardened(joint: Drawn, random: np.random.Generator) -> Drawn:
     """``joint``, with curves of the bodies that yield."""
     own = dict(joint.own)
-    *_, clearance, pin, block = joint.numbers
+    pin, block = joint.numbers.yielding
     alike = pin == block and random.random() < 0.5
     for body in ("pin", "block"):
         strength = own.get(f"{body}.yield_stress")
         if strength is None:
             continue
-        curve = hardening(random, strength, own[f"{body}.E"], clearance)
+        curve = hardening(random, strength, own[f"{body}.E"], joint.numbers.clearance)
         if alike and body == "block":
             curve = own["pin.hardening"]
         own[f"{body}.hardening"] = curve

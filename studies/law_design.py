@@ -39,7 +39,7 @@ from archord.postprocess.laws.general.general_law import (
     law_of_numbers,
 )
 from archord.postprocess.laws.general.law_fit import steps_count
-from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
+from archord.postprocess.laws.general.yield_model import MULTIPLES, Numbers, first_yield
 from archord.scene.sections.errors import toml_value
 
 Row = dict[str, Any]
@@ -133,12 +133,12 @@ fields = false
 
 @dataclass(frozen=True)
 class Drawn:
-    """A joint: ``own`` keys of its scene, in units of R and E*; its ``numbers`` (see
-    `SolvedJoints`); x0 of the body that yields ``first`` and of the body that decides ``last``
-    (infinite: elastic); and two more random numbers."""
+    """A joint: ``own`` keys of its scene, in units of R and E*; its ``numbers``; x0 of the body
+    that yields ``first`` and of the body that decides ``last`` (infinite: elastic); and two more random
+    numbers."""
 
     own: Row
-    numbers: tuple[float, ...]
+    numbers: Numbers
     first: float
     last: float
     odd: float
@@ -196,7 +196,7 @@ def _drawn(kind: str, u: Array, beyond: float) -> Drawn:
         if np.isfinite(stress) and f"{body}.E" in own:
             own[f"{body}.yield_stress"] = stress * clearance
     odd, chance = map(float, u[6:])
-    return Drawn(own, (float(strain), *elastic, pin, block), onset, last, odd, chance)
+    return Drawn(own, Numbers(float(strain), *elastic, pin, block), onset, last, odd, chance)
 
 
 @cache

@@ -14,7 +14,7 @@ import pytest
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import law_of_numbers
 from archord.postprocess.laws.general.law_fit import NodeRun
-from archord.postprocess.laws.general.yield_model import first_yield
+from archord.postprocess.laws.general.yield_model import Numbers, first_yield
 from archord.studies import dataset
 from archord.studies.dataset import NUMBERS, scenes, write_tables
 
@@ -43,7 +43,7 @@ def test_tables_have_error_bars_and_checksums(tmp_path, monkeypatch):
     x = np.array([1.0, 2.0, 3.0])
     coarse = np.column_stack([[*x, 2.5], [1.0, 2.0, 3.0, 2.0], np.ones(4), np.ones(4)])
     fine = np.column_stack([x, [1.1, 2.2, 3.0], np.ones(3), np.ones(3)])
-    solved = {(1.0, 0.5, 0.4, 0.4, 0.005, 0.3, 0.3): [NodeRun(coarse, 1), NodeRun(fine, 2)]}
+    solved = {Numbers(1.0, 0.5, 0.4, 0.4, 0.005, 0.3, 0.3): [NodeRun(coarse, 1), NodeRun(fine, 2)]}
     monkeypatch.setattr(
         dataset, "solved_in", lambda folder, names: solved if names == {"a"} else {}
     )
@@ -70,7 +70,7 @@ def test_the_error_of_the_mesh_is_larger_where_a_block_yields_in_plane_stress(
 ):
     """`mesh_excess`, which the law is corrected by, is of elements of 2 %R."""
     x = np.array([0.05, 1.0, 3.0])
-    error = dataset._mesh_error((strain, 0.5, 0.4, 0.4, 0.005, np.inf, block), x)
+    error = dataset._mesh_error(Numbers(strain, 0.5, 0.4, 0.4, 0.005, np.inf, block), x)
     assert error[0] == 6e-4
     assert error[-1] == pytest.approx(largest, rel=0.1)
 
@@ -80,7 +80,8 @@ def test_the_law_keeps_its_expected_error_beside_the_dataset():
     that yield in plane stress, whose steps matter."""
     with (FOLDER / "joints.csv").open() as file:
         joints = {
-            row["joint"]: [float(row[name]) for name in NUMBERS] for row in csv.DictReader(file)
+            row["joint"]: Numbers(*(float(row[name]) for name in NUMBERS))
+            for row in csv.DictReader(file)
         }
     with (FOLDER / "curves.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["way"] == "loading"]

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.factor_model import (
     FRICTION,
     LARGE_STRAIN,
@@ -93,12 +93,11 @@ class Changed:
     def plain(self) -> Plain:
         """What decides it, as it was solved without."""
         numbers = within_range(joint_numbers(self.joint))
-        strain, *of_bodies, _, _ = numbers
         x, y, _, angle = self.without.T
-        elastic = Elastic(*of_bodies)
+        elastic = numbers.elastic
         lost = np.log(y / elastic_model().at(elastic, x).y)
         leads = block_leads(numbers, flows(self.joint), x)
-        return Plain(bool(strain), self.joint.friction, elastic, x, NODES[1], angle, lost, leads)
+        return Plain(numbers.plane, self.joint.friction, elastic, x, NODES[1], angle, lost, leads)
 
     @property
     def way_changed(self) -> Array:

@@ -47,7 +47,7 @@ class Plain(NamedTuple):
     semi-angle [rad], ``ln(P/P_el)``, and how far the block leads (see `block_leads`), ``(k,)``
     each."""
 
-    strain: bool
+    plane: str
     friction: float
     joint: Elastic
     x: Array
@@ -55,11 +55,6 @@ class Plain(NamedTuple):
     angle: Array
     lost: Array
     leads: Array
-
-    @property
-    def plane(self) -> str:
-        """The plane."""
-        return "strain" if self.strain else "stress"
 
     def scale(self, kind: str) -> Array:
         """What g of friction or large strain is multiplied by ``(k,)``."""

@@ -4,7 +4,6 @@ error."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
@@ -34,7 +33,7 @@ from archord.postprocess.laws.general.spline import monotone_slopes, spline_slop
 from archord.postprocess.laws.general.yield_model import (
     ELASTIC_BELOW,
     Loss,
-    Yielding,
+    Numbers,
     first_yield,
     loss,
 )
@@ -133,19 +132,19 @@ def _error_in_words(law: JointCurve) -> str:
 
 
 def law_of_numbers(
-    numbers: Sequence[float],
+    numbers: Numbers,
     given: Flows = (None, None),
     friction: float = 0.0,
     *,
     large_strain: bool = False,
 ) -> JointCurve:
-    """The law of a joint with these seven ``numbers`` (see `joint_numbers`) in units of dR, E* dR
-    and E* dR/R, whose bodies harden as ``given``; a body that yields beyond the range is
-    elastic. The coefficient of ``friction`` and ``large_strain`` add to it."""
+    """The law of a joint with these ``numbers`` in units of dR, E* dR and E* dR/R, whose bodies
+    harden as ``given``; a body that yields beyond the range is elastic. The coefficient of
+    ``friction`` and ``large_strain`` add to it."""
     numbers = within_range(numbers)
-    joint = Elastic(*numbers[1:5])
+    joint = numbers.elastic
     lost = None
-    if np.isfinite(numbers[5:]).any():
+    if np.isfinite(numbers.yielding).any():
         lost = _lost(numbers, given)
     kinds = [FRICTION] * bool(friction) + [LARGE_STRAIN] * large_strain
     if not kinds:
@@ -158,36 +157,33 @@ def law_of_numbers(
     return reduce_joint(joint, lost, added, of_elastic)
 
 
-def within_range(numbers: Sequence[float]) -> tuple[float, ...]:
+def within_range(numbers: Numbers) -> Numbers:
     """The ``numbers`` of a joint in which a body that yields beyond the range is elastic."""
-    strain, *of_bodies, pin, block = numbers
-    stresses = np.array([pin, block])
-    begins = first_yield(elastic_model(), bool(strain), Elastic(*of_bodies), stresses)
+    stresses = np.array(numbers.yielding)
+    begins = first_yield(elastic_model(), numbers.strain, numbers.elastic, stresses)
     stresses[ELASTIC_BELOW * begins >= NODES[-1]] = np.inf
-    return (*numbers[:5], *stresses.tolist())
+    return Numbers(*numbers[:5], *stresses.tolist())
 
 
-def _lost(numbers: Sequence[float], given: Flows) -> Loss:
+def _lost(numbers: Numbers, given: Flows) -> Loss:
     """What yielding takes from a joint at the nodes."""
     x = NODES[1:]
-    stresses = numbers[5:]
+    stresses = numbers.yielding
     hardens = [flow is not None and np.isfinite(s) for flow, s in zip(given, stresses, strict=True)]
     if any(hardens):
         return hardened_loss(numbers, given, x)
-    return loss(numbers, Yielding(*stresses), x)
+    return loss(numbers, stresses, x)
 
 
-def _plain(numbers: Sequence[float], friction: float, leads: Array, lost: Loss | None) -> Plain:
+def _plain(numbers: Numbers, friction: float, leads: Array, lost: Loss | None) -> Plain:
     """A joint at the nodes, which ``friction`` and large strain change."""
     x = NODES[1:]
-    strain, *of_bodies, _, _ = numbers
-    joint = Elastic(*of_bodies)
-    angle = elastic_model().at(joint, x).angle
+    angle = elastic_model().at(numbers.elastic, x).angle
     fallen = np.zeros_like(x)
     if lost is not None:
         angle = angle * np.exp(lost.angle)
         fallen = lost.force
-    return Plain(bool(strain), friction, joint, x, x[0], angle, fallen, leads)
+    return Plain(numbers.plane, friction, numbers.elastic, x, x[0], angle, fallen, leads)
 
 
 def outside(joint: LawJoint) -> str:
@@ -220,28 +216,29 @@ def outside(joint: LawJoint) -> str:
             "a body has back stresses, and the law is of isotropic hardening; archord fit RUN "
             "--table makes the law of one joint"
         )
-    strain, p, m, n, clearance, *stresses = joint_numbers(joint)
-    pin_nu, nu = (value / (1 + value) if strain else value for value in (m, n))
+    numbers = joint_numbers(joint)
+    pin_nu, nu = numbers.poisson
+    p = numbers.p
     stiffness = math.inf
     if p:
-        stiffness = (1 - p) / p * ((1 - pin_nu**2) / (1 - nu**2) if strain else 1.0)
+        stiffness = (1 - p) / p * ((1 - pin_nu**2) / (1 - nu**2) if numbers.strain else 1.0)
     softest, stiffest = RATIOS
     if joint.pin_yield is None:
         stiffest = math.inf
-    weakest = SMALLEST_S["strain" if strain else "stress"]
+    weakest = SMALLEST_S[numbers.plane]
     checks = [
         ("nu of the pin", pin_nu, *NU),
         ("nu of the block", nu, *NU),
-        ("dR/R", clearance, *CLEARANCES),
+        ("dR/R", numbers.clearance, *CLEARANCES),
         ("E(pin)/E(block)", stiffness, softest, stiffest),
-        ("sigY R/(E* dR)", min(stresses), weakest, math.inf),
+        ("sigY R/(E* dR)", min(numbers.yielding), weakest, math.inf),
         ("friction", joint.friction, 0.0, LARGEST),
     ]
     for name, value, low, high in checks:
         if not low * (1 - _LAST_DIGITS) <= value <= high * (1 + _LAST_DIGITS):
             to = f"to {high:g}" if high < math.inf else "and more"
             return f"{name} = {value:.4g} is outside {low:g} {to}"
-    gain = largest_gain(joint_numbers(joint), flows(joint), NODES[1:])
+    gain = largest_gain(numbers, flows(joint), NODES[1:])
     if gain > LARGEST_GAIN:
         said = f"{gain:.3g} times the yield stress, at most {LARGEST_GAIN:g} times is covered"
         return f"a body hardens by 3 dR to {said}"
@@ -259,9 +256,8 @@ def plane_and_nu(joint: LawJoint) -> tuple[str, float]:
     return plane, nu
 
 
-def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
-    """What decides a joint: plane (1: strain), p, m, n, dR/R, and s of pin and block, infinite of
-    an elastic body, as `SolvedJoints` has them. Raises ValueError without plane or nu."""
+def joint_numbers(joint: LawJoint) -> Numbers:
+    """What decides a joint. Raises ValueError without plane or nu."""
     plane, nu = plane_and_nu(joint)
     strain = plane == "strain"
     pin_nu = nu if joint.pin_nu is None else joint.pin_nu
@@ -271,7 +267,7 @@ def joint_numbers(joint: LawJoint) -> tuple[float, ...]:
     unit = joint.unit / joint.radius
     for stress in (joint.pin_yield, joint.block_yield):
         numbers.append(math.inf if stress is None else stress / unit)
-    return tuple(numbers)
+    return Numbers(*numbers)
 
 
 def reduce_joint(

@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
     BODIES,
@@ -50,7 +50,7 @@ from archord.postprocess.laws.general.law_fit import (
 )
 from archord.postprocess.laws.general.yield_model import (
     Loss,
-    Yielding,
+    Numbers,
     first_yield,
     loss,
     mesh_excess,
@@ -79,7 +79,7 @@ class Hardened:
     """A joint that was solved: its ``numbers``, how its bodies harden, and ``ln(P/P_el)`` and
     ``ln(p0/p0_el)``, each ``(k,)``, at ``x`` ``(k,)``."""
 
-    numbers: Sequence[float]
+    numbers: Numbers
     given: Flows
     x: Array
     force: Array
@@ -95,20 +95,14 @@ class Hardened:
         inside = (at >= begin) & (at <= end)
         x, y, peak, _ = nodes[inside].T
         elastic = elastic_model()
-        of_bodies = Elastic(*numbers[1:5])
         side, *_ = sides_of(numbers)
-        yielding = Yielding(*numbers[5:])
-        begins = first_yield(elastic, bool(numbers[0]), of_bodies, yielding.of(side))
-        without = elastic.at(of_bodies, x)
+        yielding = numbers.yielding
+        begins = first_yield(elastic, numbers.strain, numbers.elastic, yielding.of(side))
+        without = elastic.at(numbers.elastic, x)
         excess = mesh_excess(side, yielding, x / begins)
         force = np.log(y / without.y) - excess
         pressure = np.log(peak / without.peak) - excess
         return cls(numbers, flows(joint), x, force, pressure)
-
-    @property
-    def plane(self) -> str:
-        """The plane."""
-        return "strain" if self.numbers[0] else "stress"
 
     def state(self, model: Model) -> tuple[Strains, Loss]:
         """What the law says at x."""
@@ -132,7 +126,7 @@ class Hardened:
         begins = begins_of(self.numbers)
         rises = rises_of(self.given, found)
         for i, mean in means.items():
-            if np.isinf(self.numbers[5 + i]):
+            if np.isinf(self.numbers.yielding[i]):
                 continue
             body = BODIES[i]
             higher: Array = found.s.copy()
@@ -142,7 +136,7 @@ class Hardened:
             strain = found.strain[i]
             at = At(self.x, curve_at(mean, strain), found.s[1 - i], begins)
             slope = slope_at(mean, strain, found.s[i])
-            back = slope * feedback(model[f"{self.plane} {body}"], self.numbers, body, at)
+            back = slope * feedback(model[f"{self.numbers.plane} {body}"], self.numbers, body, at)
             part = of_s * slope / (1 - np.minimum(back, _STEEPEST))
             columns[i] = part * terms(self.numbers, body, at)
         return columns.reshape(-1, len(self.x)).T
@@ -154,7 +148,7 @@ def slope_at(mean: Flow, strain: Array, s: Array) -> Array:
     return np.log(higher / s) / np.log1p(_SMALL)
 
 
-def feedback(of: Array, numbers: Sequence[float], body: str, at: At) -> Array:
+def feedback(of: Array, numbers: Numbers, body: str, at: At) -> Array:
     """d(ln eps_rep)/d(ln s) ``(k,)`` with the coefficients ``of`` all `TERMS`; see `terms`."""
     stronger = at.own._replace(s=at.own.s * (1 + _SMALL))
     higher = at._replace(own=stronger)
@@ -166,8 +160,8 @@ def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, 
     """The coefficients by plane and body, by Gauss and Newton's method, from the ``start`` of a fit
     to nearly the same joints: each joint counts like five points."""
     model: dict[str, Array] = dict(start or {})
-    for plane in sorted({joint.plane for joint in joints}):
-        own = [joint for joint in joints if joint.plane == plane]
+    for plane in sorted({joint.numbers.plane for joint in joints}):
+        own = [joint for joint in joints if joint.numbers.plane == plane]
         names = [f"{plane} {body}" for body in BODIES]
         values = np.concatenate([model.get(name, _GUESS) for name in names])
         free = np.tile(_FREE, 2)
@@ -190,11 +184,11 @@ def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, 
 def fit_peak(joints: list[Hardened], model: Model) -> dict[str, float]:
     """The factor on `peak_rise` by plane, by least squares of ln p0."""
     factors = {}
-    for plane in sorted({joint.plane for joint in joints}):
+    for plane in sorted({joint.numbers.plane for joint in joints}):
         rises = []
         misses = []
         for joint in joints:
-            if joint.plane == plane:
+            if joint.numbers.plane == plane:
                 found, lost = joint.state(model)
                 rises.append(peak_rise(found, rises_of(joint.given, found), lost))
                 misses.append(joint.peak - lost.peak)

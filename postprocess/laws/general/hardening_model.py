@@ -15,7 +15,7 @@ stronger block yields earlier, by the rise of the pin's curve (`felt`).
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,11 +23,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
+from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
     Loss,
+    Numbers,
     Yielding,
     loss,
     share_of_pin,
@@ -147,14 +148,13 @@ class At(NamedTuple):
     begins: Callable[[Array], Array]
 
 
-def terms(numbers: Sequence[float], body: str, at: At) -> Array:
-    """All `TERMS` ``(terms, ..., k)`` of a ``body`` of the joint with these ``numbers`` (see
-    `joint_numbers`)."""
-    _, p, m, n, clearance, *first = numbers
+def terms(numbers: Numbers, body: str, at: At) -> Array:
+    """All `TERMS` ``(terms, ..., k)`` of a ``body`` of the joint with these ``numbers``."""
+    p, m, n, clearance = numbers.elastic
     share, soft = (p, p * m) if body == "pin" else (1 - p, (1 - p) * n)
     ls = np.log(at.own.s)
     weaker = np.clip(np.log(at.other) - ls, -_ALIKE, _ALIKE)
-    gain = ls - np.log(first[BODIES.index(body)])
+    gain = ls - np.log(getattr(numbers, body))
     begins = at.begins(at.own.s) / at.x
     of = {
         "1": 1.0,
@@ -179,35 +179,30 @@ def terms(numbers: Sequence[float], body: str, at: At) -> Array:
     return product
 
 
-def begins_of(numbers: Sequence[float]) -> Callable[[Array], Array]:
+def begins_of(numbers: Numbers) -> Callable[[Array], Array]:
     """About the x of first yield by s of the joint with these ``numbers``."""
-    strain, *of_bodies, _, _ = numbers
-    return yield_places(elastic_model(), bool(strain), Elastic(*of_bodies))
+    return yield_places(elastic_model(), numbers.strain, numbers.elastic)
 
 
-def representative(
-    model: Mapping[str, Array], numbers: Sequence[float], given: Flows, x: Array
-) -> Strains:
+def representative(model: Mapping[str, Array], numbers: Numbers, given: Flows, x: Array) -> Strains:
     """s_eff and eps_rep at ``x`` ``(k,)`` of the joint with these ``numbers``, whose bodies harden
     as ``given``; ``model`` has the coefficients by plane and body. Newton's method in ln(eps_rep)
     of both bodies, with difference quotients."""
-    plane = "strain" if numbers[0] else "stress"
     begins = begins_of(numbers)
     s = np.empty((2, 3, len(x)))
-    s[:] = np.reshape(numbers[5:], (2, 1, 1))
+    s[:] = np.reshape(numbers.yielding, (2, 1, 1))
     strain = np.zeros((2, len(x)))
     means = mean_flows(given)
-    hardens = [i for i in means if np.isfinite(numbers[5 + i])]
+    hardens = [i for i in means if np.isfinite(numbers.yielding[i])]
 
     def predicted(i: int, at: At) -> Array:
-        return np.tensordot(model[f"{plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
+        return np.tensordot(model[f"{numbers.plane} {BODIES[i]}"], terms(numbers, BODIES[i], at), 1)
 
-    clearance = numbers[4]
     zeros = np.zeros(len(x))
     for i in hardens:
         straight = Curve(s[i, 0], zeros, zeros)
         at = At(x, straight, s[1 - i, 0], begins)
-        strain[i] = clearance * np.exp(predicted(i, at))
+        strain[i] = numbers.clearance * np.exp(predicted(i, at))
     # of a body that does not harden nothing is missed: its row of the Jacobian is the identity's
     miss = np.log(_SHIFTS) + np.zeros_like(s)
     step: Array = np.zeros_like(strain)
@@ -218,7 +213,7 @@ def representative(
             s[i] = curve.s
         for i, curve in curves.items():
             at = At(x, curve, s[1 - i], begins)
-            miss[i] = np.log(shifted[i] / clearance) - predicted(i, at)
+            miss[i] = np.log(shifted[i] / numbers.clearance) - predicted(i, at)
         step = _step(miss, step)
         strain *= np.exp(-step)
         if np.abs(step).max() <= _CLOSE:
@@ -244,27 +239,27 @@ def _step(miss: Array, last: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def strains(numbers: tuple[float, ...], given: Flows, x: tuple[float, ...]) -> Strains:
+def strains(numbers: Numbers, given: Flows, x: tuple[float, ...]) -> Strains:
     """`representative` by the model that comes with archord."""
     return representative(hardening_model()["strain"], numbers, given, np.array(x))
 
 
-def largest_gain(numbers: Sequence[float], given: Flows, x: Array) -> float:
+def largest_gain(numbers: Numbers, given: Flows, x: Array) -> float:
     """The largest ``s_eff/s`` of the bodies that harden, at the last ``x`` ``(k,)``; one of
     none."""
     hardens = [i for i, flow in enumerate(given) if flow is not None]
     if not hardens:
         return 1.0
-    found = strains(tuple(numbers), tuple(given), tuple(x))
-    s = np.array(numbers[5:])
+    found = strains(numbers, given, tuple(x))
+    s = np.array(numbers.yielding)
     return max(1.0, *(found.s[hardens, -1] / s[hardens]))
 
 
-def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
+def hardened_loss(numbers: Numbers, given: Flows, x: Array) -> Loss:
     """What yielding does at ``x`` ``(k,)`` to the joint with these ``numbers``, whose bodies harden
     as ``given``. Raises ValueError where no eps_rep is found."""
     table = hardening_model()
-    found = strains(tuple(numbers), tuple(given), tuple(x))
+    found = strains(numbers, given, tuple(x))
     if found.step.max() > _FOUND:
         at = x[found.step.argmax()]
         raise ValueError(
@@ -274,21 +269,18 @@ def hardened_loss(numbers: Sequence[float], given: Flows, x: Array) -> Loss:
     rises = rises_of(given, found)
     lost = loss(numbers, felt(numbers, found.s, rises), x)
     slope = spline_slopes(np.log(x), lost.force) / x
-    plane = kind(numbers).split()[0]
-    peak = lost.peak + table["peak"][plane] * peak_rise(found, rises, lost)
+    peak = lost.peak + table["peak"][numbers.plane] * peak_rise(found, rises, lost)
     wrong = table["error"][kind(numbers)] * unsure(rises, lost)
     error: Array = np.sqrt(lost.deviation**2 + wrong**2)
     way_error = np.hypot(lost.way_error, wrong)  # of the travel, too
     return lost._replace(slope=slope, deviation=error, peak=peak, way_error=way_error)
 
 
-def kind(numbers: Sequence[float]) -> str:
+def kind(numbers: Numbers) -> str:
     """Plane, and which body yields, "pin", "block" or "both"."""
-    strain, *_, pin, block = numbers
-    body = "both"
-    if np.isinf(pin) or np.isinf(block):
-        body = "pin" if np.isinf(block) else "block"
-    return f"{'strain' if strain else 'stress'} {body}"
+    yields = np.flatnonzero(np.isfinite(numbers.yielding))
+    body = "both" if len(yields) > 1 else BODIES[yields[0]]
+    return f"{numbers.plane} {body}"
 
 
 def rises_of(given: Flows, found: Strains) -> Array:
@@ -300,26 +292,25 @@ def rises_of(given: Flows, found: Strains) -> Array:
     return rises
 
 
-def block_leads(numbers: Sequence[float], given: Flows, x: Array) -> Array:
+def block_leads(numbers: Numbers, given: Flows, x: Array) -> Array:
     """How far a block that is weaker than the pin leads in plane stress at ``x`` ``(k,)``, from 0
     to 1: then it yields in narrow bands where small strain leaves its thickness out. It leads less
     where it hardens, as bands spread."""
-    strain, *_, block = numbers
-    if strain or np.isinf(block):
+    if numbers.strain or np.isinf(numbers.block):
         return np.zeros_like(x)
-    found = strains(tuple(numbers), tuple(given), tuple(x))
+    found = strains(numbers, given, tuple(x))
     lacking = 1 - found.s[1] / found.s[0]
     _, rise = rises_of(given, found)
     leads: Array = np.clip(lacking / _LEADS, 0.0, 1.0) * np.exp(-rise / _SPREADS)
     return leads
 
 
-def felt(numbers: Sequence[float], s: Array, rises: Array) -> Yielding:
+def felt(numbers: Numbers, s: Array, rises: Array) -> Yielding:
     """The ``s`` ``(2, k)`` with which pin and block act on the joint with these ``numbers``. A pin
     that hardens presses more in its middle than a perfectly plastic one does, so that in plane
     strain a stronger block yields earlier. ``rises`` ``(2, k)`` is what `rises_of` tells."""
     pin, block = s
-    if numbers[0]:
+    if numbers.strain:
         block = block * np.exp(-_TAKEN * rises[0] * share_of_pin(pin, block))
     return Yielding(pin, block)
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Container, Sequence
+from collections.abc import Container
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -48,8 +48,8 @@ from archord.postprocess.laws.general.yield_model import (
     PIN_ALONE,
     PIN_WEAKER,
     SIDES,
+    Numbers,
     SolvedJoints,
-    Yielding,
     YieldModel,
     kind_of_scatter,
     mesh_excess,
@@ -86,8 +86,6 @@ _LITTLE = 0.03  # of the largest force, below which points on the way back count
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
 _LAW = NODES[1:]
-
-Numbers = tuple[float, ...]  # of a joint, as `joint_numbers` has them
 
 
 def exponents(degree: int) -> Array:
@@ -215,13 +213,13 @@ def by_joint(folder: Path, names: Container[str] | None = None) -> dict[LawJoint
 
 def solved_in(folder: Path, names: Container[str] | None = None) -> dict[Numbers, list[NodeRun]]:
     """`by_joint` of joints at small strain that do not harden and have no friction, by their
-    numbers, as `joint_numbers` has them."""
+    numbers."""
     found: dict[Numbers, list[NodeRun]] = defaultdict(list)
     for joint, runs in by_joint(folder, names).items():
         if joint.hardens or joint.friction or joint.large_strain:
             continue
         rounded = (float(f"{value:.6g}") for value in joint_numbers(joint))
-        found[tuple(rounded)] += runs
+        found[Numbers(*rounded)] += runs
     return dict(found)
 
 
@@ -233,15 +231,14 @@ def fit_law(
     elastic: dict[Numbers, Array] = {}
     yielding: dict[Numbers, list[NodeRun]] = {}
     for numbers, runs in solved.items():
-        strengths = numbers[5:]
-        if np.isinf(strengths).all():
+        if np.isinf(numbers.yielding).all():
             elastic[numbers] = runs[0].nodes
         else:
             yielding[numbers] = runs
     nodes = np.array([*elastic.values()])
     x, *quantities = np.moveaxis(nodes, -1, 0)
-    columns = np.array([*elastic]).T
-    model = fit_elastic(Elastic(*columns[1:5]), x[0], *quantities)
+    columns = Numbers(*np.array([*elastic]).T)
+    model = fit_elastic(columns.elastic, x[0], *quantities)
     alone = {numbers: runs for numbers, runs in yielding.items() if PIN_ALONE in sides_of(numbers)}
     pins = yielding_joints(model, alone)
     of_pins = fit_side(pins, PIN_ALONE)
@@ -273,16 +270,15 @@ def yielding_joints(
     rows: list[tuple[Any, ...]] = []
     back: list[tuple[float, ...]] = []
     for numbers, runs in solved.items():
-        joint = Elastic(*numbers[1:5])
-        yielding = Yielding(*numbers[5:])
+        joint = numbers.elastic
+        yielding = numbers.yielding
         x, *quantities = first_loading(runs).T
         base = model.at(joint, x)
         over_elastic = np.divide(quantities, [base.y, base.peak, base.angle])
         total = np.log(over_elastic)
-        plane = "strain" if numbers[0] else "stress"
         elastic = model.at(joint, _FINE)
         unloaded = [run for run in runs if run.steps == 1 and len(run.back) > 2]
-        ways = [way_told(plane, elastic, run) for run in unloaded]
+        ways = [way_told(numbers.plane, elastic, run) for run in unloaded]
         for side in sides_of(numbers):
             curves = total
             of_pins: Array = np.zeros(len(_LAW))
@@ -468,14 +464,13 @@ def main(folder: Path | None) -> None:
     print(error_table(stored_joints(), json.loads(KERNELS.read_text(encoding="utf-8"))).markdown())
 
 
-def steps_count(numbers: Sequence[float]) -> bool:
+def steps_count(numbers: Numbers) -> bool:
     """Whether a joint is solved in two step sizes, to extrapolate: one that yields in plane stress,
     or early in plane strain."""
-    plane = "strain" if numbers[0] else "stress"
-    return min(numbers[5:]) < _STEPS_COUNT_BELOW[plane]
+    return min(numbers.yielding) < _STEPS_COUNT_BELOW[numbers.plane]
 
 
-def complete(numbers: Sequence[float], runs: list[NodeRun]) -> bool:
+def complete(numbers: Numbers, runs: list[NodeRun]) -> bool:
     """Whether the runs of a joint reach 3 dR, in two step sizes where `steps_count`."""
     reached = {run.steps for run in runs if run.nodes[:, 0].max() >= _LAST - 0.05}
     return 1 in reached and (2 in reached or not steps_count(numbers))

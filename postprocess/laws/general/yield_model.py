@@ -17,7 +17,7 @@ law_fit.py makes both.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -89,6 +89,41 @@ class Yielding(NamedTuple):
     def of(self, side: str) -> Any:
         """s of the body from whose first yield one of `SIDES` tells."""
         return self.pin if side in (PIN_ALONE, "stress pin") else self.block
+
+
+class Numbers(NamedTuple):
+    """What decides a joint: plane (1: strain), p, m, n, dR/R, and s of pin and block, infinite of
+    an elastic body."""
+
+    strain: Any
+    p: Any
+    m: Any
+    n: Any
+    clearance: Any
+    pin: Any
+    block: Any
+
+    @property
+    def plane(self) -> str:
+        """The plane."""
+        return "strain" if self.strain else "stress"
+
+    @property
+    def poisson(self) -> tuple[float, float]:
+        """Poisson's ratios of pin and block."""
+        ratios = self.m, self.n
+        pin, block = (ratio / (1 + ratio) if self.strain else ratio for ratio in ratios)
+        return pin, block
+
+    @property
+    def elastic(self) -> Elastic:
+        """Those of an elastic joint."""
+        return Elastic(*self[1:5])
+
+    @property
+    def yielding(self) -> Yielding:
+        """s of both bodies."""
+        return Yielding(*self[5:])
 
 
 class Loss(NamedTuple):
@@ -279,16 +314,14 @@ class YieldModel:
         return found._replace(travel=1 + found.travel)
 
 
-def loss(numbers: Sequence[float], yielding: Yielding, x: Array) -> Loss:
-    """What yielding does at ``x`` ``(k,)`` to a joint with these ``numbers`` (see `SolvedJoints`),
-    but for its ``yielding``, with the processes that come with archord. The weaker body at each x
-    tells of it; where bodies are nearly alike, the two processes are mixed, so that P does not jump
-    where the other body becomes the weaker one."""
-    strain, *of_bodies = numbers[:5]
-    joint = Elastic(*of_bodies)
+def loss(numbers: Numbers, yielding: Yielding, x: Array) -> Loss:
+    """What yielding does at ``x`` ``(k,)`` to a joint with these ``numbers``, but for its
+    ``yielding``, with the processes that come with archord. The weaker body at each x tells of it;
+    where bodies are nearly alike, the two processes are mixed, so that P does not jump where the
+    other body becomes the weaker one."""
     pin, block, _ = np.broadcast_arrays(*yielding, x)
     pins = share_of_pin(pin, block)
-    if strain:
+    if numbers.strain:
         pin_weaker = PIN_ALONE if np.isinf(block).all() else PIN_WEAKER
         shares = {"strain block": 1 - pins, pin_weaker: pins}
     else:
@@ -298,7 +331,7 @@ def loss(numbers: Sequence[float], yielding: Yielding, x: Array) -> Loss:
         asked = share > 0
         if asked.any():
             models = {name: yield_model(name) for name in needed(side)}
-            told = total_loss(models, elastic_model(), joint, yielding, x, asked)
+            told = total_loss(models, elastic_model(), numbers.elastic, yielding, x, asked)
             found = [total + share * own for total, own in zip(found, told, strict=True)]
     return Loss(*found)
 
@@ -386,7 +419,7 @@ class SolvedJoints:
     rows.
 
     - ``side`` ``(n,)``: the index in `SIDES` of the process that a row is for
-    - ``numbers`` ``(n, 7)``: plane (1: strain), p, m, n, dR/R, s of pin and of block
+    - ``numbers`` ``(n, 7)``: `Numbers`
     - ``x0``, ``lost`` ``(n,)``: what `onset` tells
     - ``count`` ``(n,)``: how many `MULTIPLES` are known
     - ``force``, ``peak``, ``angle`` ``(n, multiples)``: the curves there
@@ -429,10 +462,8 @@ class SolvedJoints:
         chosen = self.rows(side)
         beyond = np.arange(len(MULTIPLES)) >= self.count[chosen, None]
         curves = {name: np.where(beyond, np.nan, getattr(self, name)[chosen]) for name in _CURVES}
-        own = self.numbers[chosen].T
-        elastic = Elastic(*own[1:5])
-        yielding = Yielding(*own[5:])
-        inputs = features(side, elastic, yielding, self.lost[chosen])
+        own = Numbers(*self.numbers[chosen].T)
+        inputs = features(side, own.elastic, own.yielding, self.lost[chosen])
         place = np.full(len(self.numbers), -1)
         place[chosen] = np.arange(len(chosen))
         rows = place[self.back[:, 0].astype(int)]
@@ -443,15 +474,13 @@ class SolvedJoints:
         return {"inputs": inputs, **curves, "back_inputs": deep, "back": back}
 
 
-def sides_of(numbers: Any) -> tuple[str, ...]:
-    """The `SIDES` that a joint with these ``numbers`` (see `SolvedJoints`) belongs to; the first
-    tells its law."""
-    strain, *_, pin, block = numbers
-    first = str(telling_side(bool(strain), pin, block))
-    alike = np.isfinite(block) and _alike(pin, block)
+def sides_of(numbers: Numbers) -> tuple[str, ...]:
+    """The `SIDES` that a joint with these ``numbers`` belongs to; the first tells its law."""
+    first = str(telling_side(bool(numbers.strain), *numbers.yielding))
+    alike = np.isfinite(numbers.block) and _alike(*numbers.yielding)
     if not alike:
         return (first,)
-    return first, PIN_WEAKER if strain else "stress pin"
+    return first, PIN_WEAKER if numbers.strain else "stress pin"
 
 
 def telling_side(strain: bool, pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.NDArray[np.str_]:

@@ -37,6 +37,7 @@ from archord.postprocess.laws.general.hardening_model import (
     representative,
 )
 from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.general.yield_model import Numbers
 from archord.scene.presets.joint import Scene
 
 X = np.linspace(0.0, 3.0, 241)
@@ -520,7 +521,7 @@ def test_nothing_jumps_where_the_other_body_becomes_the_weaker_one(
 
     flows = (line, flat) if hardens == "pin" else (flat, line)
     stresses = (first, second) if hardens == "pin" else (second, first)
-    numbers = (float(plane == "strain"), share, 0.45, 0.5, clearance, *stresses)
+    numbers = Numbers(float(plane == "strain"), share, 0.45, 0.5, clearance, *stresses)
     x = np.geomspace(0.3, 3.0, 1000)
     pin, block = representative(hardening_model()["strain"], numbers, flows, x).s
     assert (pin[0] < block[0]) != (pin[-1] < block[-1])
@@ -542,12 +543,12 @@ def test_forces_of_joints_that_harden_do_not_jump(plane: str) -> None:
     while tried < 60:
         first = np.exp(random.uniform(np.log(0.15), np.log(0.8), 2))
         rises = random.uniform(0.02, 0.6, 2)
-        flows = [
+        flows = tuple(
             lambda strain, s=s, rise=rise: s * (1 + rise * strain / clearance)
             for s, rise in zip(first, rises, strict=True)
-        ]
+        )
         share, *ratios = random.uniform([0.05, 0.2, 0.2], [0.95, 0.6, 0.6])
-        numbers = (float(plane == "strain"), share, *ratios, clearance, *first)
+        numbers = Numbers(float(plane == "strain"), share, *ratios, clearance, *first)
         if largest_gain(numbers, flows, x) > LARGEST_GAIN:
             continue
         tried += 1
