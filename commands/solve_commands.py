@@ -172,7 +172,7 @@ def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: 
     if file.suffix == ".toml":
         loaded = load_scene(file, overrides)
         loaded.require_mesh()
-        scene: Any = parse_any(loaded.general())
+        scene: Any = parse_any(loaded.general(), str(file))
     else:
         given: Any = {"mesh": {"file": str(file)}}
         make: Any = MeshScene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -91,8 +92,12 @@ def mesh_name(scene: ProblemScene) -> str:
 
 def scene_mesh(scene: Any, comm: MPI.Comm) -> TaggedMesh:
     """The mesh of a general ``scene``, or of a scene that has a mesh alone. Collective; raises
-    ValueError."""
+    ValueError, and `InputError` for a file that is not there."""
     mesh = scene.mesh
+    where = scene.where("mesh.file")
+    lacks = mesh.shape is None and where != mesh.file and not os.path.exists(mesh.file)
+    if comm.bcast(lacks):
+        raise InputError(f'{where}: mesh.file = "{mesh.file}" must be a file that is there.')
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
         del shape["kind"]

@@ -25,6 +25,7 @@ from archord.geometry.meshes.cells import (
     with_middle_nodes,
 )
 from archord.geometry.meshes.tagged_mesh import tags_of
+from archord.report.errors import shown
 
 _FAR = 1e30  # coordinates beyond overflow
 _INCOMPLETE = 20  # gmsh's number of triangles of third order without a node inside
@@ -164,11 +165,13 @@ class MeshArrays:
 
     def with_sets(self, sets: Mapping[str, Sequence[str]]) -> MeshArrays:
         """This mesh with more facet ``sets``, each made of others. Raises ValueError for others
-        that are not there."""
+        that are not there, and for no others."""
         facet_sets = dict(self.facet_sets)
         for name, others in sets.items():
-            tags = [tags_of("facet", self.facet_sets, other) for other in others]
+            by = f"mesh.sets.{name} = {shown(others)}: "
+            tags = [tags_of("facet", self.facet_sets, other, by) for other in others]
             facet_sets[name] = tuple(sorted(set().union(*tags)))
+            tags_of("facet", facet_sets, name, by)
         return replace(self, facet_sets=facet_sets)
 
     def second_order(self) -> MeshArrays:

@@ -108,7 +108,7 @@ def refined(
         if len(circle.centre) != mesh.dimension:
             said = f"must have a centre of {mesh.dimension} numbers, as the mesh has dimensions"
             raise ValueError(f"the circle of {circle.facets!r} {said}")
-        tags_of("facet", mesh.facet_sets, circle.facets)
+        tags_of("facet", mesh.facet_sets, circle.facets, "mesh.circle.facets: ")
         _require_near(mesh, circle)
         notes += _elsewhere(mesh, circle)
 

@@ -141,11 +141,11 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
     return f"there is no {kind} {name!r}{hint}; there are {', '.join(map(repr, known)) or 'none'}"
 
 
-def tags_of(kind: str, sets: Sets, name: str) -> tuple[int, ...]:
-    """Tags of the set ``name`` of a ``kind``. Raises ValueError if there is none, or if it is
-    empty."""
+def tags_of(kind: str, sets: Sets, name: str, by: str = "") -> tuple[int, ...]:
+    """Tags of the set ``name`` of a ``kind``. Raises ValueError, which begins with ``by``, if there
+    is none, or if it is empty."""
     if name not in sets:
-        raise ValueError(unknown(f"{kind} set", name, list(sets)))
+        raise ValueError(by + unknown(f"{kind} set", name, list(sets)))
     if not sets[name]:
-        raise ValueError(f"the {kind} set {name!r} is empty: the mesh has no {kind} of it")
+        raise ValueError(f"{by}the {kind} set {name!r} is empty: the mesh has no {kind} of it")
     return sets[name]

@@ -51,6 +51,14 @@ class Checked(Section):
             raise InputError(
                 in_sentences(error.errors(), data, type(self), source, dict(origin or {}))
             ) from None
+        # no field: scenes of different files are equal
+        self.__dict__["_places"] = {"": source} | dict(origin or {})
+
+    def where(self, key: str) -> str:
+        """What messages call the place of the dotted ``key``: the scene's file, or the option that
+        gave the key."""
+        places = self.__dict__["_places"]
+        return places.get(key, places[""])
 
     def require_open(self: Any) -> None:
         """Raise `Fault` if the scene gives a key that its accuracy chooses."""

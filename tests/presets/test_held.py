@@ -1,5 +1,6 @@
 """What is said of a general scene on a mesh file that cannot be right."""
 
+import re
 from pathlib import Path
 
 import gmsh
@@ -14,6 +15,7 @@ from archord.scene.file import load_scene, parse_any
 from archord.solver.path import system
 
 LUG = Path(__file__).parents[2] / "scenes" / "lug.toml"
+BALL = LUG.with_name("ball.toml")
 STEEL = {"E": 210000.0, "nu": 0.3}
 
 
@@ -175,9 +177,15 @@ def test_a_load_on_a_single_point_is_told(at, single):
     ] * single
 
 
-def test_a_file_that_is_not_there():
-    with pytest.raises(InputError, match=r"nowhere.msh: No such file"):
+def test_a_file_that_is_not_there(tmp_path):
+    """The scene, the key and where the file was looked for."""
+    with pytest.raises(InputError, match=r'^scene: mesh\.file = "nowhere.msh" must be a file that'):
         account("nowhere.msh")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(BALL.read_text(encoding="utf-8"), encoding="utf-8")
+    said = f'{scene}: mesh.file = "{tmp_path / "ball.msh"}" must be a file that is there.'
+    with pytest.raises(InputError, match=re.escape(said)):
+        account_of(load_scene(scene), MPI.COMM_SELF)
 
 
 def test_a_tie_holds_in_both_directions(squares):

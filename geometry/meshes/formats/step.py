@@ -76,7 +76,8 @@ def _set_sizes(gmsh: Any, faces: Mapping[str, list[int]], sizes: Sizes) -> None:
     grown = []
     for name, on_face in sizes.on.items():
         if name not in faces:
-            raise ValueError(f"there is no face {name!r} for a size; there are {', '.join(faces)}")
+            known = ", ".join(faces)
+            raise ValueError(f"mesh.sizes: there is no face {name!r} for a size; there are {known}")
         away = field.add("Distance")
         field.setNumbers(away, "SurfacesList", faces[name])
         growing = field.add("MathEval")
