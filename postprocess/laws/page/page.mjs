@@ -49,7 +49,7 @@ function bodyOf(body) {
         const nu = number(`${body}-nu`);
         if (number(`${body}-yield`) === null) return { E, nu: nu ?? NaN, yield: null };
         const strength = positive(`${body}-yield`, `The yield stress of the ${body}`);
-        if (!number(`${body}-slope`)) return { E, nu: nu ?? NaN, yield: strength };
+        if (number(`${body}-slope`) === null || number(`${body}-slope`) === 0) return { E, nu: nu ?? NaN, yield: strength };
         const rise = positive(`${body}-slope`, `The hardening slope of the ${body}`);
         return { E, nu: nu ?? NaN, yield: strength, hardening: [[0, strength], [FAR, strength + FAR * rise]] };
     }

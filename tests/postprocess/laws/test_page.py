@@ -360,6 +360,19 @@ def test_metals_by_name_are_the_metals_of_scenes(opened):
         assert load == pytest.approx(general_law(changed).at(0.12).load, rel=1e-5)
 
 
+@pytest.mark.parametrize(("slope", "refused"), [("0", False), ("2000", False), ("2 000", True)])
+def test_a_slope_that_is_no_number_is_refused(opened, slope, refused):
+    """It was perfect plasticity, whose force is another one, without a word."""
+    joint = "diameter=20&by=given&clearance=0.05&block-metal=own&block-yield=300"
+    opened.run(f"location.hash = '{joint}&block-slope={slope}'")
+    opened.run("new Promise((done) => setTimeout(done, 100))")
+    assert opened.run(READY)
+    said = opened.run("document.getElementById('refused').textContent")
+    shown = not opened.run("document.getElementById('refused').hidden")
+    assert shown == refused
+    assert (said == "The hardening slope of the block must be a positive number.") == refused
+
+
 def test_all_files_can_be_saved(opened):
     """What links are clicked to download."""
     suffixes = ("csv", "png", "py", "h", "m", "mo", "mjs")
