@@ -4,12 +4,15 @@ Margins are ``MS = allowable / applied - 1``. Forces are of the whole, as in his
 thickness where the scene has none. The applied force is ``load`` for the yield margins and
 ``load * factor`` for the ultimate ones. `archord.postprocess.judgement.sections` has the hand
 formulas. By finite elements the allowable is the largest force that the run had reached when the
-PEEQ of the part passed a limit.
+PEEQ of the part passed a limit at an integration point. A note tells how much the mesh counts for
+it.
 """
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -32,8 +35,8 @@ _NO_PULL = 1e-9  # of the largest force: round-off
 @dataclass(frozen=True)
 class StrengthCheck:
     """One allowable: ``kind`` is "yield" or "ultimate", ``by`` is "hand" or "FE", ``bound`` tells
-    that the run did not reach it, so that the ``allowable`` is the largest force that was
-    solved."""
+    that the run did not reach it, so that the ``allowable`` is the largest force that was solved,
+    ``peeq`` is the limit of it, if there is one."""
 
     kind: str
     by: str
@@ -41,6 +44,7 @@ class StrengthCheck:
     allowable: float
     applied: float
     bound: bool = False
+    peeq: float = 0.0
 
     @property
     def margin(self) -> float | None:
@@ -133,6 +137,8 @@ def margins(
         found, said = _by_elements(judged, peeq, applied, yield_peeq, last)
         checks += found
         notes += said
+        if (run.folder / "fields.h5").exists():
+            notes += _over_mesh(run, judged, [check for check in found if not check.bound])
     stress = run.scene.units.stress
     title = judged.noun if judged.name else ""
     return Margins(load, factor, judged.unit, stress, strengths, checks, notes, title)
@@ -171,7 +177,8 @@ def _by_elements(
     checks = []
     for kind, name, limit in limits:
         allowable, reached = load_at(force, peeq, limit)
-        checks.append(StrengthCheck(kind, "FE", name, allowable, applied[kind], bound=not reached))
+        check = StrengthCheck(kind, "FE", name, allowable, applied[kind], not reached, limit)
+        checks.append(check)
         notes += _without_pull(part, peeq, limit, name)
     for kind in dict.fromkeys(check.kind for check in checks if check.margin is None):
         notes.append(
@@ -179,6 +186,30 @@ def _by_elements(
             f"largest force that was solved, {force.max():.5g}; solve further"
         )
     return checks, notes
+
+
+def _over_mesh(run: Run, part: Part, checks: Sequence[StrengthCheck]) -> list[str]:
+    """A note on each of the ``checks`` of a PEEQ: the force at which the mean of a cell passes it,
+    mostly too late, and the force at which a value recovered at a node does, mostly too early."""
+    limits = {check.name: check.peeq for check in checks if check.peeq}
+    if not limits:
+        return []
+    largest: dict[str, list[float]] = defaultdict(list)
+    for step in range(1, run.steps + 1):
+        fields = run.fields(step)
+        tag = fields.bodies[part.body.name]
+        largest["by means of cells"].append(fields.peeq[fields.body == tag].max())
+        if fields.peeq_nodal is not None:
+            at_nodes = fields.peeq_nodal[fields.body_of_node == tag]
+            largest["by values recovered at nodes"].append(at_nodes.max())
+    notes = []
+    for name, limit in limits.items():
+        said = []
+        for how, found in largest.items():
+            force, reached = load_at(part.force, np.array(found), limit)
+            said.append(f"{'' if reached else '> '}{force:.5g} {part.unit} {how}")
+        notes.append(f"the mesh counts for {name}: {', '.join(said)}")
+    return notes
 
 
 def _without_pull(part: Part, peeq: Array, limit: float, name: str) -> list[str]:
