@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome
+from archord.report.by_name import ByName
 from archord.report.files import Row, write_report
 from archord.report.table import Table
 from archord.scene.file import parse_scene, resolved
@@ -117,7 +118,7 @@ def varied(scene: Scene, **sections: dict) -> Scene:
     return parse_scene(_overridden(scene.model_dump(exclude_unset=True), sections))
 
 
-def _overridden(data: dict[str, Any], sections: dict[str, dict]) -> dict[str, Any]:
+def _overridden(data: ByName, sections: dict[str, dict]) -> ByName:
     """``data`` with the keys of ``sections``, without those that are None; a rigid pin has no
     other."""
     merged = dict(data)

@@ -23,7 +23,7 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
 
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.calibration import fit
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.general_law import joint_numbers, law_of_numbers
@@ -62,7 +62,7 @@ class Off:
     P are within the expected ones."""
 
     kind: str
-    errors: dict[str, Array]
+    errors: Arrays
     inside: Array
 
 
@@ -121,7 +121,7 @@ def kind_of(numbers: Numbers) -> str:
     return f"{numbers.plane} {body}{soft}"
 
 
-def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
+def _back(law: JointCurve, run: NodeRun) -> Arrays:
     """Errors of a way back, in per cent: of P over the largest P, of the displacements at which
     parts of it are left over dR, of the energy lost over the work of loading, of P on reloading;
     and where P is within what is expected."""

@@ -16,6 +16,7 @@ from click.core import ParameterSource
 from archord.commands.law_files import exports_of, sentences, warn, write
 from archord.commands.law_joint import joint_of
 from archord.commands.options import argument, file, flag, overrides
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -261,7 +262,7 @@ def _refuse_contradictions() -> None:
             raise InputError(f"{typed[name]}: is of an export's element, and {missing}.")
 
 
-def _refuse_unused(chosen: list[Law], given: dict[str, Any], *, in_a_scene: bool) -> None:
+def _refuse_unused(chosen: list[Law], given: ByName, *, in_a_scene: bool) -> None:
     """Raise `InputError` for a coefficient that no law among the ``chosen`` has, and for a length
     that none needs, unless it is the thickness ``in_a_scene``."""
     from archord.postprocess.laws.laws import LAWS

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _OF_BODIES = ("nu", "yield_stress")
 
 
 def joint_of(
-    scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any], needed: dict[str, str]
+    scene: Path | None, overrides: tuple[str, ...], given: ByName, needed: dict[str, str]
 ) -> tuple[LawJoint, dict[str, str], float]:
     """The joint of the scene, which the options given change as ``--set`` would, or of the options
     alone; the names of the units; and the thickness. ``needed`` has the law by each parameter that
@@ -68,7 +69,7 @@ def _ask_for(missing: list[str], needed: dict[str, str]) -> str:
 
 
 def _joint_of_scene(
-    path: Path, overrides: tuple[str, ...], values: dict[str, Any], needed: dict[str, str]
+    path: Path, overrides: tuple[str, ...], values: ByName, needed: dict[str, str]
 ) -> tuple[LawJoint, dict[str, str], float]:
     """As `joint_of`, of the scene ``path``."""
     from archord.postprocess.laws.general.joint import LawJoint

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.floating]
+Arrays = dict[str, Array]  # by name
 Plane = Literal["strain", "stress", "axisymmetric", "space"]
 
 

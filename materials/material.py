@@ -17,9 +17,9 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 import numpy.typing as npt
 
-from archord.materials.kinematics import Array, Kinematics, Plane
+from archord.materials.kinematics import Array, Arrays, Kinematics, Plane
 
-__all__ = ["Array", "Material", "Plane", "Points", "State"]
+__all__ = ["Array", "Arrays", "Material", "Plane", "Points", "State"]
 State = Any
 
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.kinematics import AXISYMMETRIC, SPACE
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -122,15 +123,13 @@ def _of_copies(values: Callable[[Any], Array]) -> Callable[[Any], Array]:
 
     def of_copies(at: PointFields) -> Array:
         given = at._asdict()
-        own: dict[str, Any] = {k: v.copy() for k, v in given.items() if isinstance(v, np.ndarray)}
+        own: ByName = {k: v.copy() for k, v in given.items() if isinstance(v, np.ndarray)}
         return values(at._replace(state=deepcopy(at.state), **own))
 
     return of_copies
 
 
-def cell_means(
-    system: System, parts: Sequence[PointFields], rows: Sequence[CellField]
-) -> dict[str, Array]:
+def cell_means(system: System, parts: Sequence[PointFields], rows: Sequence[CellField]) -> Arrays:
     """The means ``(n_cells,)``, or ``(n_cells, 4)`` and in space ``(n_cells, 6)``, of this rank's
     cells by name, from the ``parts`` at the integration points."""
     found = {}

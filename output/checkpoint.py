@@ -24,6 +24,7 @@ from archord.measures.energies import Work
 from archord.measures.record import Record
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import all_arrays, hdf5_in_memory, image, put
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.report.version import VERSION
@@ -48,7 +49,7 @@ class Checkpoint:
     step: int
     scene: str
     mesh: str
-    scalars: dict[str, Any]
+    scalars: ByName
     arrays: Arrays
 
     @property
@@ -132,7 +133,7 @@ def resume(
     return Record.read(scalars["measures"]), step, position, Work(**scalars["work"])
 
 
-def _newton(attempt: dict[str, Any]) -> Newton:
+def _newton(attempt: ByName) -> Newton:
     """A solve as a checkpoint holds it; version 0.1 called active-set changes flips."""
     names = {"flips": "active_set_changes"}
     return Newton(**{names.get(name, name): value for name, value in attempt.items()})

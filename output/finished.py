@@ -4,16 +4,16 @@ with run.json."""
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from archord.output.files.seal import faults_of
 from archord.output.history import fault_of_history, read_history
+from archord.report.by_name import ByName
 from archord.scene.file import AnyScene, load_scene, resolved
 from archord.scene.mesh_digests import digests
 from archord.scene.problem import ProblemScene
 
 
-def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
+def fault_of_run(folder: Path, scene: AnyScene, report: ByName) -> str:
     """Why the run in ``folder`` with the run.json ``report`` is no finished run of ``scene``, in
     words; nothing where its files agree. Of large files only the size is read."""
     if not _is_of(folder, scene):
@@ -28,7 +28,7 @@ def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
     return f"history.csv {fault}" if fault else ""
 
 
-def fault_of_mesh(scene: AnyScene, report: dict[str, Any]) -> str:
+def fault_of_mesh(scene: AnyScene, report: ByName) -> str:
     """What happened to the mesh file of ``scene`` since the run with this ``report`` read it, in
     words; nothing where it is the same or gone, or nothing tells."""
     file = scene.mesh.file if isinstance(scene, ProblemScene) else None
@@ -47,7 +47,7 @@ def fault_of_mesh(scene: AnyScene, report: dict[str, Any]) -> str:
     return f"mesh {file}{names} was changed after the run: its sha256 is not the one in run.json"
 
 
-def history_fault(folder: Path, report: dict[str, Any]) -> str:
+def history_fault(folder: Path, report: ByName) -> str:
     """What is wrong with the history.csv in ``folder``, in words; nothing where it agrees with the
     ``report``."""
     path = folder / "history.csv"

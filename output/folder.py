@@ -7,10 +7,10 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from archord.output.files.disk import new_name
 from archord.output.files.seal import read_report
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 FILES = (
@@ -96,7 +96,7 @@ def refuse_folder(scene: Path) -> None:
     raise InputError(f"{scene}: {said}.")
 
 
-def report_of(folder: Path) -> dict[str, Any]:
+def report_of(folder: Path) -> ByName:
     """The run.json in ``folder``; empty if there is none that can be read."""
     with suppress(OSError, ValueError):
         if isinstance(report := read_report(folder / "run.json"), dict):

@@ -7,7 +7,6 @@ import tomllib
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from archord.output.checkpoint import Checkpoint
 from archord.output.files.seal import TABLES, fault_of, read_report, require_intact
 from archord.output.finished import fault_of_mesh, fault_of_run, history_fault
 from archord.output.folder import CHECKPOINT, report_of
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
@@ -34,7 +34,7 @@ class Start:
     checkpoint's."""
 
     checkpoint: Checkpoint
-    report: dict[str, Any]
+    report: ByName
     done: list[Record]
 
 
@@ -94,7 +94,7 @@ def _plan_without_checkpoint(folder: Path, scene: AnyScene) -> Plan:
     return Plan(scene, None, said)
 
 
-def _lost_tables(folder: Path, scene: AnyScene, report: dict[str, Any]) -> list[str]:
+def _lost_tables(folder: Path, scene: AnyScene, report: ByName) -> list[str]:
     """Those of the files that a run makes from the others which are missing, changed, or lack a
     step."""
     seals = report.get("files", {})
@@ -170,7 +170,7 @@ def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None
             )
 
 
-def _without_targets(keys: dict[str, Any]) -> dict[str, Any]:
+def _without_targets(keys: ByName) -> ByName:
     """The ``keys`` of a scene, its loads without their values."""
     if "load" not in keys:
         return keys

@@ -31,6 +31,7 @@ from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
 from archord.presets.account import account_of
+from archord.report.by_name import ByName
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
 from archord.solver.contact.quadrature import points_by
@@ -109,7 +110,7 @@ def solve_scene(
         watched = nullcontext(interrupt) if interrupt else Interrupt()
         status = "done"
         message = ""
-        failed: dict[str, Any] = {}
+        failed: ByName = {}
         received = 0
         try:
             with watched as account.system.equilibrium.evaluation.interrupt:
@@ -323,7 +324,7 @@ class _Output:
         return found if self.system.comm.rank == 0 else []
 
 
-def _arrays(profiles: Mapping[str, EdgeProfile], names: tuple[str, ...]) -> dict[str, Any]:
+def _arrays(profiles: Mapping[str, EdgeProfile], names: tuple[str, ...]) -> ByName:
     """The arrays of all ``profiles`` that have these ``names``, as contact.h5 names them."""
     return {
         f"{side}/{name}": getattr(profile, name)

@@ -22,6 +22,7 @@ from archord.measures.record import Record
 from archord.output.files.disk import replace_file
 from archord.output.files.seal import report_text, seals_of
 from archord.presets.joint_doubts import APART
+from archord.report.by_name import ByName
 from archord.report.doubts import Told, kind, tell
 from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
@@ -52,7 +53,7 @@ class Report:
         worst_cells: dict[str, float],
         begun: float,
         steps: list[Record],
-        before: dict[str, Any],
+        before: ByName,
     ) -> None:
         self.path = path
         self.account = account
@@ -76,7 +77,7 @@ class Report:
         ]
         facts = account.facts()
         facts["mesh"]["worst_cells"] = worst_cells
-        self.content: dict[str, Any] = {
+        self.content: ByName = {
             "status": "running",
             "message": "",
             "started": before.get("started", now),
@@ -194,7 +195,7 @@ def peak_memory() -> int:
         return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def _finite(value: dict[str, Any]) -> dict[str, Any]:
+def _finite(value: ByName) -> ByName:
     """``value`` with null for numbers that are none, which JSON does not know (residuals of a solve
     that failed)."""
     return json.loads(json.dumps(value), parse_constant=lambda name: None)

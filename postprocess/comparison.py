@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.postprocess.curve import first_loading, gap_name
 from archord.postprocess.run import Run
 from archord.report.errors import InputError
@@ -42,7 +42,7 @@ class Comparison:
     labels: dict[str, str]  # of "load" and of the quantities
     step_by_step: bool
     load: Array  # (n,)
-    values: dict[str, Array]  # (r, n)
+    values: Arrays  # (r, n)
     interpolated: np.ndarray  # (r, n) whether the values lie between steps
 
     def relative(self, name: str) -> Array:
@@ -94,12 +94,12 @@ def _shared_loads(loads: list[Array], margin: float) -> Array:
     return first[(first >= low) & (first <= high)]
 
 
-def _on_first_loading(table: dict[str, Array]) -> dict[str, Array]:
+def _on_first_loading(table: Arrays) -> Arrays:
     first = first_loading(table["load"])
     return {name: values[first] for name, values in table.items()}
 
 
-Curves = tuple[list[dict[str, Array]], dict[str, str], Array]
+Curves = tuple[list[Arrays], dict[str, str], Array]
 
 
 def curves_of(runs: Sequence[Run]) -> Curves:
@@ -170,7 +170,7 @@ def _curves_of_joints(runs: Sequence[Run]) -> Curves:
     return tables, {named[name]: labels[name] for name in named}, per["p0"]
 
 
-def _at(load: Array, table: dict[str, Array], between: np.ndarray) -> dict[str, Array]:
+def _at(load: Array, table: Arrays, between: np.ndarray) -> Arrays:
     """The first loading of a run at ``load`` ``(n,)``; interpolated where that lies ``between`` its
     own loads."""
     own = table["load"]

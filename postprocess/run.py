@@ -35,6 +35,7 @@ from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.probes.ask import probe
 from archord.postprocess.probes.probe import Probe
 from archord.presets.views import view_of
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.file import load_scene
 
@@ -58,12 +59,12 @@ class _Report(BaseModel):
     versions: dict[str, str]
     seconds: dict[str, float]
     totals: dict[str, float]
-    steps: list[dict[str, Any]]
-    mesh: dict[str, Any] = {}
+    steps: list[ByName]
+    mesh: ByName = {}
     bodies: dict[str, Annotated[list[int], Field(min_length=1)]] = {}
     error_estimates: dict[str, float | None] = {}
     peak_memory: list[float] = []
-    accuracy: dict[str, Any] | None = None
+    accuracy: ByName | None = None
 
 
 class Run:
@@ -130,7 +131,7 @@ class Run:
             if not (self.folder / name).is_file():
                 raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
         # before the history, which a run writes first
-        self.summary: dict[str, Any] = self._read_report()
+        self.summary: ByName = self._read_report()
         require_intact(self.folder, ["scene.toml"])
         self.scene: Any = load_scene(self.folder / "scene.toml")
         self.view = view_of(self.scene)
@@ -168,7 +169,7 @@ class Run:
         columns["P"] /= self.scene.thickness
         return RunCurve(str(self.folder), self.scene, **columns, folder=self.folder)
 
-    def contact(self, step: int | None = None) -> dict[str, Any]:
+    def contact(self, step: int | None = None) -> ByName:
         """The contact along the integrated surfaces at ``step`` (the last), arrays by name: of a
         joint "pin" and "hole". Raises `InputError` without such a step, and where nothing may
         touch."""
@@ -330,7 +331,7 @@ class Run:
         named = (heading.partition(" [") for heading in headings)
         return columns, {name: unit.removesuffix("]") for name, _, unit in named if unit}
 
-    def _read_report(self) -> dict[str, Any]:
+    def _read_report(self) -> ByName:
         path = self.folder / "run.json"
         fault = ""
         try:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 from mpi4py import MPI
 
@@ -32,6 +31,7 @@ from archord.presets.problem import (
     require_no_lever,
 )
 from archord.presets.solid_measures import solid_measures
+from archord.report.by_name import ByName
 from archord.report.timer import Timer
 from archord.scene.columns import supporting
 from archord.scene.mesh_digests import digests
@@ -166,9 +166,9 @@ def _balance_of(scene: ProblemScene, axes: Sequence[str]) -> Callable[[Accepted,
 
 def _facts(
     scene: ProblemScene, system: System, mirrors: Sequence[Mirror], file: str | None
-) -> dict[str, Any]:
+) -> ByName:
     """Sizes of the mesh, which is in a ``file``, if any, and what was made of the scene."""
-    source: dict[str, Any] = {"file": scene.mesh.file} if scene.mesh.file else {}
+    source: ByName = {"file": scene.mesh.file} if scene.mesh.file else {}
     if file:
         beside = digests(Path(file))
         source["sha256"] = beside.pop("")
@@ -179,7 +179,7 @@ def _facts(
         interface.interaction.name: [pair.share for pair in interface.pairs]
         for interface in system.contact.interfaces
     }
-    model: dict[str, Any] = {"contact_shares": shares}
+    model: ByName = {"contact_shares": shares}
     if mirrors:
         model["mirrors"] = [(mirror.axis, mirror.at) for mirror in mirrors]
     return {

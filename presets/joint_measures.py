@@ -19,6 +19,7 @@ from archord.measures.record import WORST, Record
 from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
 from archord.presets.joint import joint_problem
 from archord.presets.joint_doubts import before_steps, ending, step_checks
+from archord.report.by_name import ByName
 from archord.report.timer import Timer
 from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
@@ -149,7 +150,7 @@ class JointMeasures:
             scale = nodal
         return max(abs(force - P) for force in forces.values()) / scale if scale else 0.0
 
-    def facts(self) -> dict[str, dict[str, Any]]:
+    def facts(self) -> dict[str, ByName]:
         """Sizes of the mesh and what was made of the scene, for run.json."""
         shares = [pair.share for pair in self.system.contact.pairs]
         model = {"E_star": self.scene.E_star, "contact_shares": shares}

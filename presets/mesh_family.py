@@ -15,6 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from archord.measures.record import Record
+from archord.report.by_name import ByName
 from archord.scene.file import AnyScene
 from archord.scene.presets.joint import Scene
 from archord.scene.presets.joint_geometry import JointGeometry
@@ -125,7 +126,7 @@ class ProblemFamily:
         dimension = 3 if self.scene.in_space else 2
         if level and self.dofs * self.ratio**dimension > _MOST_DOFS:
             return None
-        changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
+        changes: ByName = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _FIRST_OF_SHAPE / self.ratio**level
             changes = {"shape": resized(self.shape, factor * self.shape.h, factor)}
@@ -181,7 +182,7 @@ def coarser(scene: ProblemScene) -> ProblemScene | None:
 
 def resized(shape: Any, size: float, steeper: float) -> Any:
     """The ``shape`` with elements of another ``size``, which grow by a factor ``steeper``."""
-    sizes: dict[str, Any] = {
+    sizes: ByName = {
         "element_size": rounded(size),
         "growth": rounded(steeper * shape.growth),
     }
@@ -203,7 +204,7 @@ def expected_angle(scene: Scene) -> float:
     return math.atan2(math.sqrt(delta * (2 * dR + delta)), dR) if delta else _WIDE
 
 
-def chosen(scene: AnyScene, substeps: int) -> dict[str, Any]:
+def chosen(scene: AnyScene, substeps: int) -> ByName:
     """The sections of ``scene`` that make it ask for no accuracy, but for so many ``substeps`` an
     output step."""
     length = 1 / substeps

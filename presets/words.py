@@ -15,6 +15,7 @@ from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.materials.material import Material
 from archord.report.attributes import attributes_of, described
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.contact import CONTACT_LAWS
@@ -38,7 +39,7 @@ def words_of(problem: Problem, mesh_file: str, fields: str | bool = "nodes") -> 
     return make("archord.Problem", None, **_sections(problem, mesh_file, fields))
 
 
-def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> dict[str, Any]:
+def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> ByName:
     for part in (*problem.supports, *problem.loads, *problem.means, *problem.drives):
         if not isinstance(part, (Support, Load)):
             kind = type(part).__name__
@@ -76,7 +77,7 @@ def _require_true_stresses(problem: Problem) -> None:
             )
 
 
-def _mesh(mesh: Any, file: str) -> dict[str, Any]:
+def _mesh(mesh: Any, file: str) -> ByName:
     if not isinstance(mesh, Mesh):
         return {"file": file}
     circles = [
@@ -89,11 +90,11 @@ def _mesh(mesh: Any, file: str) -> dict[str, Any]:
     return {"file": file, "circle": circles} | changes
 
 
-def _body(body: Body, plane: str) -> dict[str, Any]:
+def _body(body: Body, plane: str) -> ByName:
     return {"name": body.name, "cells": body.cells} | material_words(body.material, plane)
 
 
-def material_words(material: Any, plane: str) -> dict[str, Any]:
+def material_words(material: Any, plane: str) -> ByName:
     """The keys of a body's section for ``material`` in a problem of these kinematics: a scene's, or
     a description of a class of one's own, with E and nu of its elastic moduli."""
     kind = type(material)
@@ -110,7 +111,7 @@ def material_words(material: Any, plane: str) -> dict[str, Any]:
     return _moduli(material, plane) | {"own": _own(material) | {"plastic": bool(material.yields)}}
 
 
-def _hardening(law: Hardening) -> dict[str, Any] | None:
+def _hardening(law: Hardening) -> ByName | None:
     """The keys of a body's section for a hardening law, None for a class of one's own."""
     if type(law) is LinearHardening:
         return {"yield_stress": law.yield_stress, "hardening": law.modulus}
@@ -138,7 +139,7 @@ def _moduli(material: Any, plane: str) -> dict[str, float]:
     return {"E": along * (1 + nu) * (1 - 2 * nu) / (1 - nu), "nu": nu}
 
 
-def _own(part: Any) -> dict[str, Any]:
+def _own(part: Any) -> ByName:
     """An object of a class of one's own in words, the same ones in every process."""
     return {
         "kind": type(part).__qualname__,
@@ -147,9 +148,9 @@ def _own(part: Any) -> dict[str, Any]:
     }
 
 
-def _interaction(part: Interaction) -> dict[str, Any]:
+def _interaction(part: Interaction) -> ByName:
     disc = part.disc
-    words: dict[str, Any] = {
+    words: ByName = {
         "name": part.name,
         "surfaces": [name for name in part.surfaces if isinstance(name, str)],
         "friction": part.friction,
@@ -162,7 +163,7 @@ def _interaction(part: Interaction) -> dict[str, Any]:
     return words | _law(part.law)
 
 
-def _law(law: Any) -> dict[str, Any]:
+def _law(law: Any) -> ByName:
     """The keys of an interaction's section for a contact law."""
     if isinstance(law, str):
         return {"law": law}
@@ -175,16 +176,16 @@ def _law(law: Any) -> dict[str, Any]:
     return {"own": _own(law) | {"friction": bool(law.has_friction), "quantities": units}}
 
 
-def _support(support: Support, dimension: int) -> dict[str, Any]:
+def _support(support: Support, dimension: int) -> ByName:
     return {"name": support.name, "on": support.on, "fixed": support.held(dimension)}
 
 
-def _coupling(coupling: Coupling, dimension: int) -> dict[str, Any]:
+def _coupling(coupling: Coupling, dimension: int) -> ByName:
     return vars(coupling) | {"point": coupling.point or (0.0,) * dimension}
 
 
-def _load(load: Load) -> dict[str, Any]:
-    words: dict[str, Any] = {"name": load.name, "on": load.on, "direction": load.direction}
+def _load(load: Load) -> ByName:
+    words: ByName = {"name": load.name, "on": load.on, "direction": load.direction}
     words[load.kind] = getattr(load, load.kind)
     if load.core is not None:
         centre, radius = load.core
@@ -199,7 +200,7 @@ def _plane(problem: Problem) -> str:
     return "space" if problem.mesh.dimension == 3 else "strain"
 
 
-def _analysis(problem: Problem) -> dict[str, Any]:
+def _analysis(problem: Problem) -> ByName:
     are_large = {getattr(body.material, "finite", False) for body in problem.bodies}
     if len(are_large) > 1:
         said = 'bodies are at small and at large strain; strain = "large" takes all to large strain'

@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.scene.presets.joint import CHOSEN, Scene
@@ -35,7 +36,7 @@ AnyScene = Scene | ProblemScene
 
 
 def parse_scene(
-    data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None
+    data: ByName, source: str = "scene", origin: Mapping[str, str] | None = None
 ) -> Scene:
     """The joint of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere.
     Raises `InputError`."""
@@ -44,7 +45,7 @@ def parse_scene(
 
 
 def parse_any(
-    data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None
+    data: ByName, source: str = "scene", origin: Mapping[str, str] | None = None
 ) -> AnyScene:
     """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
     preset: Any = next((scene for name, scene in PRESETS.items() if name in data), None)
@@ -126,7 +127,7 @@ def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
     return [path, *(path.parent / name for name in named if isinstance(name, str))]
 
 
-def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
+def _give_way(data: ByName, overrides: Sequence[str]) -> None:
     """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other
     way round."""
     given = {override.partition("=")[0].strip() for override in overrides if not _drops(override)}
@@ -140,7 +141,7 @@ def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
             data[section].pop(name, None)
 
 
-def read_targets(data: dict[str, Any], scene: Path) -> None:
+def read_targets(data: ByName, scene: Path) -> None:
     """Put the targets of the file ``load.path``, beside the file ``scene``, into ``data``; each is
     one step by default.
 
@@ -185,7 +186,7 @@ def read_text(path: str | Path) -> str:
         raise InputError(f"{path}: cannot be read: {said}.") from None
 
 
-def read_toml(path: str | Path) -> dict[str, Any]:
+def read_toml(path: str | Path) -> ByName:
     """What the TOML file ``path`` holds. Raises `InputError`."""
     text = read_text(path)
     try:
@@ -197,14 +198,14 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
 
 
-def _parsed(text: str) -> dict[str, Any]:
+def _parsed(text: str) -> ByName:
     """What the TOML ``text`` says. Raises ValueError, RecursionError."""
     if _LONG_KEY.search(text):
         raise ValueError(f"a key has more than {_DEEPEST} dotted parts")
     return tomllib.loads(text)
 
 
-def override_key(data: dict[str, Any], override: str) -> str:
+def override_key(data: ByName, override: str) -> str:
     """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in a table by its name, or number
     from 1 (value: TOML, a number, else text; none: drop it); returns the key as faults name it.
     Raises `InputError`."""
@@ -242,7 +243,7 @@ def override_key(data: dict[str, Any], override: str) -> str:
     return f"{section} {json.dumps(part) if 'name' in known[part] else part}.{name}"
 
 
-def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
+def put(data: ByName, section: str, name: str, value: Any, said: str) -> None:
     """Set a key of scene ``data``, or drop it if ``value`` is `ABSENT`; what it is an alternative
     to goes, too.
 
@@ -300,9 +301,9 @@ def resolved(scene: AnyScene, beside: Path | None = None) -> str:
     return tomli_w.dumps(data)
 
 
-def scene_keys(scene: AnyScene) -> dict[str, Any]:
+def scene_keys(scene: AnyScene) -> ByName:
     """Every key of the resolved scene by its dotted name."""
-    found: dict[str, Any] = {}
+    found: ByName = {}
     for section, keys in tomllib.loads(resolved(scene)).items():
         found |= (
             {f"{section}.{k}": v for k, v in keys.items()}

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any, get_args, get_origin
 
 from archord.materials.named import metals
+from archord.report.by_name import ByName
 from archord.report.table import Table
 from archord.scene.parts import MeshSection
 from archord.scene.presets.joint import FORMAT as JOINT_FORMAT
@@ -17,14 +18,12 @@ from archord.scene.problem import FORMAT, ProblemScene
 from archord.scene.sections.bodies import Solid
 from archord.scene.sections.errors import toml_value
 
-_JOINT: dict[str, Any] = {
-    name: info for name, info in Scene.model_fields.items() if name != "format"
-}
-_GENERAL: dict[str, Any] = {
+_JOINT: ByName = {name: info for name, info in Scene.model_fields.items() if name != "format"}
+_GENERAL: ByName = {
     name: info for name, info in ProblemScene.model_fields.items() if name != "format"
 }
 _GENERAL["mesh.circle"] = MeshSection.model_fields["circle"]
-_PRESETS: dict[str, dict[str, Any]] = {
+_PRESETS: dict[str, ByName] = {
     name: {
         section: info
         for section, info in scene.model_fields.items()
@@ -135,7 +134,7 @@ def reference() -> str:
     return "\n".join(parts)
 
 
-def _solids(sections: dict[str, Any]) -> dict[str, Any]:
+def _solids(sections: ByName) -> ByName:
     """The section of the block, with the keys of all materials, for each solid of ``sections``."""
     solid = [name for name, info in sections.items() if issubclass(_model_of(info), Solid)]
     return dict.fromkeys(solid, _JOINT["block"])
@@ -145,7 +144,7 @@ def _model_of(section: Any) -> Any:
     return next(iter(get_args(section.annotation)), section.annotation)
 
 
-def _in_words(preset: str, sections: dict[str, Any]) -> str:
+def _in_words(preset: str, sections: ByName) -> str:
     """The sections of a ``preset``, as the page names them."""
     others = [(_heading(name, info), info) for name, info in sections.items() if name != preset]
     needed = [f"`{heading}`" for heading, info in others if info.is_required()]
@@ -154,7 +153,7 @@ def _in_words(preset: str, sections: dict[str, Any]) -> str:
     return f"`[{preset}]` (and {said})" if said else f"`[{preset}]`"
 
 
-def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
+def _tables(sections: ByName, before: ByName) -> Iterator[str]:
     """Tables of the keys of ``sections``, without those that stood ``before``."""
     for section, info in sections.items():
         known = {}
@@ -209,7 +208,7 @@ def materials() -> str:
     return table.markdown()
 
 
-def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+def _keys(section: Any) -> Iterator[tuple[str, Any, ByName]]:
     """Name, field and JSON schema of every key of a section."""
     model = _model_of(section)
     schemas = model.model_json_schema()["properties"]
@@ -218,7 +217,7 @@ def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
             yield name, model.model_fields[name], schemas[name]
 
 
-def _allowed(schema: dict[str, Any]) -> str:
+def _allowed(schema: ByName) -> str:
     """Type and limits of a key from its JSON schema, for a table."""
     kinds = [kind for part in schema.get("anyOf", [schema]) for kind in part.get("oneOf", [part])]
     one, *more = [s for s in kinds if s.get("type") != "null"]

@@ -28,6 +28,7 @@ from archord.output.run import Outcome, solve_scene
 from archord.postprocess.judgement.convergence import Curve, mesh_error, richardson, step_error
 from archord.presets.joint_doubts import UNSEEN
 from archord.presets.views import view_of
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.file import AnyScene
 from archord.solver.path.system import System
@@ -118,7 +119,7 @@ class _Search:
     interrupt: Interrupt
     on_start: Callable[[System], None]
     on_level: Callable[[Level], None]
-    options: dict[str, Any]
+    options: ByName
     outcome: Outcome | None = None
     substeps: int = 1
     mesh_error: float | None = None

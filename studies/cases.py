@@ -25,6 +25,7 @@ from pydantic import (
     model_validator,
 )
 
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.file import (
     ABSENT,
@@ -134,7 +135,7 @@ class SweepFile(Section):
     ``latin_hypercube``, in all combinations."""
 
     model_config = ConfigDict(populate_by_name=True)
-    base: dict[str, Any]
+    base: ByName
     list_: list[Annotated[Overrides, BeforeValidator(flattened)]] = Field(
         default=[], alias="list", min_length=1
     )
@@ -194,7 +195,7 @@ def _was_solved(path: Path) -> bool:
     return path.name == "sweep.toml" and (path.parent / "cases").is_dir()
 
 
-def _add_defaults(base: dict[str, Any]) -> None:
+def _add_defaults(base: ByName) -> None:
     """Put `DEFAULTS` into the table ``base`` of a scene, where it says nothing."""
     for key, value in DEFAULTS.items():
         section, _, name = key.partition(".")
@@ -404,7 +405,7 @@ def run_name(scene: AnyScene) -> str:
     ).hexdigest()[:12]
 
 
-def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> AnyScene:
+def _scene(base: ByName, overrides: Overrides, path: Path) -> AnyScene:
     """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
     ordered = in_order(f"{key}={toml_value(value)}" for key, value in overrides.items())

@@ -26,6 +26,7 @@ from archord.postprocess.laws.general.yield_model import (
     mesh_excess,
     sides_of,
 )
+from archord.report.by_name import ByName
 from archord.report.files import replacing, write_rows
 from archord.studies.law_design import FRESH, Drawn, Row, joints, sweep_file
 
@@ -111,7 +112,7 @@ def checksums(files: Iterable[Path]) -> str:
     return "".join(f"{digest}  {name}\n" for digest, name in digests)
 
 
-def _curve(numbers: Numbers, runs: Sequence[NodeRun]) -> Iterable[dict[str, Any]]:
+def _curve(numbers: Numbers, runs: Sequence[NodeRun]) -> Iterable[ByName]:
     """First loading of the joint with these ``numbers``, extrapolated to infinitely many steps
     where it was solved twice, and the way back."""
     nodes = first_loading(list(runs))
@@ -151,7 +152,7 @@ def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:
 
 def _row(
     way: str, x: float, y: float, error: float, p0: float = np.nan, eps: float = np.nan
-) -> dict[str, Any]:
+) -> ByName:
     return {
         "way": way,
         "delta/dR": x,
@@ -162,7 +163,7 @@ def _row(
     }
 
 
-def _short(row: dict[str, Any]) -> dict[str, object]:
+def _short(row: ByName) -> dict[str, object]:
     """With six digits; nothing for what is not known."""
     return {key: _written(value) for key, value in row.items()}
 

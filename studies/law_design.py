@@ -134,8 +134,8 @@ fields = false
 @dataclass(frozen=True)
 class Drawn:
     """A joint: ``own`` keys of its scene, in units of R and E*; its ``numbers``; x0 of the body
-    that yields ``first`` and of the body that decides ``last`` (infinite: elastic); and two more random
-    numbers."""
+    that yields ``first`` and of the body that decides ``last`` (infinite: elastic); and two more
+    random numbers."""
 
     own: Row
     numbers: Numbers

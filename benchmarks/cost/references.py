@@ -19,7 +19,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -35,6 +34,7 @@ from archord.benchmarks.cost.work_precision_codes import (
 from archord.benchmarks.timing import Said
 from archord.geometry.basis import Array
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.table import Table
 from archord.scene.presets.joint import Scene
 
@@ -57,7 +57,7 @@ class Solved:
     """A mesh of a family: the element size over R, and what was found at the last step."""
 
     size: float
-    found: dict[str, Any]
+    found: ByName
 
 
 @dataclass(frozen=True)
@@ -173,10 +173,10 @@ def reference(solved: Sequence[Sequence[Solved]], quantity: str, other: float | 
     return Reference(limits, other)
 
 
-def references(case: str, folder: Path, said: Said, table: Table) -> dict[str, Any]:
+def references(case: str, folder: Path, said: Said, table: Table) -> ByName:
     """What references.json holds of a ``case``; adds its rows to the ``table``."""
     given = CASES[case]
-    entry: dict[str, Any] = {"profile_error": {}, "profile": {}}
+    entry: ByName = {"profile_error": {}, "profile": {}}
     for kinematics in KINEMATICS:
         solved = solve(case, kinematics, folder, said)
         # fixed pairs can be chosen along the normals of either side

@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from archord.benchmarks.cost.work_precision_codes import CASES, Point, points, profile_error
 from archord.benchmarks.timing import Said, Timing, time_all
 from archord.benchmarks.work_precision_picture import STEM, cases, draw, short_table
+from archord.report.by_name import ByName
 from archord.report.files import replacing, write_rows
 
 NAMES = ("P", "p0", "eps", "profile", "dissipation")
@@ -26,7 +26,7 @@ class Line:
     timing: Timing
 
     @property
-    def found(self) -> dict[str, Any]:
+    def found(self) -> ByName:
         """The result of the last run."""
         return {} if self.timing.failure else self.timing.runs[-1].result
 

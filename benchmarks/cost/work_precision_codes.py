@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,6 +30,7 @@ from archord.benchmarks.timing import Failure, Process, solving
 from archord.geometry.basis import Array
 from archord.postprocess.run import Run
 from archord.presets.arc import ArcProfile
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.version import VERSION
 from archord.scene.file import AnyScene, parse_any, resolved
@@ -38,8 +38,8 @@ from archord.scene.sections.bodies import Pin
 
 DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
 REFERENCES = Path(__file__).with_name("references.json")
-_KNOWN: dict[str, dict[str, Any]] = json.loads(REFERENCES.read_text(encoding="utf-8"))
-CASES: dict[str, dict[str, Any]] = {
+_KNOWN: dict[str, ByName] = json.loads(REFERENCES.read_text(encoding="utf-8"))
+CASES: dict[str, ByName] = {
     case: given | _KNOWN.get(case, {}) for case, given in DATA["cases"].items()
 }
 OURS = "archord"
@@ -108,7 +108,7 @@ def points(patterns: Sequence[str] = ()) -> list[Point]:
     ]
 
 
-def _of_series(case: str, series: dict[str, Any], version: str) -> Iterator[Point]:
+def _of_series(case: str, series: ByName, version: str) -> Iterator[Point]:
     """The points of a series of archord or CalculiX, from coarse to fine."""
     given = CASES[case]
     code = series["code"]
@@ -153,9 +153,9 @@ def profile_error(pressure: Array, reference: Array) -> float:
     return float(np.sqrt(difference / np.trapezoid(reference**2, ANGLES)))
 
 
-def quantities_of(run: Run) -> dict[str, Any]:
+def quantities_of(run: Run) -> ByName:
     """What a ``run`` of the paper's joint found at its last step."""
-    found: dict[str, Any] = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
+    found: ByName = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
     # the unbiased contact integrates one half of the pressure on either side
     sides = [_profile_of(arc, run.scene.plastic) for arc in run.contact().values()]
     return found | {"profile": np.mean(sides, axis=0), "dofs": run.summary["mesh"]["dofs"]}
@@ -177,7 +177,7 @@ def _pin_of(scene: AnyScene) -> Pin | None:
 def _archord(scene: AnyScene, folder: Path) -> Process:
     (folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
 
-    def read() -> dict[str, Any]:
+    def read() -> ByName:
         run = Run(folder / "run")
         if _pin_of(scene) is None:
             found = {"P": run.columns["pull force"][-1]}
@@ -196,7 +196,7 @@ def _archord(scene: AnyScene, folder: Path) -> Process:
 def _calculix(scene: AnyScene, folder: Path) -> Process:
     process = calculix.process(scene, folder)
 
-    def read() -> dict[str, Any]:
+    def read() -> ByName:
         opinion = process.read()
         # neither contact angle nor profile: pressures at the nodes near the edge scatter too much
         found = {
@@ -231,7 +231,7 @@ def _calculix_version() -> dict[str, str]:
 def _peer(peer: Peer, case: str, size: float, order: int, steps: int, folder: Path) -> Process:
     output = folder / "result.json"
 
-    def read() -> dict[str, Any]:
+    def read() -> ByName:
         found = json.loads(output.read_text(encoding="utf-8"))
         if found["failed"]:
             raise Failure(found["failed"])

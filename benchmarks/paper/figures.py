@@ -16,7 +16,7 @@ import numpy as np
 
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, MILD_YIELD, PLANES, Runs
 from archord.geometry.basis import Array
-from archord.materials.material import Plane
+from archord.materials.material import Arrays, Plane
 from archord.postprocess.arrays.arc import read_contact
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
@@ -24,6 +24,7 @@ from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_p
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.postprocess.pictures.joint import field_panel
+from archord.report.by_name import ByName
 from archord.report.figure import new_figure, save
 from archord.report.files import replacing, write_rows
 
@@ -45,7 +46,7 @@ LAYOUTS: dict[str, dict] = tomllib.loads(
 )
 
 
-def columns(parts: list[Part], **where: object) -> dict[str, Array]:
+def columns(parts: list[Part], **where: object) -> Arrays:
     """The columns of the ``parts`` in which these entries have these values, one below the
     other."""
     chosen = [part for part in parts if where.items() <= scalars(part).items()]
@@ -83,7 +84,7 @@ def rows_of(part: Part) -> Iterator[Part]:
         yield {key: f"{v:.10g}" if isinstance(v, float) else v for key, v in row}
 
 
-def draw(canvas: Any, parts: list[Part], layout: dict[str, Any]) -> None:
+def draw(canvas: Any, parts: list[Part], layout: ByName) -> None:
     """Draw those of the ``parts`` that the ``layout`` asks for: marks for ours, lines for laws."""
     axes = canvas.subplots()
     x = layout["x"]

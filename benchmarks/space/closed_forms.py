@@ -41,6 +41,7 @@ from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.material import Material
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.table import Table
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
 
@@ -125,7 +126,7 @@ def mindlin(size: float) -> Iterator[Compared]:
     force = 2 / 3 * E / balls.BALL  # by Hertz, at a = 1
     aside = _PUSHED * share * force
     push = Load("push", on="ball top", direction="x", displacement=[0.0, aside])
-    how: dict[str, Any] = {"material": Elastic(E, 0.0), "friction": FRICTION, "steps": [2, 4]}
+    how: ByName = {"material": Elastic(E, 0.0), "friction": FRICTION, "steps": [2, 4]}
     with _run_of(_balls(size, 2, push, **how)) as run:
         pressing = abs(run.columns["ball force"][-1])
         pushing = abs(run.columns["push force"][-1])

@@ -11,12 +11,12 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from mpi4py import MPI
 
 from archord.measures.record import Record
 from archord.output.run import solve_scene
+from archord.report.by_name import ByName
 from archord.report.table import Table
 from archord.scene.file import parse_any
 
@@ -24,14 +24,14 @@ THICKNESSES = (0.2, 0.5, 1.0, 2.0, 4.0)  # over R
 _RADIUS = 10.0
 _STEPS = (1, 2, 4)  # of the four whose loads stand in the table
 STEEL = {"E": 210000.0, "nu": 0.3}
-JOINT: dict[str, Any] = {
+JOINT: ByName = {
     "radius": _RADIUS,
     "clearance": 0.05,
     "block_size": 40.0,
     "relative_element_size": 0.15,
     "growth": 0.35,
 }
-_SCENE: dict[str, Any] = {
+_SCENE: ByName = {
     "joint": JOINT,
     "pin": STEEL,
     "block": STEEL | {"yield_stress": 300.0},
@@ -40,7 +40,7 @@ _SCENE: dict[str, Any] = {
 }
 
 
-def solved(changes: dict[str, Any]) -> Sequence[Record]:
+def solved(changes: ByName) -> Sequence[Record]:
     """The steps of the joint with ``changes`` of its sections."""
     with tempfile.TemporaryDirectory() as folder:
         run = solve_scene(parse_any(_SCENE | changes), Path(folder), MPI.COMM_SELF)

@@ -24,6 +24,7 @@ from archord.benchmarks.case import Case, Expected, paper_joint, varied
 from archord.benchmarks.persson import persson_joint, theory
 from archord.benchmarks.stability.eye import drawn_eye
 from archord.presets.views import view_of
+from archord.report.by_name import ByName
 from archord.scene.file import AnyScene, parse_any
 from archord.scene.presets.joint import Scene
 
@@ -55,7 +56,7 @@ def cases() -> dict[str, Case]:
     return found
 
 
-def _tables(file: str) -> dict[str, Any]:
+def _tables(file: str) -> ByName:
     """The tables of a ``file`` beside this one."""
     return tomllib.loads(FILE.with_name(file).read_text(encoding="utf-8"))
 
@@ -69,14 +70,14 @@ def _merged(base: Any, keys: Any) -> Any:
 
 
 def _case(
-    name: str, group: str, keys: dict[str, Any], scene: Callable[[Any], AnyScene], default: str
+    name: str, group: str, keys: ByName, scene: Callable[[Any], AnyScene], default: str
 ) -> Case:
     limits = {key: keys.pop(key) for key in ("stops", "warns", "budget") if key in keys}
     expected = _expected(keys, bool(limits.get("stops")), default)
     return Case(name, scene(keys), group, expected, **limits)
 
 
-def _expected(keys: dict[str, Any], stops: bool, default: str) -> tuple[Expected, ...]:
+def _expected(keys: ByName, stops: bool, default: str) -> tuple[Expected, ...]:
     """What a case must give, by the ``keys`` that say so, which are taken out."""
     of, like, value, fine = (keys.pop(key, None) for key in ("of", "like", "value", "fine"))
     if "persson" in keys and not (like or fine):
@@ -89,7 +90,7 @@ def _expected(keys: dict[str, Any], stops: bool, default: str) -> tuple[Expected
     return tuple(Expected(quantity, *said) for quantity in of or [default or "pull force"])
 
 
-def _joint(keys: dict[str, Any]) -> Scene:
+def _joint(keys: ByName) -> Scene:
     """The joint that the rest of the ``keys`` of a case describe."""
     size = keys.pop("size", _COARSE)
     steps = keys.pop("steps", _STEPS)
@@ -114,7 +115,7 @@ def _joint(keys: dict[str, Any]) -> Scene:
     return paper_joint(size, steps, strength, **keys)
 
 
-def _problem(keys: dict[str, Any]) -> AnyScene:
+def _problem(keys: ByName) -> AnyScene:
     """The scene of a case's ``keys``, its ``blocks`` or its ``eye``, if there is one, drawn as a
     mesh file."""
     load = keys["load"]

@@ -10,6 +10,7 @@ from scipy.linalg import null_space
 
 from archord.geometry.basis import Array
 from archord.geometry.vectors import crossed
+from archord.materials.material import Arrays
 
 PLANE: Sequence[str] = ("x", "y", "rotation")
 SPACE: Sequence[str] = ("x", "y", "z", "rotation x", "rotation y", "rotation z")
@@ -67,7 +68,7 @@ def _along(n: Array, x: Array, motions: Sequence[str]) -> Array:
     d)``."""
     if n.shape[1] == len(motions):
         return n
-    moved: dict[str, Array] = dict(zip("xyz", n.T, strict=False))
+    moved: Arrays = dict(zip("xyz", n.T, strict=False))
     if x.shape[1] == 3:
         moments = np.cross(x, n)
         moved |= zip(SPACE[3:], moments.T, strict=True)

@@ -15,6 +15,7 @@ from archord.geometry.meshes.cells import along, outer_sides, side_kind
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import place
 from archord.geometry.patches import Patches
+from archord.report.by_name import ByName
 
 # of a side: how deep bodies may overlap by their sides being straight, or curved
 _INTO_STRAIGHT = 0.02
@@ -155,7 +156,7 @@ def overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
     is ``allowed``."""
     into = _INTO_CURVED if mesh.order > 1 else _INTO_STRAIGHT
     outline: Any = _Outline if mesh.dimension == 2 else _Hull
-    outlines: dict[str, Any] = {}
+    outlines: ByName = {}
     for body, cells in inside.items():
         with suppress(ValueError):  # of a body in space whose boundary meets itself along an edge
             outlines[body] = outline.of(mesh, mesh.cells[cells])

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import basix
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from archord.geometry.basis import QUADRILATERAL, TRIANGLE, dimension_of, order_of
 from archord.geometry.meshes.cells import sides_of
 from archord.geometry.meshes.mesh_arrays import MeshArrays, coordinates
+from archord.report.by_name import ByName
 
 # the arrays of a file, each with the kind of its numbers and its dimension
 _ARRAYS = {
@@ -75,7 +76,7 @@ def stored_mesh(path: Path) -> MeshArrays:
     return mesh
 
 
-def _kind_of(words: dict[str, Any], nodes: int) -> basix.CellType:
+def _kind_of(words: ByName, nodes: int) -> basix.CellType:
     """The kind of the cells, each of so many ``nodes``. Raises ValueError."""
     old = _KIND_IN_OLD_FILES.get(nodes)
     name = words.get(_KIND, old and old.name)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.files.disk import naming
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.readable import json_of, require_file
 
@@ -35,7 +36,7 @@ class ChangedError(ValueError):
     """A run.json is not what the run wrote."""
 
 
-def seals_of(folder: Path) -> dict[str, dict[str, Any]]:
+def seals_of(folder: Path) -> dict[str, ByName]:
     """Bytes and SHA-256 by name of those files in ``folder`` that results are read from. Raises
     `OSError`."""
     apart = sorted(folder.glob("fields/[0-9]*.h5"))
@@ -126,7 +127,7 @@ def sha256_of(path: Path) -> str:
     return _digest(path, known.st_mtime_ns, known.st_size, known.st_ino)
 
 
-def _seal(path: Path) -> dict[str, Any]:
+def _seal(path: Path) -> ByName:
     with naming(path):
         return {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
 

@@ -10,11 +10,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.measures.edge import AnyProfile, PatchProfile, SurfaceProfile
 from archord.output.files.seal import require_intact
 from archord.output.files.step_file import step_name
 from archord.presets.arc import ArcProfile
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 _OF_ARCS = ("pin", "hole")
@@ -39,7 +40,7 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
         raise InputError(f"{path}: cannot be read as the {name} of a run at step {step}.") from None
 
 
-def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
+def read_contact(folder: str | Path, scene: Any, step: int) -> ByName:
     """The integrated surfaces of the run of ``scene`` at ``step`` (from 1): `SurfaceProfile` by
     name, in space `PatchProfile`, of a joint `ArcProfile` of "pin" and "hole". Raises `InputError`
     as `opened`."""
@@ -63,7 +64,7 @@ def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
         return profiles
 
 
-def _arrays_of(surface: h5py.Group, step: int) -> dict[str, Array]:
+def _arrays_of(surface: h5py.Group, step: int) -> Arrays:
     """What contact.h5 has of a ``surface``: what does not change, and what it was at the
     ``step``."""
     return {

@@ -13,7 +13,7 @@ import numpy as np
 
 from archord.materials.elasticity import principal_stresses, von_mises
 from archord.materials.kinematics import PLANE_STRAIN, kinematics
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arrays.arc import opened
 from archord.report.errors import InputError
@@ -94,8 +94,8 @@ class Fields:
     cells: np.ndarray  # (m, 6), or (m, 9) of quadrilaterals
     body: np.ndarray  # (m,) the tag of the cell's body
     displacement: Array  # (n, 2)
-    cell: dict[str, Array]  # means of cells by name: scalars (m,), tensors (m, 4)
-    nodal: dict[str, Array]  # recovered at the nodes: scalars (n,), tensors (n, 4)
+    cell: Arrays  # means of cells by name: scalars (m,), tensors (m, 4)
+    nodal: Arrays  # recovered at the nodes: scalars (n,), tensors (n, 4)
     components: tuple[str, ...] = PLANE_STRAIN.names  # of tensors (., 4)
     bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
     edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along named sets
@@ -123,11 +123,11 @@ class Fields:
         found[self.cells] = self.body[:, None]
         return found
 
-    def nodal_fields(self) -> dict[str, Array]:
+    def nodal_fields(self) -> Arrays:
         """The recovered fields of the nodes by name ``(n,)``, tensors by components, with the
         principal stresses "p1" to "p3" (the largest first), "principal_angle" (of the larger one in
         the plane, from the x axis) and "von_mises" of the stress."""
-        found: dict[str, Array] = {}
+        found: Arrays = {}
         for name, values in self.nodal.items():
             if values.ndim == 1:
                 found[name] = values
@@ -199,14 +199,14 @@ def read_fields(
         )
 
 
-def _arrays_at(group: Any, step: int) -> dict[str, Array]:
+def _arrays_at(group: Any, step: int) -> Arrays:
     """The arrays of a ``step`` in a group by name."""
     at = step_name(step)
     places = {name: f"{name}/{at}" for name in group if name not in _NO_FIELDS}
     return {name: group[place][()] for name, place in places.items() if place in group}
 
 
-def _with_tensors(arrays: dict[str, Array], components: Sequence[str]) -> dict[str, Array]:
+def _with_tensors(arrays: Arrays, components: Sequence[str]) -> Arrays:
     """Nodal ``arrays`` ``(n,)`` by name, those that are the ``components`` of a tensor as one array
     ``(n, 4)``."""
     found = dict(arrays)
@@ -218,7 +218,7 @@ def _with_tensors(arrays: dict[str, Array], components: Sequence[str]) -> dict[s
     return {name.removesuffix("_nodal"): values for name, values in found.items()}
 
 
-def read_points(folder: str | Path, scene: Any, step: int) -> dict[str, Array]:
+def read_points(folder: str | Path, scene: Any, step: int) -> Arrays:
     """What ``output.fields = "points"`` writes at ``step``: "coordinates" ``(m, q, 2)`` of the
     integration points, "stress" ``(m, q, 4)`` and, where a body can yield, "plastic_strain" and
     "peeq" ``(m, q)``. Raises `InputError`."""

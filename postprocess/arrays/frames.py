@@ -12,6 +12,7 @@ import pandas as pd
 
 from archord.output.user_file import writing
 from archord.postprocess.arrays.arc import undeformed
+from archord.report.by_name import ByName
 from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
@@ -73,7 +74,7 @@ def read_frame(path: Path) -> pd.DataFrame:
     return frame_of(table.rename(columns=name_of), units)
 
 
-def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
+def contact_frame(arcs: ByName, scene: Any) -> pd.DataFrame:
     """The points of the arcs by side and, of joints, by angle from the contact axis; x and y are
     undeformed.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Arrays
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import number
@@ -22,7 +22,7 @@ class Moved:
     node_set: str
     axis: int
     nodes: Ints
-    rates: dict[str, Array]
+    rates: Arrays
     whole: bool
 
     def boundary(self, values: dict[str, float]) -> list[str]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +22,7 @@ from archord.postprocess.judgement.convergence import Order, Refined, group
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint import LawJoint
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning
@@ -280,9 +280,7 @@ class Calibration:
         run = self.scenes[0].run
         found = self.joint.estimates
         parts = self.joint.residuals
-        numbers: dict[str, Any] = {
-            name: getattr(run, name) for name in ("E_star", "R", "dR", "plane")
-        }
+        numbers: ByName = {name: getattr(run, name) for name in ("E_star", "R", "dR", "plane")}
         if not run.sigY:
             found.pop("c", None)
         for name, estimate in found.items():

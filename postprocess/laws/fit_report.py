@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from archord.output.user_file import writing
 from archord.postprocess.laws.calibration import POOR, Calibration, dimensionless_law
+from archord.report.by_name import ByName
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
@@ -17,10 +17,10 @@ _BENT = 0.5  # serial correlation that noise in ten steps or more hardly ever re
 _COLUMNS = ("run", "of", "value", "s.e.", "mesh", "95 % interval", "R2", "rms", "largest", "steps")
 
 
-def parameters(calibration: Calibration) -> list[dict[str, Any]]:
+def parameters(calibration: Calibration) -> list[ByName]:
     """One row per fitted parameter, in numbers: value, errors (None where the mesh's is
     unknown), interval, quality of the fit."""
-    rows: list[dict[str, Any]] = []
+    rows: list[ByName] = []
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
     named += [("all together", calibration.joint)] if len(calibration.scenes) > 1 else []
     for run, fit in named:

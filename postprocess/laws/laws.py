@@ -7,7 +7,6 @@ import difflib
 import math
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from archord.postprocess.laws import elastic_laws as elastic
 from archord.postprocess.laws.general import general_law as general
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import Law, LawState
+from archord.report.by_name import ByName
 
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation
 _ALIKE = 0.01  # Dundurs' beta that counts as zero
@@ -43,7 +43,7 @@ def _unlike(joint: LawJoint) -> str:
     return _thick(joint)
 
 
-def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
+def _half_spaces(A: float, q: float, hertz: bool = True) -> ByName:
     """`elastic.logarithm` up to its load limit, with the pressure and contact angle of ``hertz`` in
     his range."""
 
@@ -58,16 +58,16 @@ def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
     return {"state": state, "limit": lambda joint: elastic.turning_point(joint, A, q), **gives}
 
 
-_CHORD: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance, "unfit": _thick}
-_WINKLER: dict[str, Any] = {"coefficients": ("k",), **_CHORD}
-_PLASTIC: dict[str, Any] = {
+_CHORD: ByName = {"limit": lambda joint: _DEEPEST * joint.clearance, "unfit": _thick}
+_WINKLER: ByName = {"coefficients": ("k",), **_CHORD}
+_PLASTIC: ByName = {
     "coefficients": ("k", "c"),
     "needs": ("yield_stress",),
     "plastic": True,
     **_CHORD,
 }
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
-_FUNCTIONS: dict[str, dict[str, Any]] = {
+_FUNCTIONS: dict[str, ByName] = {
     "archord": {
         "state": _archord,
         "limit": lambda joint: general.NODES[-1] * joint.clearance,

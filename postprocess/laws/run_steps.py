@@ -6,13 +6,13 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.curve import on_first_loading
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.version import VERSION
 from archord.scene.file import resolved
@@ -75,7 +75,7 @@ class RunSteps:
         return self.run.scene.joint.radius
 
     @property
-    def units(self) -> dict[str, Any]:
+    def units(self) -> ByName:
         """Units of x, y and peak as numbers, the names of their units, and the length that forces
         are of, as `JointCurve` has them."""
         length_unit, force_unit = (self.run.units.get(name, "-") for name in self.names)
@@ -125,7 +125,7 @@ class RunSteps:
         return (self.accuracy or 0.0) * largest
 
     @property
-    def about(self) -> dict[str, Any]:
+    def about(self) -> ByName:
         """What the table is of."""
         run = self.run
         scene = run.scene

@@ -15,7 +15,7 @@ it opens than the first step.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import JointCurve, hermite
 from archord.postprocess.laws.run_steps import RunSteps, read_steps
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 _ELASTIC = 1e-9  # of the largest force times displacement: nothing was dissipated
@@ -134,7 +135,7 @@ def _steps_of_loading(steps: RunSteps) -> np.ndarray:
     return k
 
 
-def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> dict[str, Any]:
+def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> ByName:
     """All cubics at the nodes of both ways, by their names in `JointCurve`."""
     on_way_back = back.curve.x
     distance = np.abs(on_way_back[:, None] - loading.x).min(axis=1)
@@ -151,7 +152,7 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
         "angle": _cubic(x, steps.angle[touched] / root),
     }
     sharp = np.zeros(len(nodes))
-    tables: dict[str, Any] = {"x": nodes, "toe": sharp, "touch": np.empty(0)}
+    tables: ByName = {"x": nodes, "toe": sharp, "touch": np.empty(0)}
     for name, cubic in cubics.items():
         tables[name], tables[f"d{name}"] = cubic.at(nodes)
     return tables | steps.units

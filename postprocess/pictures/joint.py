@@ -20,9 +20,10 @@ from archord.postprocess.pictures.problems import (
     shown_steps,
 )
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.scene.presets.joint import Scene
 
-_BEFORE: dict[str, Any] = {"color": "0.55", "lw": 0.9}
+_BEFORE: ByName = {"color": "0.55", "lw": 0.9}
 _VISIBLE = 0.1  # clearance over R, as drawn
 _FARTHEST = 0.2  # displacement and clearance over R, as drawn
 _NEAR = 3.0  # radii within which displacements count
@@ -68,7 +69,7 @@ def _load(scene: Scene, delta: float) -> str:
     return f"δ = {delta / abs(dR):.4g} {gap_name(dR, 'ΔR')}"
 
 
-def _over(divisor: float) -> dict[str, Any]:
+def _over(divisor: float) -> ByName:
     """Of a second axis with the numbers of the first over the ``divisor``."""
 
     def divided(value: Any) -> Array:
@@ -115,7 +116,7 @@ def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
         load = _load(scene, run.path[step - 1])
         for side, arc in arcs.items():
             angle, pressure = arc.facet_means()
-            style: dict[str, Any] = {"ls": "-", "label": load}
+            style: ByName = {"ls": "-", "label": load}
             if both and side == "pin":
                 style = {"ls": "--"}
             axes.plot(np.degrees(angle), pressure, color=f"C{i}", lw=1.4, **style)

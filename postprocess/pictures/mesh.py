@@ -26,6 +26,7 @@ from archord.geometry.meshes.quality import measures, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.patches import Patches
 from archord.postprocess.pictures.pictures import save_figure
+from archord.report.by_name import ByName
 from archord.report.figure import new_figure
 from archord.report.table import Table
 
@@ -144,7 +145,7 @@ def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
     around = [0, 1, 2] if mesh.kind == TRIANGLE else [0, 1, 3, 2]
     for k, (name, tags) in enumerate(mesh.cell_sets.items()):
         own = mesh.cells[np.isin(mesh.bodies, tags)]
-        style: dict[str, Any] = {"facecolors": [faint(k % 8)], "zorder": -len(own)}
+        style: ByName = {"facecolors": [faint(k % 8)], "zorder": -len(own)}
         cells = PolyCollection(mesh.x[own][:, around], label=name, **style)
         axes.add_collection(cells)
     sides = mesh.x[along(sides_of(mesh.kind, mesh.cells))]

@@ -15,6 +15,7 @@ from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.pictures.abscissa import abscissa
 from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 # largest displacement over the size of the bodies, as drawn, where nothing touches
@@ -280,7 +281,7 @@ def edge_panel(
     axes.set_title(f"{shown} along {', '.join(edges)}", fontsize="medium")
 
 
-def draw_probes(axes: Any, probes: Sequence[Probe], styles: Sequence[dict[str, Any]]) -> None:
+def draw_probes(axes: Any, probes: Sequence[Probe], styles: Sequence[ByName]) -> None:
     """Quantities over their `abscissa`, each in its style."""
     places, label = abscissa(probes)
     for probe, along, style in zip(probes, places, styles, strict=True):

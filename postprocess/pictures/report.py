@@ -28,6 +28,7 @@ from archord.postprocess.tables import (
     peaks_of,
     spread,
 )
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.figure import new_figure
 from archord.report.files import is_device
@@ -177,7 +178,7 @@ def _finish(axes: Any) -> None:
     axes.grid(alpha=0.3)
 
 
-def _last_residual(step: dict[str, Any]) -> float:
+def _last_residual(step: ByName) -> float:
     """The residual with which the last solve of a step ended; NaN where none is known."""
     solves = [residuals for residuals in step.get("residuals", []) if residuals]
     last = solves[-1][-1] if solves else None

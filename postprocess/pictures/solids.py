@@ -25,6 +25,7 @@ from archord.postprocess.pictures.problems import (
     step_words,
 )
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 AXES = "xyz"
@@ -239,7 +240,7 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     axes.figure.colorbar(drawn, ax=axes, label=f"pressure [{unit}]", shrink=0.85)
 
 
-def _unrolled(surfaces: dict[str, Any]) -> tuple[str, Array, tuple[str, str]]:
+def _unrolled(surfaces: ByName) -> tuple[str, Array, tuple[str, str]]:
     """The surface that is drawn, its facets' corners ``(n, c, 2)`` in the picture, and the words on
     its axes."""
     # with compiled curves, which other commands do without

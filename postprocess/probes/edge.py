@@ -6,7 +6,7 @@ import numpy as np
 
 from archord.geometry.vectors import unit
 from archord.materials.kinematics import kinematics
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.probes.angles import angles_about, rising
 from archord.postprocess.probes.meeting import meeting
@@ -42,7 +42,7 @@ def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
     return found._replace(angle=np.degrees(found.s / radius))
 
 
-def _stresses(stress: Array, tangent: Array) -> dict[str, Array]:
+def _stresses(stress: Array, tangent: Array) -> Arrays:
     """The stress along an edge, across it, and their shear ``(k, 3)``, of the ``stress`` ``(k, 3,
     4)`` in axes."""
     xx, yy, _, xy = np.moveaxis(stress, -1, 0)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import ByName
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, PinPart, Preset, Shape
 from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import Solid
@@ -81,7 +82,7 @@ class BushingScene(Preset):
     def _rings(self) -> list[list[float]]:
         return [[ring.bore, ring.outer] for ring in (*self.sleeve, self.housing)]
 
-    def general(self) -> dict[str, Any]:
+    def general(self) -> ByName:
         """The general scene that it stands for."""
         sleeves = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
         surfaces = [

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import ByName
 from archord.scene.presets.lug import Lug, PlateOutline
 from archord.scene.presets.preset import BoredShape, PinPart, Preset, general_scene
 from archord.scene.presets.space import ClevisSpace
@@ -21,7 +22,7 @@ class PlateOfClevis(PlateOutline):
         outline = self.model_dump(include={*PlateOutline.model_fields})
         return Lug.model_construct(radius=clevis.radius, clearance=clevis.clearance, **outline)
 
-    def outline(self, clevis: Clevis) -> dict[str, Any]:
+    def outline(self, clevis: Clevis) -> ByName:
         """What draws it."""
         found = self.lug(clevis).arguments()
         return {name: found[name] for name in PlateOutline.model_fields}
@@ -71,7 +72,7 @@ class ClevisShape(Clevis):
             require(self.space is None or plate.thickness is not None, (name, "thickness"), said)
         return self
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it: lengths, and what is drawn."""
         found = super().arguments()
         wall = found.pop("wall")
@@ -130,13 +131,13 @@ class ClevisScene(Preset):
     def _wall(self) -> float:
         return self.bushing.thickness if self.bushing else 0.0
 
-    def general(self) -> dict[str, Any]:
+    def general(self) -> ByName:
         """The general scene that it stands for."""
         return self._in_plane() if self.space is None else self._solid()
 
-    def _in_plane(self) -> dict[str, Any]:
+    def _in_plane(self) -> ByName:
         """Two plane problems, each of a plate and its own pin."""
-        parts: dict[str, list[dict[str, Any]]] = {"interaction": [], "support": [], "load": []}
+        parts: dict[str, list[ByName]] = {"interaction": [], "support": [], "load": []}
         shape = self.arguments() | {"kind": "clevis"}
         overlap = max(-self.clevis.clearance, 0.0)
         bodies: dict[str, Solid] = {}
@@ -157,7 +158,7 @@ class ClevisScene(Preset):
         parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
         return general_scene(self, shape, 2, bodies, **parts, path={"steps": self.load.steps})
 
-    def _solid(self) -> dict[str, Any]:
+    def _solid(self) -> ByName:
         """One pin through all plates: the outer ones are pulled away from the inner one."""
         shape = self.arguments() | {"kind": "clevis", "wall": self._wall}
         bodies: dict[str, Solid] = {"pin": self.pin}

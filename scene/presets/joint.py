@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from archord.materials.elasticity import contact_modulus
 from archord.materials.thickening import block_thickens, error_of_small_strain
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.presets.joint_geometry import JointGeometry
 from archord.scene.presets.preset import general_scene, require_solid
@@ -139,12 +140,12 @@ class Scene(Checked):
                 "here."
             )
 
-    def general(self) -> dict[str, Any]:
+    def general(self) -> ByName:
         """The general scene that it stands for; its pin is pressed along -y."""
         g = self.joint
         pin = self.pin
         load = self.load
-        contact: dict[str, Any] = {
+        contact: ByName = {
             "name": "contact",
             "surfaces": ["pin", "hole"],
             "overlap": max(-g.dR, 0.0),
@@ -156,7 +157,7 @@ class Scene(Checked):
         on = "pin" if g.is_ring else "pin top"
         if pin.rigid:
             on = "contact"
-        press: dict[str, Any] = {"name": "press", "on": on, "direction": "y"}
+        press: ByName = {"name": "press", "on": on, "direction": "y"}
         press["force" if self.force_controlled else "displacement"] = [
             -at * self.load_unit for at in load.stages
         ]
@@ -176,7 +177,7 @@ class Scene(Checked):
         middles = ["block held"] if pin.rigid else ["pin top", "block held"]
         return general_scene(self, shape, 2, {"block": self.block}, middles, **parts)
 
-    def resolved_data(self) -> dict[str, Any]:
+    def resolved_data(self) -> ByName:
         """The table of the scene, with every default filled in but for what an accuracy chooses."""
         data = super().resolved_data()
         joint = data["joint"]

@@ -4,10 +4,11 @@ pin and hole are meshed; and the same as a shape of a general scene."""
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import ByName
 from archord.scene.presets.preset import PinPart
 from archord.scene.presets.space import Space
 from archord.scene.sections.keys import Positive, Section, given, key, require
@@ -106,7 +107,7 @@ class JointGeometry(Section):
         require(cells <= _MOST_CELLS, name, said)
         return self
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it: lengths, and what is drawn."""
         edge = None
         if self.edge_angle is not None:
@@ -202,9 +203,9 @@ class JointShape(JointGeometry):
     kind: Literal["joint"] = "joint"
     drawing: ClassVar[str] = "archord.geometry.shapes.pin_in_block:pin_joint"
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it."""
-        drawn: dict[str, Any] = {
+        drawn: ByName = {
             "kind": self.kind,
             "pin": self.pin,
             "core_radius": self.core_radius,

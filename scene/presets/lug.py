@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import ByName
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, BoredShape, PinPart, Preset
 from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import NotNegative, Solid
@@ -60,7 +61,7 @@ class Lug(PlateOutline, BoredShape):
             require(ligament >= THINNEST * R, (*place, name), said)
             require(a[name] <= FARTHEST * R, (*place, name), f"must not exceed {FARTHEST:g} R")
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it: lengths, and what is drawn."""
         lengths = {
             "edge_distance": self.edge_distance or self.width / 2,
@@ -137,7 +138,7 @@ class LugScene(Preset):
             self.lug.check(self.bushing.check(self.lug, ("bushing",)), ("lug",))
         return self
 
-    def general(self) -> dict[str, Any]:
+    def general(self) -> ByName:
         """The general scene that it stands for."""
         shape = self.arguments() | {"kind": "lug"}
         sleeve = self.bushing

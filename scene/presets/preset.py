@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import ByName
 from archord.scene.presets.space import COARSE, Space, solid
 from archord.scene.sections.analysis import PresetAnalysis, ProblemOutput, Stepping
 from archord.scene.sections.bodies import Pin, Solid
@@ -51,7 +52,7 @@ class Shape(Section):
         """Element size on the arcs."""
         return self.element_size or 0.04 * self.radius
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it: lengths, and what is drawn."""
         found = self.model_dump(exclude={"space"}) | {"element_size": self.h}
         space: Space | None = getattr(self, "space", None)
@@ -122,7 +123,7 @@ class Preset(Checked):
         """The section that tells the shape."""
         return getattr(self, self.shape.model_fields["kind"].default)
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws the shape; elements in space are larger by default."""
         found = self.drawn.arguments()
         if self.space is not None and self.drawn.element_size is None:
@@ -130,7 +131,7 @@ class Preset(Checked):
         return found
 
     @abstractmethod
-    def general(self) -> dict[str, Any]:
+    def general(self) -> ByName:
         """The general scene that it stands for."""
 
     def require_whole(self, name: str, gap: float) -> None:
@@ -140,20 +141,20 @@ class Preset(Checked):
 
     def pulled(
         self,
-        shape: dict[str, Any],
+        shape: ByName,
         solids: Mapping[str, Solid],
         held: str,
         surfaces: list[str],
         gaps: list[float],
         laws: Sequence[str] = (),
-    ) -> dict[str, Any]:
+    ) -> ByName:
         """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their
         ``surfaces`` the first faces the second at the first of the ``gaps`` by the first of the
         ``laws``, the third the fourth, ..."""
         half, touching = (shape.get(name, True) for name in ("half", "touching"))
         rigid = self.pin.rigid
         names = ["pin", *solids]
-        contacts = list[dict[str, Any]]()
+        contacts = list[ByName]()
         for k, gap in enumerate(gaps):
             facing = {
                 "name": f"{names[k]} in {names[k + 1]}",
@@ -193,13 +194,13 @@ class Preset(Checked):
 
 def general_scene(
     scene: Any,
-    shape: dict[str, Any],
+    shape: ByName,
     symmetry: int,
     solids: Mapping[str, Solid],
     middles: Sequence[str] = (),
     /,
     **parts: Any,
-) -> dict[str, Any]:
+) -> ByName:
     """The general scene of a pin in ``solids``, with its other ``parts``; of ``middles`` see
     `solid`. Of the sections that ``scene`` has, too, the keys that were given, as an accuracy
     chooses some others."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
+from archord.report.by_name import ByName
 from archord.scene.sections.bodies import NotNegative
 from archord.scene.sections.keys import Positive, Section, key, require
 
@@ -63,7 +63,7 @@ class Space(Depth):
             require(length is None or length >= _SHORTEST * radius, ("space", name), said)
         self.check_rims(radius, self.thickness)
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it."""
         return self.model_dump() | {"pin_length": self.pin_length or self.thickness}
 
@@ -80,12 +80,12 @@ class ClevisSpace(Depth):
         said = f"must be at most {_HOLLOWEST:g} R"
         require(self.bore <= _HOLLOWEST * radius, "space.bore", said)
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> ByName:
         """What draws it."""
         return self.model_dump()
 
 
-def solid(general: dict[str, Any], space: Depth, middles: Sequence[str]) -> dict[str, Any]:
+def solid(general: ByName, space: Depth, middles: Sequence[str]) -> ByName:
     """The ``general`` scene of a plane joint in ``space``, with the mid-plane as a mirror; of the
     whole, the ``middles`` of these facet sets are held along z, where the mirror leaves them."""
     shape = general["mesh"]["shape"] | {"space": space.model_dump(exclude_none=True)}
@@ -106,6 +106,6 @@ def solid(general: dict[str, Any], space: Depth, middles: Sequence[str]) -> dict
     }
 
 
-def _cylinder(disc: dict[str, Any]) -> dict[str, Any]:
+def _cylinder(disc: ByName) -> ByName:
     """The cylinder along z over a ``disc``."""
     return disc | {"centre": [*disc["centre"], 0.0], "axis": [0.0, 0.0, 1.0]}

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import ValidationError
 
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.sections.bodies import strength_doubts
 from archord.scene.sections.faults import in_sentences
@@ -78,11 +79,11 @@ class Checked(Section):
     def require_mesh(self) -> None:
         """Raise `InputError` if the scene leaves open which mesh is meant."""
 
-    def general(self) -> dict[str, Any]:
+    def general(self) -> ByName:
         """The table of the general scene that this one stands for: its own, if it is one."""
         return self.resolved_data()
 
-    def resolved_data(self) -> dict[str, Any]:
+    def resolved_data(self) -> ByName:
         """The table of the scene, with every default filled in but for what an accuracy chooses."""
         data = self.model_dump(exclude_none=True)
         for section, key in self._left_open:
@@ -114,7 +115,7 @@ class Checked(Section):
         return [*self.units.doubts, *self.analysis.doubts, *strength_doubts(self.solids)]
 
     @property
-    def materials(self: Any) -> dict[str, dict[str, Any]]:
+    def materials(self: Any) -> dict[str, ByName]:
         """The numbers that each body is solved with, by its name: E, nu, the yield stress, and in
         words how it hardens."""
         unit = self.units.stress

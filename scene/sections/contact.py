@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from archord.report.by_name import ByName
 from archord.scene.sections.keys import require
 
 # The parameters of each law, with their meaning. They are positive numbers, by the names of the
@@ -24,7 +23,7 @@ PARAMETERS_IN_WORDS = "; ".join(
 )
 
 
-def require_parameters(law: str, given: dict[str, Any]) -> None:
+def require_parameters(law: str, given: ByName) -> None:
     """Raise `Fault` unless the parameters ``given`` are just the ones of the ``law``."""
     wanted = CONTACT_LAWS[law]
     said = f"must be {{{', '.join(wanted)}}}" if wanted else "are not"

@@ -12,6 +12,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from archord.report.by_name import ByName
 from archord.scene.sections.errors import Fault, toml_value
 
 _MOST_SENTENCES = 20
@@ -51,7 +52,7 @@ PHRASES = {
 
 def in_sentences(
     errors: list[Any],
-    data: dict[str, Any],
+    data: ByName,
     model: type[BaseModel],
     source: str,
     origin: dict[str, str],
@@ -74,7 +75,7 @@ def keys_of(models: list[Any], section: str) -> list[str]:
     return sorted({key for kind in kinds for key in kind.model_fields})
 
 
-def of_section(errors: list[Any], data: dict[str, Any], section: type[BaseModel]) -> str:
+def of_section(errors: list[Any], data: ByName, section: type[BaseModel]) -> str:
     """`in_sentences` of a ``section`` that was made alone, from ``data``."""
     name = section.__name__.lower()
     place: tuple[str | int, ...] = (name, 0) if "name" in data else (name,)
@@ -92,7 +93,7 @@ def shortened(text: str) -> str:
 
 
 def _sentence(
-    error: Any, data: dict[str, Any], model: type[BaseModel], source: str, origin: dict[str, str]
+    error: Any, data: ByName, model: type[BaseModel], source: str, origin: dict[str, str]
 ) -> str:
     place = error["loc"]
     context = dict(error.get("ctx", {}))
@@ -146,7 +147,7 @@ def _kind_of(value: Any) -> Any:
 def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
     """What may stand in the place ``loc`` of an unknown key or section, and which of it may be
     meant."""
-    of_kind: dict[str, Any] = {}
+    of_kind: ByName = {}
     place = [part for part in loc if isinstance(part, str)]
     for part in place[:-1]:
         if part in model.model_fields:
@@ -166,7 +167,7 @@ def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
     }
 
 
-def _sections(kind: Any) -> dict[str, Any]:
+def _sections(kind: Any) -> ByName:
     """The sections among the kinds of values that a key may have, by their own ``kind``."""
     if isinstance(kind, type):
         name = getattr(kind, "model_fields", {}).get("kind")

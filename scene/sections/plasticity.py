@@ -18,6 +18,7 @@ from archord.materials.hardening import (
     VoceHardening,
 )
 from archord.materials.named import metal, metals
+from archord.report.by_name import ByName
 from archord.scene.sections.errors import Fault, toml_value
 from archord.scene.sections.keys import Pair, Positive, Section, key, require
 
@@ -43,9 +44,9 @@ class NamedLaw:
     law: type[Hardening]
     parameters: dict[str, tuple[Any, str]]
     make: Callable[..., Hardening] | None = None
-    begins: Callable[[dict[str, Any]], tuple[float, ...]] | None = None
+    begins: Callable[[ByName], tuple[float, ...]] | None = None
 
-    def of(self, yield_stress: float, E: float, parameters: dict[str, Any]) -> Hardening:
+    def of(self, yield_stress: float, E: float, parameters: ByName) -> Hardening:
         """The law of a body with these ``parameters``."""
         if self.make is None:
             made: Callable[..., Hardening] = self.law
@@ -57,7 +58,7 @@ def _tension_test(yield_stress: float, E: float, engineering: list[list[float]])
     return TabularHardening.from_engineering(engineering, E)
 
 
-def _first_of_test(parameters: dict[str, Any]) -> tuple[float, float]:
+def _first_of_test(parameters: ByName) -> tuple[float, float]:
     strain, stress = parameters["engineering"][0]
     return float(stress), float(stress * (1 + strain))
 
@@ -96,14 +97,14 @@ LAWS = (
 IN_WORDS = ", ".join(f"{{{', '.join(law.parameters)}}} ({law.name})" for law in LAWS)
 
 
-def _laws_of(table: dict[str, Any]) -> list[NamedLaw]:
+def _laws_of(table: ByName) -> list[NamedLaw]:
     """The laws that have just the parameters of a ``table``, and the name that it says."""
     names = table.keys() - {"law"}
     fitting = [law for law in LAWS if law.parameters.keys() == names]
     return [law for law in fitting if table.get("law") in (None, law.name)]
 
 
-def parameters_of(law: Hardening) -> dict[str, Any] | None:
+def parameters_of(law: Hardening) -> ByName | None:
     """The table of a scene that states ``law``; None for a law of a class without a row."""
     for row in LAWS:
         if type(law) is row.law and all(hasattr(law, name) for name in row.parameters):
@@ -125,15 +126,15 @@ class _HardeningTable(Section):
         return self
 
 
-def _keys() -> dict[str, Any]:
+def _keys() -> ByName:
     """The keys of all laws, for pydantic: their types, and what they mean in each law."""
-    types: dict[str, Any] = {}
+    types: ByName = {}
     meanings: dict[str, list[str]] = {}
     for law in LAWS:
         for name, (kind, meaning) in law.parameters.items():
             types[name] = types[name] | kind if name in types else kind
             meanings.setdefault(name, []).append(f"{law.name}: {meaning}")
-    keys: dict[str, Any] = {
+    keys: ByName = {
         name: (types[name] | None, key("; ".join(meanings[name]), default=None)) for name in types
     }
     names = Literal[tuple(law.name for law in LAWS)]  # type: ignore[valid-type]
@@ -182,7 +183,7 @@ def filled(data: Any, unit: str) -> Any:
     return data
 
 
-def _brought(data: dict[str, Any], unit: str) -> dict[str, Any]:
+def _brought(data: ByName, unit: str) -> ByName:
     """What the metal brings that ``data`` names.
 
     It brings its whole curve from first yield on; or the listed yield strength, where the scene

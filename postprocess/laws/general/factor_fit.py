@@ -16,12 +16,11 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.factor_model import (
     FRICTION,
@@ -35,6 +34,7 @@ from archord.postprocess.laws.general.general_law import NODES, joint_numbers, w
 from archord.postprocess.laws.general.hardening_model import block_leads, flows
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
+from archord.report.by_name import ByName
 from archord.report.table import Table
 
 _RANGE = (0.05, 3.05)  # x of the data
@@ -123,7 +123,7 @@ def planes_of(joints: list[Changed]) -> list[str]:
     return sorted({joint.joint.plane or "" for joint in joints})
 
 
-def fit_gain(joints: list[Changed]) -> dict[str, Array]:
+def fit_gain(joints: list[Changed]) -> Arrays:
     """The coefficients of `Plain.terms` ``(3, N_TERMS)`` by plane; each joint counts alike."""
     found = {}
     for plane in planes_of(joints):
@@ -205,7 +205,7 @@ def back_factors(joints: list[Changed]) -> dict[str, float]:
     return factors
 
 
-def store(kind: str, model: dict[str, Any]) -> None:
+def store(kind: str, model: ByName) -> None:
     """Write the ``model`` of this ``kind`` beside this file, and use it from now on. Of a plane
     that it leaves out the numbers stay."""
     table = json.loads(TABLE.read_text(encoding="utf-8"))

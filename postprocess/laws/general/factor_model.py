@@ -19,12 +19,13 @@ from collections.abc import Sequence
 from functools import cache
 from itertools import combinations_with_replacement
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic
+from archord.report.by_name import ByName
 
 TABLE = Path(__file__).parent / "factor_model.json"
 FRICTION = "friction"
@@ -136,7 +137,7 @@ def gain(plain: Plain, kind: str) -> Gain:
 
 
 @cache
-def factor_model() -> dict[str, dict[str, Any]]:
+def factor_model() -> dict[str, ByName]:
     """The models of `FRICTION` and `LARGE_STRAIN` that come with archord, by plane: ``gain``, the
     coefficients ``(3, N_TERMS)`` of `Plain.terms` of P, p0 and eps; ``error``, two numbers for
     `Plain.deviation`; and ``back error``, the factor on `Plain.scale`; 9 in 10 errors keep them."""

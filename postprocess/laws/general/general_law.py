@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -37,6 +36,7 @@ from archord.postprocess.laws.general.yield_model import (
     first_yield,
     loss,
 )
+from archord.report.by_name import ByName
 from archord.report.version import VERSION
 
 NODES = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 60)])  # x = delta/dR
@@ -111,7 +111,7 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     )
 
 
-def _in_numbers(joint: LawJoint) -> dict[str, Any]:
+def _in_numbers(joint: LawJoint) -> ByName:
     """What decides ``joint``, as JSON has it: a hardening curve as points [PEEQ, yield stress]."""
     usual = {field.name: field.default for field in fields(joint)}
     told = {name: value for name, value in vars(joint).items() if value or value != usual[name]}

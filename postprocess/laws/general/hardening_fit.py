@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
@@ -156,10 +156,10 @@ def feedback(of: Array, numbers: Numbers, body: str, at: At) -> Array:
     return of @ change / np.log1p(_SMALL)
 
 
-def fit_strain(joints: list[Hardened], start: Model | None = None) -> dict[str, Array]:
+def fit_strain(joints: list[Hardened], start: Model | None = None) -> Arrays:
     """The coefficients by plane and body, by Gauss and Newton's method, from the ``start`` of a fit
     to nearly the same joints: each joint counts like five points."""
-    model: dict[str, Array] = dict(start or {})
+    model: Arrays = dict(start or {})
     for plane in sorted({joint.numbers.plane for joint in joints}):
         own = [joint for joint in joints if joint.numbers.plane == plane]
         names = [f"{plane} {body}" for body in BODIES]

@@ -34,6 +34,7 @@ from archord.postprocess.laws.general.yield_model import (
     share_of_pin,
     yield_places,
 )
+from archord.report.by_name import ByName
 
 TABLE = Path(__file__).parent / "hardening_model.json"
 BODIES = ("pin", "block")
@@ -343,7 +344,7 @@ def _share(lost: Array, whole: float) -> Array:
 
 
 @cache
-def hardening_model() -> dict[str, dict[str, Any]]:
+def hardening_model() -> dict[str, ByName]:
     """The model that comes with archord: ``strain``, the coefficients of `TERMS` by plane and body;
     ``peak``, the factor on `peak_rise` by plane; and ``error``, the factor on `unsure` that 9 in 10
     errors keep, by `kind`."""

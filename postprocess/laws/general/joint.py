@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from archord.materials.elasticity import contact_modulus
 from archord.materials.thickening import block_thickens, error_of_small_strain
+from archord.report.by_name import ByName
 
 if TYPE_CHECKING:
     from archord.materials.hardening import Hardening
@@ -162,7 +163,7 @@ class LawJoint:
         plane = scene.analysis.plane
         pin = scene.solids.get("pin")
         block = scene.block
-        given: dict[str, Any] = {"pin_share": 0.0}
+        given: ByName = {"pin_share": 0.0}
         if pin is not None:
             stiffness = contact_modulus(pin.E, pin.nu, plane)
             given = {

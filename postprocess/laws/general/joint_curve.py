@@ -22,12 +22,13 @@ import json
 import warnings
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from archord.materials.material import Array
+from archord.report.by_name import ByName
 from archord.report.readable import json_of
 
 # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
@@ -125,7 +126,7 @@ class JointCurve:
     length: float = 1.0
     force: float = 1.0
     pressure: float = 1.0
-    about: dict[str, Any] = field(default_factory=dict)
+    about: ByName = field(default_factory=dict)
     length_unit: str = "unit of R"
     force_unit: str = "unit of E* times unit of R"
     pin_length: float = 1.0
@@ -305,7 +306,7 @@ class JointCurve:
     @classmethod
     def from_json(cls, text: str) -> JointCurve:
         """The curve in ``text``. Raises ValueError if it is none."""
-        given: dict[str, Any] = {}
+        given: ByName = {}
         try:
             data = json_of(text)
             for f in fields(cls):

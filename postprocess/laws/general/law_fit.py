@@ -62,6 +62,7 @@ from archord.postprocess.laws.general.yield_model import (
     total_loss,
 )
 from archord.postprocess.run import Run
+from archord.report.by_name import ByName
 from archord.report.table import Table
 
 # degrees in the joint's numbers and in x/(1 + x), and how many of these terms are taken
@@ -225,7 +226,7 @@ def solved_in(folder: Path, names: Container[str] | None = None) -> dict[Numbers
 
 def fit_law(
     solved: dict[Numbers, list[NodeRun]],
-) -> tuple[ElasticModel, SolvedJoints, dict[str, Any]]:
+) -> tuple[ElasticModel, SolvedJoints, ByName]:
     """The elastic model, the joints that yield as the processes take them, and the processes'
     kernels by side."""
     elastic: dict[Numbers, Array] = {}
@@ -352,14 +353,14 @@ def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ..
     return tuple(map(float, (deepest, travel, toe, rms, again)))
 
 
-def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
+def fit_side(joints: SolvedJoints, side: str) -> ByName:
     """The kernels of one of `SIDES`, largest in likelihood, and the spread of errors of joints left
     out."""
     data = joints.of(side)
     shape = np.concatenate([data["peak"], data["angle"]], axis=1)
     back = data["back"][:, :2] - [1, 0]
     values = {"force": data["force"], "shape": shape, "back": back}
-    found: dict[str, Any] = {"kernels": {}, "spread": {}}
+    found: ByName = {"kernels": {}, "spread": {}}
     for name, of in values.items():
         points = data["back_inputs" if name == "back" else "inputs"]
         kernel = fit_kernel(points, of, _STARTS[name])
@@ -424,7 +425,7 @@ def rms_largest(errors: Array) -> str:
     return f"{rms:.2f}/{np.abs(errors).max():.1f}"
 
 
-def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
+def error_table(joints: SolvedJoints, kernels: ByName) -> Table:
     """rms and largest errors of P, in per cent, of joints that the others predict; and the share
     within the expected ones from 0.1 to 2 dR, `WITHIN` by construction."""
     table = Table(
@@ -459,7 +460,7 @@ def main(folder: Path | None) -> None:
         model, joints, kernels = fit_law(solved_in(folder))
         TABLE.write_text(model.to_json(), encoding="utf-8")
         KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
-        arrays: dict[str, Any] = joints.compact()
+        arrays: ByName = joints.compact()
         np.savez_compressed(DATA, **arrays)
     print(error_table(stored_joints(), json.loads(KERNELS.read_text(encoding="utf-8"))).markdown())
 

@@ -17,6 +17,7 @@ from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import FIXED_PAIRS, LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.report.by_name import ByName
 from archord.report.doubts import kind
 
 KNOWN = tuple(field.name for field in fields(LawJoint))
@@ -109,7 +110,7 @@ def _require_one_index(
 ) -> None:
     """Raise ValueError for tables of pandas of which one has its rows in another order: rows are
     taken one after the other, whatever their labels."""
-    given: dict[str, Any] = {"joints": joints, "delta": delta, "deepest": deepest}
+    given: ByName = {"joints": joints, "delta": delta, "deepest": deepest}
     if not hasattr(joints, "iloc"):
         given |= joints
     tables = {name: table for name, table in given.items() if hasattr(table, "iloc")}

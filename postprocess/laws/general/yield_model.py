@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from archord.materials.material import Array
+from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel, elastic_model
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.joint_curve import Piece, interval
@@ -442,7 +442,7 @@ class SolvedJoints:
         """Itself with the digits that yield_model.npz keeps."""
         return SolvedJoints(**_numbers(self.compact()))
 
-    def compact(self) -> dict[str, Array]:
+    def compact(self) -> Arrays:
         """Arrays for a small file: curves in steps of `CURVE_STEP`, and numbers in few digits."""
         found = {name: _rounded(value, _DIGITS) for name, value in vars(self).items()}
         found["back"] = _rounded(self.back, _DIGITS_BACK)
@@ -457,7 +457,7 @@ class SolvedJoints:
         order = np.lexsort((self.x0[chosen], -self.count[chosen]))
         return chosen[order]
 
-    def of(self, side: str) -> dict[str, Array]:
+    def of(self, side: str) -> Arrays:
         """What `YieldModel` takes of the joints of one of `SIDES`."""
         chosen = self.rows(side)
         beyond = np.arange(len(MULTIPLES)) >= self.count[chosen, None]
@@ -505,7 +505,7 @@ def _rounded(values: Array, digits: int) -> Array:
     return np.ldexp(steps, exponent - digits).astype(np.float32)
 
 
-def _numbers(compact: Mapping[str, Array]) -> dict[str, Array]:
+def _numbers(compact: Mapping[str, Array]) -> Arrays:
     found = {name: values.astype(float) for name, values in compact.items()}
     for name in _CURVES:
         curves = found[name]

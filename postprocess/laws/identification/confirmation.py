@@ -4,7 +4,6 @@ differs."""
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -12,13 +11,14 @@ from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import Identification
+from archord.report.by_name import ByName
 
 _STEPS = 30  # of loading, and about as many of the way back
 _REACHED = 0.995  # of the deepest displacement: a second loading may come as far
 _RETURNED = 0.05  # of the deepest displacement, from which on a way back is solved
 
 
-def path_of(found: Identification) -> dict[str, Any]:
+def path_of(found: Identification) -> ByName:
     """The keys of the load: to the deepest displacement and back."""
     delta = found.predicted.delta
     deepest = float(delta.max())

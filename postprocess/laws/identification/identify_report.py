@@ -19,6 +19,7 @@ from archord.postprocess.laws.identification.identification import Estimate, Ide
 from archord.postprocess.laws.identification.unknowns import COMPLIANCE, OFFSET
 from archord.postprocess.laws.law import LawRangeWarning
 from archord.postprocess.laws.laws import LAWS
+from archord.report.by_name import ByName
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
@@ -233,7 +234,7 @@ def as_json(found: Identification) -> str:
     estimates = []
     for one in found.estimates:
         numbers = {"value": one.value, "low": one.low, "high": one.high, "by_law": one.by_law}
-        row: dict[str, Any] = {"unit": units[one.unknown.name]}
+        row: ByName = {"unit": units[one.unknown.name]}
         row |= {name: _finite(value) for name, value in numbers.items()}
         row |= {"at_bound": one.is_bound, "without_effect": one.blind}
         estimates.append({"name": one.unknown.name, "keys": [*one.unknown.keys], **row})

@@ -11,6 +11,7 @@ import numpy as np
 
 from archord.postprocess.laws.general.general_law import CLEARANCES, NU
 from archord.postprocess.laws.general.joint import LawJoint
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.file import ALTERNATIVES
 from archord.scene.presets.joint import Scene
@@ -21,7 +22,7 @@ _WIDE = 20.0  # factor on the scene's value, both ways
 _SOFTEST = 50.0  # compliance of a machine times E* and thickness
 _TRIED = 1.01  # factor on a value, by which the law must notice it
 # what a joint knows and the general law does not
-_IGNORED: dict[str, Any] = {
+_IGNORED: ByName = {
     "k": 0.85,
     "c": 1.0,
     "length": None,

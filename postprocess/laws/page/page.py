@@ -33,6 +33,7 @@ from archord.postprocess.laws.general import (
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.page.skeleton import skeleton
+from archord.report.by_name import ByName
 from archord.report.version import VERSION
 
 HERE = Path(__file__).parent
@@ -114,7 +115,7 @@ def _known(name: str, stored: Any) -> np.ndarray:
     return rises[known]
 
 
-def _range() -> dict[str, Any]:
+def _range() -> ByName:
     """The range of the law."""
     return {
         "nu": general_law.NU,
@@ -126,7 +127,7 @@ def _range() -> dict[str, Any]:
     }
 
 
-def _exports() -> dict[str, Any]:
+def _exports() -> ByName:
     """The texts of the exports by kind of joint and suffix, as places of paragraphs, and the words
     around them."""
     elastic = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
