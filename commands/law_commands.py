@@ -14,7 +14,7 @@ import click
 from click.core import ParameterSource
 
 from archord.commands.law_files import exports_of, sentences, warn, write
-from archord.commands.law_joint import joint_of
+from archord.commands.law_joint import joint_of, of_scene
 from archord.commands.options import argument, file, flag, overrides
 from archord.report.by_name import ByName
 from archord.report.errors import InputError
@@ -136,12 +136,14 @@ def law(
         _require_archord("--export" if exports else "--deepest", chosen)
         _require_within(chosen[0], joint, deepest)
     if exports:
-        return _export(joint, units, thickness, exports, _contact(contact), inputs, force)
+        with of_scene(scene):
+            return _export(joint, units, thickness, exports, _contact(contact), inputs, force)
     if plot:
         check_target(plot, inputs, force=True)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
     rows = _LINE if plot else points
-    states, said = _sampled(chosen, joint, by_load, to, rows, extrapolate, deepest)
+    with of_scene(scene):
+        states, said = _sampled(chosen, joint, by_load, to, rows, extrapolate, deepest)
     if plot:
         print(draw_laws(states, joint, plot, by_load, to))
     else:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +23,20 @@ _KEYS = {
     "plane": "analysis.plane",
 }
 _OF_BODIES = ("nu", "yield_stress")
+# The keys of a scene by how laws begin to refuse its joint.
+_REFUSED = {
+    "nu of the pin": "pin.nu",
+    "nu of the block": "block.nu",
+    "Dundurs' beta": "pin.nu, block.nu",
+    "dR/R": "joint.clearance",
+    "E(pin)/E(block)": "pin.E, block.E",
+    "sigY R/(E* dR)": "pin.yield_stress, block.yield_stress",
+    "friction": "analysis.friction",
+    "a body has back stresses": "pin.back_stresses, block.back_stresses",
+    "a body hardens": "pin.hardening, block.hardening",
+    "this is a ring": "joint.model",
+    "is a law for a pin in a block": "joint.model",
+}
 
 
 def joint_of(
@@ -46,6 +62,19 @@ def joint_of(
             )
     strength = values.pop("yield_stress", None)
     return LawJoint(**values, pin_yield=strength, block_yield=strength), {}, 1.0
+
+
+@contextmanager
+def of_scene(scene: Path | None) -> Iterator[None]:
+    """Let what laws refuse of the joint of a ``scene`` name its file and the key."""
+    try:
+        yield
+    except ValueError as error:
+        _, _, reason = str(error).partition(": ")
+        keys = next((key for words, key in _REFUSED.items() if reason.startswith(words)), "")
+        if scene is None or not keys:
+            raise
+        raise InputError(f"{scene}: {keys}: {error}") from None
 
 
 def _option(name: str) -> str:

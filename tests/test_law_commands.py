@@ -301,6 +301,31 @@ def test_what_the_law_of_solved_joints_cannot_say_is_refused(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("options", [[], ["--export", "joint.py"]])
+@pytest.mark.parametrize(
+    ("change", "key", "said"),
+    [
+        ("joint.relative_clearance=0.1", "joint.clearance", "dR/R = 0.1 is outside 0.001 to 0.02"),
+        ("pin.nu=-0.3", "pin.nu", "nu of the pin = -0.3 is outside 0 to 0.49"),
+        ("pin.E=1e3", "pin.E, block.E", "E(pin)/E(block) = "),
+        ("analysis.friction=1.5", "analysis.friction", "friction = 1.5 is outside"),
+        ("block.yield_stress=30", "pin.yield_stress, block.yield_stress", "sigY R/(E* dR) = "),
+        (
+            "pin.yield_stress=100 pin.hardening=2e5",
+            "pin.hardening, block.hardening",
+            "a body hardens by 3 dR",
+        ),
+    ],
+)
+def test_what_a_law_refuses_of_a_scene_names_file_and_key(
+    options, change, key, said, tmp_path, monkeypatch, refused
+):
+    monkeypatch.chdir(tmp_path)
+    changes = [part for setting in change.split() for part in ("--set", setting)]
+    told = refused(["law", "archord", "--scene", SCENE, *changes, *options])
+    assert told.startswith(f"{SCENE}: {key}: archord: {said}")
+
+
 def test_an_export_of_a_small_block_warns(tmp_path, capsys):
     """The law is of a wide block: the export is written, and the size of the error said."""
     target = tmp_path / "joint.py"
