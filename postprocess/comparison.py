@@ -36,7 +36,8 @@ _NOTHING = 1e-9  # part of the largest value below which a relative difference s
 
 @dataclass(frozen=True)
 class Comparison:
-    """``r`` runs at ``n`` common loads."""
+    """``r`` runs at ``n`` common loads. Of general runs these are load factors, at which the loads
+    ``unlike`` have other values from run to run."""
 
     runs: list[Run]
     labels: dict[str, str]  # of "load" and of the quantities
@@ -44,6 +45,7 @@ class Comparison:
     load: Array  # (n,)
     values: Arrays  # (r, n)
     interpolated: np.ndarray  # (r, n) whether the values lie between steps
+    unlike: Sequence[str] = ()
 
     def relative(self, name: str) -> Array:
         """``value/first - 1`` ``(r, n)``; NaN where the first is nothing beside its largest value
@@ -79,7 +81,28 @@ def compare_runs(runs: list[Run]) -> Comparison:
         tables = [_at(load, table, k) for table, k in zip(tables, between, strict=True)]
     names = [name for name in labels if name != "load"]
     values = {name: np.array([table[name] for table in tables]) for name in names}
-    return Comparison(runs, labels, step_by_step, load, values, between)
+    return Comparison(runs, labels, step_by_step, load, values, between, _unlike(runs, load))
+
+
+def _unlike(runs: Sequence[Run], factor: Array) -> list[str]:
+    """The loads of general ``runs`` that are not the same in all of them at the load factors
+    ``(n,)``."""
+    scenes = [run.scene for run in runs]
+    if any(scene.has_laws for scene in scenes):
+        return []
+    fitted = {scene.fits for scene in scenes}
+    found = []
+    for load in scenes[0].load:
+        told = []
+        for scene in scenes:
+            before = float(scene.fits and len(fitted) > 1)
+            known = [own for own in scene.load if (own.name, own.kind) == (load.name, load.kind)]
+            values = [scene.values(own) for own in known]
+            told += [np.interp(factor + before, range(len(each)), each) for each in values]
+        margin = _SAME * np.abs(told).max(initial=0.0)
+        if len(told) < len(runs) or np.ptp(told, axis=0).max() > margin:
+            found.append(load.name)
+    return found
 
 
 def _same_loads(one: Array, other: Array, margin: float) -> bool:

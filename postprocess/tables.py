@@ -303,9 +303,12 @@ def _percent(relative: Any) -> str:
 
 def _note(comparison: Comparison) -> str:
     """How the runs were compared."""
-    if comparison.step_by_step:
-        return "compared step by step: all runs went through the same loads."
     note = "compared over the first loading of all runs, at the loads of the first"
+    if comparison.step_by_step:
+        note = "compared step by step: all runs went through the same loads"
+    if comparison.unlike:
+        loads = " and ".join(map(repr, comparison.unlike))
+        note = f"compared at equal load factors, at which {loads} differs from run to run"
     if comparison.interpolated.any():
         note += "; ~: between steps, by a monotone cubic"
     return f"{note}."

@@ -11,6 +11,7 @@ from archord.cli import run as command
 from archord.postprocess.comparison import compare_runs, differing_keys
 from archord.postprocess.curve import RunCurve, first_loading
 from archord.postprocess.run import Run
+from archord.postprocess.tables import comparison_text
 from archord.report.errors import InputError
 from archord.scene.file import parse_any
 from tests.output.run_files import solved
@@ -125,6 +126,10 @@ def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
     assert "pull force" not in found.values
     np.testing.assert_allclose(found.relative("pull displacement")[1], 0.0, atol=1e-6)
     np.testing.assert_allclose(found.relative("pin in lug largest pressure")[1], 2.0, rtol=1e-6)
+    told = comparison_text(found)
+    assert "compared at equal load factors, at which 'pull' differs from run to run" in told
+    assert "went through the same loads" not in told
+    assert "went through the same loads" in comparison_text(compare_runs(runs[:1] * 2))
 
 
 def test_a_press_fit_is_compared_from_its_end_on(tmp_path):
