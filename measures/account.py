@@ -11,6 +11,7 @@ from archord.measures.doubts import Check
 from archord.measures.energies import energy_balance, work_doubts
 from archord.measures.measure import Accepted, Column, Measure
 from archord.measures.record import Record
+from archord.solver.path.stepping import StepFailure
 
 if TYPE_CHECKING:
     from archord.scene.file import AnyScene
@@ -88,8 +89,12 @@ class Account:
         work: float,
         seconds: float,
     ) -> Record:
-        """The record of the last accepted state, which follows the steps ``before``. Collective."""
+        """The record of the last accepted state, which follows the steps ``before``. Collective;
+        raises `StepFailure` where a law has other quantities than its columns."""
         system = self.system
+        for interface in system.contact.interfaces:
+            if fault := interface.fault_of_quantities():
+                raise StepFailure(fault, step)
         state = Accepted(system, profiles, before)
         values = {measure.name: float(measure.value(state)) for measure in self.measures}
         elastic_energy, plastic_dissipation = system.energies()

@@ -395,6 +395,24 @@ def test_a_quantity_of_a_law_has_its_own_column(run, tmp_path):
             archord.solve(sliding(MPI.COMM_SELF, law=named(name)), tmp_path / "refused")
 
 
+class Late(Wear):
+    """A law that tells of its depth as soon as there is one, and of a width until then."""
+
+    def quantities(self, state):
+        name = "depth" if (state.depth > 1e-4).any() else "width"
+        return {name: archord.Quantity(state.depth, "mm2")}
+
+
+@pytest.mark.mpi
+def test_a_law_tells_the_same_quantities_in_all_states(comm, tmp_path):
+    """A quantity that began later had no column, and one that ended was a traceback."""
+    folder = comm.bcast(tmp_path) / "run"
+    run = archord.solve(sliding(comm, law=Late), folder, comm=comm)
+    said = "the contact law of 'rub' has the quantities 'depth', 'width' in some states alone"
+    assert (run.status, run.steps) == ("stopped", 1)
+    assert run.message.startswith(said)
+
+
 def test_the_halted_step_keeps_its_contact(tmp_path, monkeypatch):
     """A law that takes its wear from the beginning of the step has another pressure where the
     accepted state is evaluated once more."""

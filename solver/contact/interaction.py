@@ -181,6 +181,7 @@ class Interface:
             raise ValueError(f"the contact law of {interaction.name!r} {fault}")
         if integrated[0].kinematics.has_hoop:
             self._require_on_axis()
+        self._told = {*law.quantities(law.state(1))}
         self.pairs: list[Pair] = []
         with on_every_rank(integrated[0].comm):
             for own, share in zip(integrated, _shares(integrated), strict=True):
@@ -261,6 +262,21 @@ class Interface:
                 found[name] = before + pair.integral(quantity.density), quantity.unit
         comm = self.pairs[0].surface.comm
         return {name: (comm.allreduce(value), unit) for name, (value, unit) in found.items()}
+
+    def fault_of_quantities(self) -> str:
+        """What is wrong with the names of the law's quantities at the last evaluation: they make
+        the columns of a history, and are the same on all ranks; empty if nothing is. Collective."""
+        odd = set()
+        for pair in self.pairs:
+            odd |= self._told ^ {*pair.law.quantities(pair.points.told())}
+        everywhere = set().union(*self.pairs[0].surface.comm.allgather(odd))
+        if not everywhere:
+            return ""
+        names = ", ".join(map(repr, sorted(everywhere)))
+        return (
+            f"the contact law of {self.interaction.name!r} has the quantities {names} in some "
+            "states alone; it must give them from the beginning, 0 where there is nothing yet"
+        )
 
     def _summed(self, on_own: Sequence[Array]) -> Array:
         """What the points of each pair get from the other surface ``(m, k)``, summed over the
