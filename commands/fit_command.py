@@ -76,7 +76,7 @@ def fit(
     if any(map(is_sweep, folders)):
         if len(folders) > 1 or json_file or exports or picture:
             raise InputError(
-                f"{first}: a sweep is fitted alone; --json, --export and --picture are for runs."
+                first, "a sweep is fitted alone; --json, --export and --picture are for runs."
             )
         return _fit_sweep(first, deltas)
     calibration = calibrate([Run(folder).curve.loading() for folder in folders], deltas)

@@ -75,7 +75,7 @@ def identify(
         raise InputError("archord identify: needs a --scene and what is --free in it.")
     begun = law_scene(scene, overrides)
     if begun.joint.is_ring:
-        raise InputError(f"{scene}: is a ring, and the law is of a pin in a block.")
+        raise InputError(scene, "is a ring, and the law is of a pin in a block.")
     units = begun.units.length, begun.units.force_of(begun.analysis.thickness)
     measured = read_curve(curve, delta, load, units)
     at = _number("--offset", offset)
@@ -88,7 +88,7 @@ def identify(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot hold results: {error.strerror}.") from None
+        raise InputError(folder, f"cannot hold results: {error.strerror}.") from None
     print(identify_report.estimates_table(found))
     print("", identify_report.correlation_table(found), sep="\n")
     print("", *identify_report.notes(found), sep="\n")
@@ -112,7 +112,7 @@ def _refuse(folder: Path, inputs: list[Path], force: bool) -> None:
 
     nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not nearest.is_dir():
-        raise InputError(f"{folder}: cannot hold results: Not a directory.")
+        raise InputError(folder, "cannot hold results: Not a directory.")
     if nearest == folder:
         for name in (_SCENE, _NUMBERS):
             check_target(folder / name, inputs, force=force)

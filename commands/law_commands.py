@@ -228,7 +228,7 @@ def _export(
 def _require_archord(option: str, chosen: list[Law]) -> None:
     """Raise `InputError` for an ``option`` beside another law."""
     if [entry.name for entry in chosen] != ["archord"]:
-        raise InputError(f"{option}: is for the law archord alone, which needs plane and nu.")
+        raise InputError(option, "is for the law archord alone, which needs plane and nu.")
 
 
 def _require_within(law: Law, joint: LawJoint, deepest: float) -> None:
@@ -252,7 +252,7 @@ def _refuse_contradictions() -> None:
     for option, idle in _IDLE.items():
         clash = [typed[name] for name in idle if name in typed]
         if option in typed and clash:
-            raise InputError(f"{typed[option]}: does not go with {' or '.join(clash)}.")
+            raise InputError(typed[option], f"does not go with {' or '.join(clash)}.")
     exports = context.params["exports"]
     if "force" in typed and not exports:
         raise InputError("--force: overwrites exports, and there is no --export.")
@@ -261,7 +261,7 @@ def _refuse_contradictions() -> None:
     missing = "a .json file has none" if exports else "there is no --export"
     for name in _CONTACT:
         if name in typed:
-            raise InputError(f"{typed[name]}: is of an export's element, and {missing}.")
+            raise InputError(typed[name], f"is of an export's element, and {missing}.")
 
 
 def _refuse_unused(chosen: list[Law], given: ByName, *, in_a_scene: bool) -> None:

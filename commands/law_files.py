@@ -49,7 +49,7 @@ def _exported(law: JointCurve | FittedLaw, target: Path, contact: Contact | None
 
     known = [*FILE_FORMS, ".fmu", ".json"]
     if target.suffix not in known:
-        raise InputError(f"{target}: must end in {', '.join(known[:-1])} or {known[-1]}.")
+        raise InputError(target, f"must end in {', '.join(known[:-1])} or {known[-1]}.")
     if target.suffix == ".fmu":
         return export_fmu(law, target, contact)
     return export_law(law, target, contact)
@@ -64,7 +64,7 @@ def write(texts: list[Text], inputs: list[Path], force: bool) -> list[Path]:
     for target in targets:
         check_target(target, inputs, force=force)
     if len({target.resolve() for target in targets}) < len(targets):
-        raise InputError(f"{targets[0]}: is named for two files; choose different ones.")
+        raise InputError(targets[0], "is named for two files; choose different ones.")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         contents = [make() for _, make in texts]

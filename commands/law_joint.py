@@ -58,7 +58,7 @@ def joint_of(
     for name, other in (("plane", "nu"), ("nu", "plane")):
         if name in values and other not in values:
             raise InputError(
-                f"{_option(name)}: says nothing without {_option(other)}; give both or none."
+                _option(name), f"says nothing without {_option(other)}; give both or none."
             )
     strength = values.pop("yield_stress", None)
     return LawJoint(**values, pin_yield=strength, block_yield=strength), {}, 1.0
@@ -118,7 +118,7 @@ def _joint_of_scene(
     for change, option in typed.items():
         same = set_keys.get(change.partition("=")[0])
         if same:
-            raise InputError(f"{option}: does not go with --set {same}; give one of them.")
+            raise InputError(option, f"does not go with --set {same}; give one of them.")
     try:
         found = law_scene(path, (*overrides, *changes))
     except InputError as error:
@@ -143,7 +143,7 @@ def law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
 
     found: Any = load_scene(path, overrides)
     if not found.has_laws:
-        raise InputError(f"{path}: must be the scene of a [joint]; this is a general one.")
+        raise InputError(path, "must be the scene of a [joint]; this is a general one.")
     return found
 
 

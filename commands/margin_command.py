@@ -50,7 +50,7 @@ def margin(folder: Path, load: float, part: str | None, **asked: Any) -> int:
     names = [part] if part else known
     strengths = [f"--{name}" for name in ("proof", "tensile") if asked[name] is not None]
     if len(names) > 1 and strengths:
-        raise InputError(f"{strengths[0]}: is the strength of one part; say --part {names[0]}.")
+        raise InputError(strengths[0], f"is the strength of one part; say --part {names[0]}.")
     found = [margins(run, load, part=name, **asked) for name in names]
     print("\n\n".join(margin_text(one) for one in found))
     return 0

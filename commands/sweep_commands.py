@@ -86,7 +86,7 @@ def sweep(
             print(_table(design))
             return design, mine, [], []
         if gather and not (folder / FILE).exists():
-            raise InputError(f"{folder}: holds no sweep to gather.")
+            raise InputError(folder, "holds no sweep to gather.")
         claim(design, folder)
         if gather:
             return design, mine, [], []

@@ -100,7 +100,7 @@ def require_same_mesh(order: MeshOrder, path: Path, checkpoint: Checkpoint | Non
     elif "sets" in scalars and scalars["sets"] != order.system.comm.bcast(order.sets_digest):
         fault = "belongs to other bodies, supports, loads or surfaces of this mesh: its sets differ"
     if fault:
-        raise InputError(f"{path}: {fault}, so that the run cannot be continued.")
+        raise InputError(path, f"{fault}, so that the run cannot be continued.")
     return scalars
 
 
@@ -169,12 +169,12 @@ def read(path: Path) -> Checkpoint:
         content = require_file(path).read_bytes()
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be read, so that the run cannot be continued: {error.strerror}."
+            path, f"cannot be read, so that the run cannot be continued: {error.strerror}."
         ) from None
     body = content[_HEADER:]
     if content[:_HEADER] != _header(body):
         raise InputError(
-            f"{path}: is damaged or of a newer archord, so that the run cannot be continued."
+            path, "is damaged or of a newer archord, so that the run cannot be continued."
         )
     with h5py.File(io.BytesIO(body), "r") as file:
         mesh = file.attrs["mesh"]

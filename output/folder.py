@@ -55,7 +55,7 @@ def occupied(folder: Path, wait: bool = False) -> Iterator[None]:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             except BlockingIOError:
-                raise InputError(f"{folder}: another archord is solving into it.") from None
+                raise InputError(folder, "another archord is solving into it.") from None
         yield
     finally:
         os.close(descriptor)
@@ -72,13 +72,13 @@ def claim_folder(folder: Path, force: bool) -> None:
         empty = True
         fault = error.strerror or str(error)
     if fault:
-        raise InputError(f"{folder}: cannot be used for results: {fault}.")
+        raise InputError(folder, f"cannot be used for results: {fault}.")
     if not (empty or force):
         said = "is not empty; choose another folder with -o, or overwrite a run in it with --force"
         if (status := report_of(folder).get("status")) in _UNFINISHED:
             how = "continue it with --restart, or overwrite it with --force"
             said = f"holds a run that {_UNFINISHED[status]}; {how}"
-        raise InputError(f"{folder}: {said}.")
+        raise InputError(folder, f"{said}.")
 
 
 def refuse_folder(scene: Path) -> None:
@@ -93,7 +93,7 @@ def refuse_folder(scene: Path) -> None:
         said = (
             f"is a run; --restart or --extend continues it, and its scene is {scene / 'scene.toml'}"
         )
-    raise InputError(f"{scene}: {said}.")
+    raise InputError(scene, f"{said}.")
 
 
 def report_of(folder: Path) -> ByName:

@@ -69,7 +69,7 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
     total = len(scene.targets)
     if extend and step == total:
         raise InputError(
-            f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further."
+            folder, f"ends at {scene.targets[-1]:g} already; {scene.loading} goes no further."
         )
     if step == total and start.report["status"] == "done":
         lost = _lost_tables(folder, scene, start.report)
@@ -117,7 +117,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     path = folder / CHECKPOINT
     if not scene.output.checkpoint and not path.exists():
         said = "has no checkpoint, as it was solved with output.checkpoint = false"
-        raise InputError(f"{folder}: {said}, so that the run cannot be continued.")
+        raise InputError(folder, f"{said}, so that the run cannot be continued.")
     checkpoint = checkpoints.read(path)
     data = tomllib.loads(checkpoint.scene)
     find_mesh(data.get("mesh"), folder)
@@ -132,9 +132,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
         same = (apart <= _SAME * np.abs(reached).max(axis=0)).all()
     if not same:
         said = f"{scene.loading} and its steps must begin as the steps of the run"
-        raise InputError(
-            f"{path}: its {n} steps are not the first ones of the scene's path; {said}."
-        )
+        raise InputError(path, f"its {n} steps are not the first ones of the scene's path; {said}.")
     path = folder / "run.json"
     try:
         report = read_report(path)
@@ -145,9 +143,9 @@ def _start(folder: Path, scene: AnyScene) -> Start:
         said = (
             f"is missing, was changed, or lacks some of the {n - 1} steps before the checkpoint's"
         )
-        raise InputError(f"{path}: {said}.") from None
+        raise InputError(path, f"{said}.") from None
     if fault := fault_of_mesh(scene, report):
-        raise InputError(f"{folder}: {fault}, so that the run cannot be continued.")
+        raise InputError(folder, f"{fault}, so that the run cannot be continued.")
     seals = report.get("files", {})
     require_intact(folder, [name for name in seals if name not in TABLES])
     return Start(checkpoint, report, done)
@@ -158,15 +156,16 @@ def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None
     unless it may."""
     if own.loading != scene.loading:
         raise InputError(
-            f"{folder}: was loaded by {own.loading}; {scene.loading} cannot continue it."
+            folder, f"was loaded by {own.loading}; {scene.loading} cannot continue it."
         )
     a, b = (_without_targets(scene_keys(each)) for each in (own, scene))
     for key in sorted({*a, *b}):
         if a.get(key) != b.get(key) and not key.startswith(_MAY_DIFFER):
             there, here = (toml_value(keys[key]) if key in keys else "absent" for keys in (a, b))
             raise InputError(
-                f"{folder}: was solved with {key} = {there}, the scene says {here}; only "
-                "[stepping], analysis.max_iterations and the load's further targets may change."
+                folder,
+                f"was solved with {key} = {there}, the scene says {here}; only "
+                "[stepping], analysis.max_iterations and the load's further targets may change.",
             )
 
 

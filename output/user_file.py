@@ -29,10 +29,10 @@ def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True)
     elif path.exists() and any(given.exists() and path.samefile(given) for given in inputs):
         fault = "it is an input of the command"
     if fault:
-        raise InputError(f"{path}: cannot be written: {fault}.")
+        raise InputError(path, f"cannot be written: {fault}.")
     if path.is_file() and not force and not is_device(path):
         raise InputError(
-            f"{path}: is there already; choose another file, or overwrite it with --force."
+            path, "is there already; choose another file, or overwrite it with --force."
         )
 
 
@@ -46,4 +46,4 @@ def writing(path: Path) -> Iterator[Path]:
         with replacing(path) as new:
             yield new
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}.") from None
+        raise InputError(path, f"cannot be written: {error.strerror or error}.") from None

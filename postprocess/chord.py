@@ -152,4 +152,4 @@ def read_chord_pressure(
     try:
         return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)
     except ValueError as error:
-        raise InputError(f"{folder}: step {number} cannot be projected: {error}") from None
+        raise InputError(folder, f"step {number} cannot be projected: {error}") from None

@@ -75,7 +75,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
         tables = [_on_first_loading(table) for table in tables]
         load = _shared_loads([table["load"] for table in tables], margin)
         if not len(load):
-            raise InputError(f"{runs[0].folder}: shares no range of loads with the others.")
+            raise InputError(runs[0].folder, "shares no range of loads with the others.")
         distances = [np.abs(load[:, None] - table["load"]).min(axis=1) for table in tables]
         between = np.array(distances) > margin
         tables = [_at(load, table, k) for table, k in zip(tables, between, strict=True)]
@@ -150,7 +150,7 @@ def _common_columns(runs: Sequence[Run]) -> Curves:
     for run in runs:
         run.number(None)
         if any(run.units.get(name) != first.units.get(name) for name in names):
-            raise InputError(f"{run.folder}: has other units than {first.folder}.")
+            raise InputError(run.folder, f"has other units than {first.folder}.")
         before = float(run.scene.fits and len(fitted) > 1)
         load = np.array(run.path) - before
         loaded = load > _SAME
@@ -158,7 +158,7 @@ def _common_columns(runs: Sequence[Run]) -> Curves:
         table = {"load": load} | columns
         tables.append({name: values[loaded] for name, values in table.items()})
     if not names or not all(len(table["load"]) for table in tables):
-        raise InputError(f"{first.folder}: shares no load with the others.")
+        raise InputError(first.folder, "shares no load with the others.")
     after_fits = ", after press fits" if len(fitted) > 1 else ""
     labels = {"load": f"load factor{after_fits}"}
     labels |= {name: first.heading(name) for name in names}

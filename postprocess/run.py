@@ -125,11 +125,11 @@ class Run:
         if is_sweep(self.folder):
             cases = self.folder / "cases"
             raise InputError(
-                f"{self.folder}: is a sweep, not a run; its runs are the folders in {cases}."
+                self.folder, f"is a sweep, not a run; its runs are the folders in {cases}."
             )
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
-                raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
+                raise InputError(self.folder, f"is not a run folder: {name} is missing.")
         # before the history, which a run writes first
         self.summary: ByName = self._read_report()
         require_intact(self.folder, ["scene.toml"])
@@ -160,10 +160,10 @@ class Run:
         `InputError` without an accepted step, and of a run that is not of a joint."""
         if "P" not in self.columns:
             raise InputError(
-                f"{self.folder}: is the run of a general scene; this is for runs of a [joint]."
+                self.folder, "is the run of a general scene; this is for runs of a [joint]."
             )
         if self.kinematics.dimension == 3:
-            raise InputError(f"{self.folder}: is in space; this is for joints in a plane.")
+            raise InputError(self.folder, "is in space; this is for joints in a plane.")
         self.number(None)
         columns = {name: np.array(self.columns[name]) for name in CURVES}
         columns["P"] /= self.scene.thickness
@@ -175,10 +175,10 @@ class Run:
         touch."""
         step = self.number(step)
         if not self.has_contact:
-            raise InputError(f"{self.folder}: has no contact: its scene has no interaction.")
+            raise InputError(self.folder, "has no contact: its scene has no interaction.")
         if not self.has_profiles:
             raise InputError(
-                f"{self.folder}: has no contact.h5: it was solved with output.contact = false."
+                self.folder, "has no contact.h5: it was solved with output.contact = false."
             )
         return read_contact(self.folder, self.scene, step)
 
@@ -188,7 +188,7 @@ class Run:
         arcs = self.contact(step)
         if side is not None and side not in arcs:
             sides = ", ".join(arcs)
-            raise InputError(f"{self.folder}: has no side {side!r}; its sides are {sides}.")
+            raise InputError(self.folder, f"has no side {side!r}; its sides are {sides}.")
         return arcs[side or list(arcs)[-1]]
 
     def unrolled(
@@ -223,7 +223,7 @@ class Run:
         if interaction not in shares:
             known = ", ".join(shares) or "none"
             raise InputError(
-                f"{self.folder}: has no interaction {interaction!r}; its interactions are {known}."
+                self.folder, f"has no interaction {interaction!r}; its interactions are {known}."
             )
         part = next(part for part in self.scene.interaction if part.name == interaction)
         met = self.contact(step)
@@ -240,7 +240,7 @@ class Run:
     def _require_space(self, what: str) -> None:
         """Raise `InputError` for a run that is not in space."""
         if self.kinematics.dimension != 3:
-            raise InputError(f"{self.folder}: has no {what}, which are for runs in space.")
+            raise InputError(self.folder, f"has no {what}, which are for runs in space.")
 
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
         """`contact` as a table with a row for each point; of one ``side`` if given. Raises
@@ -304,12 +304,12 @@ class Run:
         """``step``, or the number of the last accepted step. Raises `InputError` if the run has no
         such step."""
         if not self.steps:
-            raise InputError(f"{self.folder}: holds no accepted step.")
+            raise InputError(self.folder, "holds no accepted step.")
         if step is None:
             return self.steps
         if not (1 <= step <= self.steps and step == int(step)):
             raise InputError(
-                f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}."
+                self.folder, f"has no step {step}; its accepted steps are 1 to {self.steps}."
             )
         return int(step)
 
@@ -323,10 +323,10 @@ class Run:
             if not np.isfinite(needed).all():
                 raise ValueError("numbers that are not finite")
         except (ValueError, IndexError, KeyError, OSError):
-            raise InputError(f"{path}: cannot be read as the history of a run.") from None
+            raise InputError(path, "cannot be read as the history of a run.") from None
         if fault := fault_of_history(columns, self.summary):
             cure = f"archord solve {self.folder} --restart writes it again"
-            raise InputError(f"{path}: {fault}; {cure}.")
+            raise InputError(path, f"{fault}; {cure}.")
         require_intact(self.folder, ["history.csv"])
         named = (heading.partition(" [") for heading in headings)
         return columns, {name: unit.removesuffix("]") for name, _, unit in named if unit}
@@ -347,4 +347,4 @@ class Run:
             fault = f": {error}"
         except (OSError, ValueError):
             pass
-        raise InputError(f"{path}: cannot be read as the report of a run{fault}.")
+        raise InputError(path, f"cannot be read as the report of a run{fault}.")

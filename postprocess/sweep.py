@@ -66,7 +66,7 @@ class Sweep:
                 if is_sweep(self.folder):
                     cure = f"; archord sweep {self.folder} --gather writes it"
                 raise InputError(
-                    f"{self.folder}: is not the folder of a sweep: {name} is missing{cure}."
+                    self.folder, f"is not the folder of a sweep: {name} is missing{cure}."
                 )
         self.cases = self._read("cases.csv", _FIRST)
         names = list(self.cases)
@@ -101,9 +101,7 @@ class Sweep:
             if list(table)[: len(first)] != first or (first and "message" not in table):
                 raise ValueError("columns")
         except (OSError, ValueError):
-            raise InputError(
-                f"{self.folder / name}: cannot be read as a table of a sweep."
-            ) from None
+            raise InputError(self.folder / name, "cannot be read as a table of a sweep.") from None
         return table
 
     def run(self, case: int | str) -> Run:
@@ -111,7 +109,7 @@ class Sweep:
         is none (yet)."""
         found = self.cases["run"][(self.cases["case"] == case) | (self.cases["run"] == case)]
         if found.empty:
-            raise InputError(f"{self.folder}: has no case {case}; its cases are 1 to {len(self)}.")
+            raise InputError(self.folder, f"has no case {case}; its cases are 1 to {len(self)}.")
         return Run(self.folder / "cases" / found.iloc[0])
 
     @cached_property

@@ -61,7 +61,7 @@ def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
             drawn = "a mesh of solids"
             allowed = '"space"'
         said = f"must be {allowed} for {drawn}"
-        raise InputError(f'{mesh_name(scene)}: analysis.plane = "{plane}" {said}.')
+        raise InputError(mesh_name(scene), f'analysis.plane = "{plane}" {said}.')
     if not in_space and not scene.in_space:
         return scene
     data = plain(scene)
@@ -98,7 +98,7 @@ def scene_mesh(scene: Any, comm: MPI.Comm) -> TaggedMesh:
     where = scene.where("mesh.file")
     lacks = mesh.shape is None and where != mesh.file and not os.path.exists(mesh.file)
     if comm.bcast(lacks):
-        raise InputError(f'{where}: mesh.file = "{mesh.file}" must be a file that is there.')
+        raise InputError(where, f'mesh.file = "{mesh.file}" must be a file that is there.')
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
         del shape["kind"]

@@ -28,6 +28,10 @@ class InputError(ValueError):
     archord.Coupling: coupling "crank".kind = "stiff" must be "rigid" or "distributing".
     """
 
+    def __init__(self, *said: object) -> None:
+        """The message is what is ``said``, first of what, with colons between."""
+        super().__init__(": ".join(map(str, said)))
+
 
 def in_sentences(cls: type) -> Any:
     """Let a call of ``cls`` with wrong arguments raise `InputError`, a sentence; and let its

@@ -69,11 +69,11 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     file = Path(path)
     if file.is_dir():
         raise InputError(
-            f"{path}: is a folder, not a scene; the scene of a run is {file / 'scene.toml'}."
+            path, f"is a folder, not a scene; the scene of a run is {file / 'scene.toml'}."
         )
     data = read_toml(path)
     if "base" in data and "joint" not in data:
-        raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
+        raise InputError(path, "is a sweep, not a scene; archord sweep solves it.")
     _give_way(data, overrides)
     origin = {override_key(data, o): f"--set {o}" for o in in_order(overrides, "--set ")}
     read_targets(data, file)
@@ -158,15 +158,13 @@ def read_targets(data: ByName, scene: Path) -> None:
     name, *values = [line.strip().strip('"') for line in lines]
     if name not in LOADS:
         known = f"{', '.join(LOADS[:-1])} or {LOADS[-1]}"
-        raise InputError(
-            f"{file}: must have one column, headed by {known}, not {shortened(name)!r}."
-        )
+        raise InputError(file, f"must have one column, headed by {known}, not {shortened(name)!r}.")
     if not values:
-        raise InputError(f"{file}: must have a number below the heading {name}.")
+        raise InputError(file, f"must have a number below the heading {name}.")
     for row, value in enumerate(values, 2):
         if not _NUMBER.fullmatch(value):
             said = "a decimal number like 0.5 and nothing else in every row"
-            raise InputError(f"{file}: must have {said}; row {row} has {shortened(value)!r}.")
+            raise InputError(file, f"must have {said}; row {row} has {shortened(value)!r}.")
     load[name] = [float(value) for value in values]
     load.setdefault("steps", 1)
 
@@ -180,10 +178,10 @@ def read_text(path: str | Path) -> str:
             raise OSError(None, f"it is larger than {_LARGEST_FILE // 10**6} MB")
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is not UTF-8 text.") from None
+        raise InputError(path, "cannot be read: it is not UTF-8 text.") from None
     except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read: {said}.") from None
+        raise InputError(path, f"cannot be read: {said}.") from None
 
 
 def read_toml(path: str | Path) -> ByName:
@@ -195,7 +193,7 @@ def read_toml(path: str | Path) -> ByName:
         ValueError,
         RecursionError,
     ) as error:  # also whole numbers of thousands of digits, dates like 0000-00-00
-        raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
+        raise InputError(path, f"is not valid TOML: {shortened(str(error))}.") from None
 
 
 def _parsed(text: str) -> ByName:
@@ -252,7 +250,7 @@ def put(data: ByName, section: str, name: str, value: Any, said: str) -> None:
     """
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
-        raise InputError(f"{said}: {section} is not a section of the scene.")
+        raise InputError(said, f"{section} is not a section of the scene.")
     instead = next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,))
     there = name in table
     for other in (*instead, *_BROUGHT.get(name, ())):
@@ -274,7 +272,7 @@ def require_key(section: str, name: str, said: str) -> None:
         return
     near = difflib.get_close_matches(name, known, 1)
     meant = "".join(f"; did you mean {section}.{found}?" for found in near) or "."
-    raise InputError(f"{said}: there is no key {section}.{name}{meant}")
+    raise InputError(said, f"there is no key {section}.{name}{meant}")
 
 
 def _value(text: str) -> Any:

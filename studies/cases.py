@@ -166,8 +166,7 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     data = read_toml(path)
     if "base" not in data and not {"joint", "mesh", *PRESETS}.isdisjoint(data):
         raise InputError(
-            f"{path}: is a scene, not a sweep; solve it by archord solve, or name a scene as a "
-            "base."
+            path, "is a scene, not a sweep; solve it by archord solve, or name a scene as a base."
         )
     source = path
     if isinstance(data.get("base"), str):
@@ -284,7 +283,7 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         keys = _checked_keys([*varied, ("--set", [given])], "joint" in file.base)
         rows = combinations(varied)
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(path, error) from None
     cases: list[Case] = []
     faults: dict[str, list[int]] = {}
     for number, row in enumerate(rows, 1):

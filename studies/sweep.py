@@ -83,19 +83,20 @@ def claim(sweep: Sweep, folder: Path) -> None:
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / FILE).exists():
             raise InputError(
-                f"{folder}: is not empty and holds no sweep; choose another folder with -o."
+                folder, "is not empty and holds no sweep; choose another folder with -o."
             )
         (folder / CASES).mkdir(parents=True, exist_ok=True)
         with occupied(folder / CASES, wait=True):
             held = {run.name for run in (folder / CASES).iterdir()}
             if held and held.isdisjoint(case.run for case in sweep.cases):
                 raise InputError(
-                    f"{folder}: holds another sweep, which has no case in common with "
-                    f"{sweep.path}; choose another folder with -o, or remove this one."
+                    folder,
+                    f"holds another sweep, which has no case in common with "
+                    f"{sweep.path}; choose another folder with -o, or remove this one.",
                 )
             replace_file(folder / FILE, sweep.file.resolved())
     except OSError as error:
-        raise InputError(f"{folder}: cannot be used for a sweep: {error.strerror}.") from None
+        raise InputError(folder, f"cannot be used for a sweep: {error.strerror}.") from None
 
 
 def part_of(cases: list[Case], part: str) -> list[Case]:

@@ -89,7 +89,7 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
         try:
             if result.status not in ("done", "stopped") or not result.steps:
                 raise InputError(
-                    f"{result.status}: {result.message}" if result.message else result.status
+                    result.status, f"{result.message}" if result.message else result.status
                 )
             curve = Run(of_case(case, folder)).curve.loading()
             check_compatible([curve])
@@ -112,9 +112,7 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
             left_out.append((name, str(error)))
     if not rows:
         said = "; ".join(f"{name}: {reason}" for name, reason in left_out[:1])
-        raise InputError(
-            f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}."
-        )
+        raise InputError(folder, f"holds no case that can be fitted{f' ({said})' if said else ''}.")
     notes = {
         "archord": VERSION,
         "sweep": f"{folder.name}, sha256 "
@@ -140,7 +138,7 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> Ro
     run = refined.run
     if run.scene.pin.whole:
         raise InputError(
-            f"{run.name}: pin.whole = true does not fit: k and c of a sweep are for half a pin."
+            run.name, "pin.whole = true does not fit: k and c of a sweep are for half a pin."
         )
     fit = fit_curve([refined], load_range)
     pin = run.scene.pin

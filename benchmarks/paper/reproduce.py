@@ -25,7 +25,7 @@ def chosen(names: Sequence[str]) -> list[str]:
     for name in names:
         if name not in (*FIGURES, "all"):
             raise InputError(
-                f"{name}: is not a figure of the paper; figures are {', '.join(FIGURES)}, all."
+                name, f"is not a figure of the paper; figures are {', '.join(FIGURES)}, all."
             )
     return [name for name in FIGURES if name in names or "all" in names]
 

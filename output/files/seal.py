@@ -72,7 +72,7 @@ def require_intact(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         if fault := fault_of(folder, name, seals):
             cure = _CURES.get(name, _SOLVE_AGAIN).format(run=folder)
-            raise InputError(f"{folder / name}: {fault}; {cure}.")
+            raise InputError(folder / name, f"{fault}; {cure}.")
 
 
 def faults_of(folder: Path, seals: Seals) -> dict[str, str]:

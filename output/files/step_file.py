@@ -136,7 +136,7 @@ class StepFile:
                 return [(load, steps[step_name(k)]) for k, load in enumerate(loads, start=1)]
         except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
             said = f"is missing or damaged, so that the run cannot be continued ({error})"
-            raise InputError(f"{self.path}: {said}.") from None
+            raise InputError(self.path, f"{said}.") from None
 
 
 def put(file: h5py.File, name: str, values: np.ndarray) -> None:

@@ -28,7 +28,7 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
     raises."""
     path = Path(folder) / f"{name}.h5"
     if not path.is_file():
-        raise InputError(f"{folder}: is not a complete run folder: {path.name} is missing.")
+        raise InputError(folder, f"is not a complete run folder: {path.name} is missing.")
     apart = [f"{name}/{step_name(k)}.h5" for k in (0, step)]
     require_intact(Path(folder), [path.name, *apart])
     try:
@@ -37,7 +37,7 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
                 raise KeyError(step)
             yield file
     except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
-        raise InputError(f"{path}: cannot be read as the {name} of a run at step {step}.") from None
+        raise InputError(path, f"cannot be read as the {name} of a run at step {step}.") from None
 
 
 def read_contact(folder: str | Path, scene: Any, step: int) -> ByName:

@@ -234,4 +234,4 @@ def read_points(folder: str | Path, scene: Any, step: int) -> Arrays:
 def _require(written: bool, folder: str | Path, scene: Any, what: str) -> None:
     if not written:
         asked = toml_value(scene.output.fields)
-        raise InputError(f"{folder}: has no {what}: it was solved with output.fields = {asked}.")
+        raise InputError(folder, f"has no {what}: it was solved with output.fields = {asked}.")

@@ -59,7 +59,7 @@ def write_deck(scene: AnyScene, path: Path, name: str, given: Problem | None = N
     try:
         text = deck(system, deck_mesh(system), scene.targets, heading)
     except ValueError as error:
-        raise InputError(f"{name}: {error}.") from error
+        raise InputError(name, f"{error}.") from error
     with writing(path) as new:
         new.write_text(text, encoding="utf-8")
 

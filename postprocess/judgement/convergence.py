@@ -142,7 +142,7 @@ def group(runs: list[RunCurve]) -> list[Refined]:
     each. Raises `InputError` for two runs of the same scene on the same mesh."""
     for run, first in twins(runs):
         raise InputError(
-            f"{run.name}: is the same scene on the same mesh as {first.name}; give one of them."
+            run.name, f"is the same scene on the same mesh as {first.name}; give one of them."
         )
     groups = _by_scene(runs).values()
     return [Refined(same[0], tuple(same[1:])) for same in groups]

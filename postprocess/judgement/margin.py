@@ -252,15 +252,17 @@ def _strengths(
     if body.yield_stress is None:
         if proof is None and tensile is None:
             raise InputError(
-                f"{run.folder}: the {part.noun} is elastic: it has no yield; give --proof and "
-                "--tensile for the hand formulas, or solve with a yield_stress."
+                run.folder,
+                f"the {part.noun} is elastic: it has no yield; give --proof and "
+                "--tensile for the hand formulas, or solve with a yield_stress.",
             )
         said = {"yield": proof, "ultimate": tensile}
         return {kind: (value, "given") for kind, value in said.items() if value is not None}
     if body.back_stresses and (proof is None or tensile is None):
         raise InputError(
-            f"{run.folder}: the {part.noun} has back stresses, and no tension test of it is known "
-            "here; give --proof and --tensile."
+            run.folder,
+            f"the {part.noun} has back stresses, and no tension test of it is known "
+            "here; give --proof and --tensile.",
         )
     found = {"yield": (proof_strength(body), "at 0.2 % plastic strain of the run's curve")}
     if proof:

@@ -72,8 +72,8 @@ def _lug(run: Run) -> Part:
     pull = _only_load(run)
     if run.scene.load[0].direction != "x":
         raise InputError(
-            f"{run.folder}: is loaded by {pull}; the hand formulas are for one load along the "
-            "lug, in x."
+            run.folder,
+            f"is loaded by {pull}; the hand formulas are for one load along the lug, in x.",
         )
     shape = _shape_of(run)
     thickness = run.scene.thickness
@@ -95,12 +95,12 @@ def _plate(run: Run, name: str) -> Part:
     known = {"pull"} if in_space else {f"{plate} pull" for plate in PLATES}
     if {load.name for load in run.scene.load} != known:
         names = " and ".join(map(repr, sorted(known)))
-        raise InputError(f"{run.folder}: margins of a clevis are for its loads {names} alone.")
+        raise InputError(run.folder, f"margins of a clevis are for its loads {names} alone.")
     drawn = getattr(shape, name)
     if drawn.thickness is None:
         raise InputError(
-            f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it "
-            "again."
+            run.folder,
+            f"mesh.shape.{name}.thickness is missing, which margins need; solve it again.",
         )
     together = PLATES[name] * drawn.thickness
     outline = drawn.outline(shape)
@@ -170,7 +170,7 @@ def _bodies(run: Run) -> dict[str, Part]:
     """Every body that yields, under the only load. Raises `InputError`."""
     pull = _only_load(run)
     if f"{pull} force" not in run.columns:
-        raise InputError(f"{run.folder}: has no column of the force {pull!r}, which margins need.")
+        raise InputError(run.folder, f"has no column of the force {pull!r}, which margins need.")
     note = "no section of this body is known by hand; those of [lug] and [clevis] are"
     force = np.abs(np.asarray(run.columns[f"{pull} force"]))
     unit = run.units[f"{pull} force"]
@@ -180,7 +180,7 @@ def _bodies(run: Run) -> dict[str, Part]:
         if body.yield_stress is not None
     }
     if not found:
-        raise InputError(f"{run.folder}: no body yields, so there is no margin to tell.")
+        raise InputError(run.folder, "no body yields, so there is no margin to tell.")
     return found
 
 
@@ -188,8 +188,8 @@ def _only_load(run: Run) -> str:
     loads = getattr(run.scene, "load", None)
     if not isinstance(loads, list) or len(loads) != 1:
         raise InputError(
-            f"{run.folder}: margins are for a scene of bodies under one load, and this run has "
-            f"{_named(loads)}."
+            run.folder,
+            f"margins are for a scene of bodies under one load, and this run has {_named(loads)}.",
         )
     return loads[0].name
 
@@ -206,8 +206,8 @@ def _pulling(run: Run, pull: str) -> Array:
     round_off = 1e-12 * max(body.E for body in run.scene.body) * _shape_of(run).radius
     if max(force) <= round_off:
         raise InputError(
-            f"{run.folder}: the pin never pulls at the lug's end: the force of {pull!r} is "
-            "never above 0."
+            run.folder,
+            f"the pin never pulls at the lug's end: the force of {pull!r} is never above 0.",
         )
     return force
 

@@ -160,8 +160,8 @@ def fit_curve(
     n_elastic = sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen)
     if quantity == "p0" and n_elastic < 2:
         raise InputError(
-            f"{groups[0].run.name}: p0 says nothing of k past yield, and fewer than two steps are "
-            "before."
+            groups[0].run.name,
+            "p0 says nothing of k past yield, and fewer than two steps are before.",
         )
     curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
 
@@ -186,7 +186,7 @@ def fit_curve(
             names = ", ".join(g.run.name for g in groups)
             what = " and ".join(free)
             raise InputError(
-                f"{names}: {what} cannot be fitted to {quantity}: {error}; widen --range."
+                names, f"{what} cannot be fitted to {quantity}: {error}; widen --range."
             ) from None
 
     data = scaled(y[0] for y in curves)
@@ -247,7 +247,7 @@ def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.
     touching = (run.P > 0) & (run.p0 > 0)
     if not touching.any():
         raise InputError(
-            f"{run.name}: the bodies never touch in this run, so there is no law to fit to it."
+            run.name, "the bodies never touch in this run, so there is no law to fit to it."
         )
     low, high = load_range
     above = load >= low * (1 - slack)
@@ -255,8 +255,9 @@ def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.
     chosen = touching & above & below
     if not chosen.any():
         raise InputError(
-            f"{run.name}: has no step with contact from {low:g} to {high:g} clearances; its "
-            f"{len(load)} steps are from {load.min():g} to {load.max():g}."
+            run.name,
+            f"has no step with contact from {low:g} to {high:g} clearances; its "
+            f"{len(load)} steps are from {load.min():g} to {load.max():g}.",
         )
     return chosen
 
@@ -321,14 +322,14 @@ def check_compatible(runs: list[RunCurve]) -> None:
     for run in runs[1:]:
         fault = _difference(run, first)
         if fault:
-            raise InputError(f"{run.name}: {fault}; {_SEPARATELY}")
+            raise InputError(run.name, f"{fault}; {_SEPARATELY}")
     yielding = [(run.name, LawJoint.from_scene(run.scene).yielding) for run in runs]
     yielding = [(name, bodies) for name, bodies in yielding if bodies != "none"]
     for name, bodies in yielding[1:]:
         like, others = yielding[0]
         if bodies != others:
             said = f"yield stresses ({bodies}) do not fit: {like} has them otherwise ({others})"
-            raise InputError(f"{name}: {said}; {_SEPARATELY}")
+            raise InputError(name, f"{said}; {_SEPARATELY}")
 
 
 def _check_alone(run: RunCurve) -> None:
@@ -336,14 +337,13 @@ def _check_alone(run: RunCurve) -> None:
     scene = run.scene
     model = scene.joint.model
     if not scene.joint.is_block:
-        raise InputError(
-            f'{run.name}: joint.model = "{model}" has no law to fit; only "block" has.'
-        )
+        raise InputError(run.name, f'joint.model = "{model}" has no law to fit; only "block" has.')
     friction = scene.analysis.friction
     if friction:
         raise InputError(
-            f"{run.name}: analysis.friction = {friction:g} does not fit: the law is for contact "
-            f"without friction; {_OWN_TABLE}"
+            run.name,
+            f"analysis.friction = {friction:g} does not fit: the law is for contact "
+            f"without friction; {_OWN_TABLE}",
         )
     for body, solid in (("pin", scene.pin), ("block", scene.block)):
         if solid.perfectly_plastic:
@@ -354,8 +354,9 @@ def _check_alone(run: RunCurve) -> None:
         elif isinstance(solid.hardening, float) and solid.hardening:
             key = f"hardening = {solid.hardening:g}"
         raise InputError(
-            f"{run.name}: {body}.{key} does not fit: the law is for perfect plasticity, "
-            f"hardening = 0; {_OWN_TABLE}"
+            run.name,
+            f"{body}.{key} does not fit: the law is for perfect plasticity, "
+            f"hardening = 0; {_OWN_TABLE}",
         )
 
 

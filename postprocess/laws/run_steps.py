@@ -106,8 +106,9 @@ class RunSteps:
                 before = self.begin + 1
                 ends = [f"{self.at(self.x[i])} (step {before + i})" for i in (a, b)]
                 raise InputError(
-                    f"{self.run.folder}: the force does not rise from {' to '.join(ends)}, from "
-                    f"{self.load(self.y[a])} to {self.load(self.y[b])}; in a table it must."
+                    self.run.folder,
+                    f"the force does not rise from {' to '.join(ends)}, from "
+                    f"{self.load(self.y[a])} to {self.load(self.y[b])}; in a table it must.",
                 )
 
     @property
@@ -156,19 +157,19 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
     run without a step or contact, or such a load."""
     run.number(None)
     if not run.has_contact:
-        raise InputError(f"{run.folder}: has no contact, and a table is of a joint's.")
+        raise InputError(run.folder, "has no contact, and a table is of a joint's.")
     if run.scene.analysis.plane == "axisymmetric":
         raise InputError(
-            f"{run.folder}: is of a body of revolution, whose forces are of the whole ring; a "
-            "table has forces per length of a pin. history.csv has force over displacement."
+            run.folder,
+            "is of a body of revolution, whose forces are of the whole ring; a "
+            "table has forces per length of a pin. history.csv has force over displacement.",
         )
     begin = 0  # steps before the load moves
     length = force = pressure = 1.0
     if _is_of_joint(run):
         if of is not None:
             raise InputError(
-                f"{run.folder}: is the run of a joint, which has one load; --of is for general "
-                "scenes."
+                run.folder, "is the run of a joint, which has one load; --of is for general scenes."
             )
         scene = run.scene
         length = abs(scene.joint.dR)
@@ -187,8 +188,8 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
         )
         if abs(before[1]) > _OPEN * np.abs(after[1]).max(initial=0.0):
             raise InputError(
-                f"{run.folder}: {names[1]} is {before[1]:.6g} before the load moves; a table "
-                "begins at 0."
+                run.folder,
+                f"{names[1]} is {before[1]:.6g} before the load moves; a table begins at 0.",
             )
         values = [after[0] - before[0], *after[1:-1], after[-1] - before[-1]]
     delta, P, *told, lost = values
@@ -222,12 +223,13 @@ def _columns_of_load(run: Run, of: str | None) -> list[str]:
     scene = run.scene
     loads = [load.name for load in scene.load]
     if of not in loads and (of or len(loads) > 1):
-        raise InputError(f"{run.folder}: --of must name one of its loads: {', '.join(loads)}.")
+        raise InputError(run.folder, f"--of must name one of its loads: {', '.join(loads)}.")
     of = of or loads[0]
     if next(load.kind for load in scene.load if load.name == of) == "pressure":
         raise InputError(
-            f"{run.folder}: {of!r} is a pressure over a volume that it displaces; a table has "
-            "forces per length of a pin. history.csv has pressure over volume."
+            run.folder,
+            f"{of!r} is a pressure over a volume that it displaces; a table has "
+            "forces per length of a pin. history.csv has pressure over volume.",
         )
     names = [f"{of} displacement", f"{of} force"]
     if len(scene.interaction) == 1 and not scene.fits:

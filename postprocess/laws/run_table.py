@@ -130,7 +130,7 @@ def _steps_of_loading(steps: RunSteps) -> np.ndarray:
     k = first[touching[0] :] if len(touching) else first[:0]
     if len(k) < _FEWEST:
         said = f"has {len(k)} steps of first loading with contact, and a table needs {_FEWEST}"
-        raise InputError(f"{steps.run.folder}: {said}; press further, or in more steps.")
+        raise InputError(steps.run.folder, f"{said}; press further, or in more steps.")
     steps.require_rising(k)
     return k
 
@@ -201,13 +201,13 @@ def _last_unloading(steps: RunSteps, k: np.ndarray, least: float) -> np.ndarray:
     if not ways:
         remedy = "a last target of 0 for the load, as load.displacement = [2.0, 0.0], gives it"
         raise InputError(
-            f"{folder}: yields and never unloads after, so its way back is unknown; {remedy}."
+            folder, f"yields and never unloads after, so its way back is unknown; {remedy}."
         )
     way = ways[-1]
     on = way[steps.closed[way]]
     if len(on) < _FEWEST_BACK:
         raise InputError(
-            f"{folder}: unloads in {len(on)} steps with contact, and a table needs {_FEWEST_BACK}."
+            folder, f"unloads in {len(on)} steps with contact, and a table needs {_FEWEST_BACK}."
         )
     steps.require_rising(on[::-1])
     return way

@@ -116,11 +116,11 @@ def panels_of(
     if run.kinematics.dimension == 3:
         if edges:
             said = "has no edges to draw a field along; archord probe --along draws it along a line"
-            raise InputError(f"{run.folder}: is in space, and {said}.")
+            raise InputError(run.folder, f"is in space, and {said}.")
         draw_fields = partial(solids.field_panel, cut=cut)
         draw_contact = solids.contact_panel
     elif cut:
-        raise InputError(f"{run.folder}: is in a plane, where there is nothing to cut.")
+        raise InputError(run.folder, "is in a plane, where there is nothing to cut.")
     draws: list[Callable[[Any], None]] = []
     of_body = "" if edges and field in problems.OF_EDGES else field
     if run.scene.output.fields or of_body:

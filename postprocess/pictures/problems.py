@@ -220,7 +220,7 @@ def _values(run: Run, fields: Fields, name: str) -> Array:
     known = fields.nodal_fields() | moved | means
     if name not in known:
         names = ", ".join(dict.fromkeys([*_FIELDS, *known]))
-        raise InputError(f"{run.folder}: has no field {name!r}; its fields are {names}.")
+        raise InputError(run.folder, f"has no field {name!r}; its fields are {names}.")
     return known[name]
 
 

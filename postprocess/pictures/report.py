@@ -58,7 +58,7 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
 
     run.number(None)
     if target.suffix.lower() != ".pdf" and not is_device(target):
-        raise InputError(f"{target}: must end in .pdf, as a report is a PDF file.")
+        raise InputError(target, "must end in .pdf, as a report is a PDF file.")
     check_target(target, force=force)
     # all is drawn before the file is begun: what a run lacks is told first
     figures = list(_pages_of(run))

@@ -144,13 +144,13 @@ def _plane_of(run: Run, fields: Fields, cut: str) -> tuple[int, float]:
         at = float(place)
     except ValueError:
         said = f'cut = "{cut}" must name a plane, as "z=0" or "x=12.5"'
-        raise InputError(f"{run.folder}: {said}.") from None
+        raise InputError(run.folder, f"{said}.") from None
     along = fields.coordinates[:, axis]
     low = along.min()
     high = along.max()
     if not low < at < high:
         said = f'cut = "{cut}" must lie within the bodies: {low:.4g} < {AXES[axis]} < {high:.4g}'
-        raise InputError(f"{run.folder}: {said}.")
+        raise InputError(run.folder, f"{said}.")
     return axis, at
 
 

@@ -25,7 +25,7 @@ def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:
         known = ", ".join(edges) or "none"
-        raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {known}.")
+        raise InputError(run.folder, f"has no edge {edge!r}; its edges are {known}.")
     nodes, s, radius = _along(fields, edge)
     tangent, joined = _tangents(run, fields, nodes)
     stresses = {}

@@ -25,7 +25,7 @@ def along_line(run: Probed, line: Sequence[float], quantity: str, step: int) -> 
     d = run.kinematics.dimension
     if len(line) != 2 * d:
         ends = ", ".join(f"{axis}{k}" for k in (0, 1) for axis in run.kinematics.axes)
-        raise InputError(f"{run.folder}: a line here is {ends}, not {len(line)} numbers.")
+        raise InputError(run.folder, f"a line here is {ends}, not {len(line)} numbers.")
     start = np.array(line[:d])
     end = np.array(line[d:])
     share = np.linspace(0, 1, _SAMPLES)
@@ -40,7 +40,7 @@ def along_line(run: Probed, line: Sequence[float], quantity: str, step: int) -> 
         found = np.maximum(_values(run, fields, x, quantity), _least(quantity))
     inside = ~np.isnan(found)
     if not inside.any():
-        raise InputError(f"{run.folder}: no body lies on the line.")
+        raise InputError(run.folder, "no body lies on the line.")
     length = np.linalg.norm(end - start)
     return Along(x[inside], share[inside] * length, found[inside])
 

@@ -118,7 +118,7 @@ class Probe:
                     between = float(np.interp(0.0, off[order], values))
                     return (between + np.pi / 2) % np.pi - np.pi / 2
                 return float(np.interp(0.0, off[order], values))
-        raise InputError(f"{self.place}: has no point at {angle:g} degrees.")
+        raise InputError(self.place, f"has no point at {angle:g} degrees.")
 
     def over(self, length: float, of: str = "") -> Probe:
         """This over P / ``length``, the mean stress that the force P makes in a section: the force
@@ -130,13 +130,14 @@ class Probe:
             if self.axes == SPACE.axes:
                 whole = "a body in space is not per unit thickness"
             raise InputError(
-                f"{self.place}: has no factor over a length, as the force of {whole}; "
-                "divide by the mean stress of the section's area."
+                self.place,
+                f"has no factor over a length, as the force of {whole}; "
+                "divide by the mean stress of the section's area.",
             )
         force, by = self._chosen(of)
         if not (force and 0 < length < np.inf):
             section = f"a section of {length:g} under a force of {force:g}"
-            raise InputError(f"{self.place}: has no factor over {section}.")
+            raise InputError(self.place, f"has no factor over {section}.")
         return replace(
             self,
             quantity=f"{self.quantity}/(P/L)",
@@ -158,8 +159,9 @@ class Probe:
         if any(largest - abs(force) > _SAME * largest for force in pulling.values()):
             told = ", ".join(f"{name} {force:.6g}" for name, force in pulling.items())
             raise InputError(
-                f"{self.place}: has no factor over a length without a load to choose: the forces "
-                f"are {told}; name one by --of."
+                self.place,
+                f"has no factor over a length without a load to choose: the forces "
+                f"are {told}; name one by --of.",
             )
         return self.force, self.by
 

@@ -52,4 +52,4 @@ def nodal(run: Probed, fields: Fields, quantity: str, nodes: Any = ..., **more: 
     why = ""
     if fields.stress is None:
         why = ' (the run was solved with output.fields = "cells")'
-    raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
+    raise InputError(run.folder, f"has no {quantity!r} there, but {', '.join(known)}{why}.")

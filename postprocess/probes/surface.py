@@ -25,13 +25,14 @@ def along_surface(run: Probed, edge: str, quantity: str, step: int) -> Along:
 
     if run.kinematics.dimension == 3:
         raise InputError(
-            f"{run.folder}: the {quantity} of a surface in space is no curve; Run.unrolled and "
-            "Run.contact have it, and archord export --csv."
+            run.folder,
+            f"the {quantity} of a surface in space is no curve; Run.unrolled and "
+            "Run.contact have it, and archord export --csv.",
         )
     arc = run.arc(step, edge)
     at_points = getattr(arc, CONTACT[quantity])
     if at_points is None:
-        raise InputError(f"{run.folder}: has no {quantity}, as its contacts have no friction.")
+        raise InputError(run.folder, f"has no {quantity}, as its contacts have no friction.")
     x = undeformed(arc, edge, run.scene)
     circle = circle_through(x.reshape(-1, 2))
     share = arc.weight / arc.width[:, None]

@@ -34,16 +34,14 @@ class Checked(Section):
         try:
             data = plain(sections)
         except RecursionError:
-            raise InputError(
-                f"{source}: is not a scene: its tables are nested too deeply."
-            ) from None
+            raise InputError(source, "is not a scene: its tables are nested too deeply.") from None
         version = data.get("format")
         newest = type(self).model_fields["format"].default
         if (
             isinstance(version, int) and version > newest
         ):  # it may hold anything else that is unknown here
             said = f"is for a newer archord; this one reads format {newest}"
-            raise InputError(f"{source}: format = {version} {said}.")
+            raise InputError(source, f"format = {version} {said}.")
         try:
             units = data.get("units")
             context = {"stress": str(units.get("stress", "MPa"))} if isinstance(units, dict) else {}

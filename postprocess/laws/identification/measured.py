@@ -68,16 +68,16 @@ def read_curve(
     columns = [_column(path, heads, name, k) for k, name in enumerate((delta, load))]
     if columns[0] == columns[1]:
         fault = f"column {columns[0] + 1} is taken for displacement and force"
-        raise InputError(f"{path}: {fault}; name both, by --delta and --load.")
+        raise InputError(path, f"{fault}; name both, by --delta and --load.")
     if any(column < len(heads) and not heads[column] for column in columns):
         fault = "has a column without a heading, as of a table's index, among the first two"
-        raise InputError(f"{path}: {fault}; name both, by --delta and --load.")
+        raise InputError(path, f"{fault}; name both, by --delta and --load.")
     _require_one_reading(path, separator, lines, cells, begin, columns)
     numbers = np.array([_numbers(path, row, columns) for row in cells[begin:]]).reshape(-1, 2)
     whole = np.isfinite(numbers).all(axis=1)
     if whole.sum() < FEWEST:
         fault = f"has {whole.sum()} rows with two numbers, and a fit needs {FEWEST} and more"
-        raise InputError(f"{path}: {fault}.")
+        raise InputError(path, f"{fault}.")
     said = []
     for k, row in enumerate(cells[:begin]):
         named = [row[column] if column < len(row) else "" for column in columns]
@@ -111,11 +111,11 @@ def _column(path: Path, heads: list[str], name: str | None, default: int) -> int
     plain = [re.split(r"[\[(]", head)[0].strip() for head in heads]
     for known in (heads, plain):
         if known.count(name) > 1:
-            raise InputError(f"{path}: has {known.count(name)} columns headed {name!r}.")
+            raise InputError(path, f"has {known.count(name)} columns headed {name!r}.")
         if name in known:
             return known.index(name)
     there = f"its headings are {', '.join(heads)}" if heads else "it has no headings"
-    raise InputError(f"{path}: has no column {name!r}; {there}.")
+    raise InputError(path, f"has no column {name!r}; {there}.")
 
 
 def _require_one_reading(
@@ -134,17 +134,17 @@ def _require_one_reading(
         k = longer[0]
         fault = f"has {len(rows[k])} cells in the line {shown(lines[begin + k])}"
         cure = "a decimal comma needs columns that are separated by semicolons or tabs"
-        raise InputError(f"{path}: {fault}, and no more than {width} before; {cure}.")
+        raise InputError(path, f"{fault}, and no more than {width} before; {cure}.")
     if separator == ",":
         if begin == 0 and width > 2:
             fault = f"has no headings and {width} columns between commas"
-            raise InputError(f"{path}: {fault}, which may be decimal ones; give it headings.")
+            raise InputError(path, f"{fault}, which may be decimal ones; give it headings.")
         return
     given = [line.split(separator) for line in lines[begin:]]
     numbers = [row[column] for row in given for column in columns if column < len(row)]
     if any("," in number for number in numbers) and any("." in number for number in numbers):
         fault = "has numbers with a comma and numbers with a point"
-        raise InputError(f"{path}: {fault}; write them without signs between thousands.")
+        raise InputError(path, f"{fault}; write them without signs between thousands.")
 
 
 def _other_units(
@@ -168,7 +168,7 @@ def _numbers(path: Path, row: list[str], columns: list[int]) -> list[float]:
     for column in columns:
         cell = row[column] if column < len(row) else ""
         if not _is_number(cell):
-            raise InputError(f"{path}: must have numbers below its headings, not {shown(cell)}.")
+            raise InputError(path, f"must have numbers below its headings, not {shown(cell)}.")
         found.append(float(cell or math.nan))
     return found
 
@@ -176,12 +176,12 @@ def _numbers(path: Path, row: list[str], columns: list[int]) -> list[float]:
 def _compressed(path: Path, displacement: Array, load: Array, said: list[str]) -> MeasuredCurve:
     """The curve with signs that are positive in compression."""
     if np.ptp(load) == 0 or np.ptp(displacement) == 0:
-        raise InputError(f"{path}: its forces or its displacements are all the same.")
+        raise InputError(path, "its forces or its displacements are all the same.")
     moves = (np.diff(displacement) != 0) | (np.diff(load) != 0)
     is_new = np.append(True, moves)
     if is_new.sum() < FEWEST:
         fault = f"has {is_new.sum()} rows that differ from the row before"
-        raise InputError(f"{path}: {fault}, and a fit needs {FEWEST} and more.")
+        raise InputError(path, f"{fault}, and a fit needs {FEWEST} and more.")
     if not is_new.all():
         repeated = (~is_new).sum()
         said.append(f"{path}: {repeated} of {len(load)} rows repeat the row before; counted once")
