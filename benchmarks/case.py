@@ -3,7 +3,6 @@ vary, and tables."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from mpi4py import MPI
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome
 from archord.report.by_name import ByName
-from archord.report.files import Row, write_report
+from archord.report.files import Row, read_json, write_report
 from archord.report.table import Table
 from archord.scene.file import parse_scene, resolved
 from archord.scene.presets.joint import Scene
@@ -67,7 +66,7 @@ class Case:
     def is_done(self, parent: Path) -> bool:
         """Whether the folder below ``parent`` holds this scene, solved to the end."""
         try:
-            report = json.loads((self.folder(parent) / "run.json").read_text(encoding="utf-8"))
+            report = read_json(self.folder(parent) / "run.json")
             scene = (self.folder(parent) / "scene.toml").read_text(encoding="utf-8")
         except (OSError, ValueError):
             return False

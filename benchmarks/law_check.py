@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
 
 from archord.materials.material import Array, Arrays
+from archord.postprocess.curve import rms
 from archord.postprocess.laws.calibration import fit
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.general_law import joint_numbers, law_of_numbers
@@ -151,7 +152,7 @@ def _back(law: JointCurve, run: NodeRun) -> Arrays:
     x_again, y_again = again[again[:, 0] <= x[0]].T
     told_again = law.at(x_again, x[0]).load
     return errors | {
-        "back": np.array([np.sqrt(np.mean(off**2))]),
+        "back": np.array([rms(off)]),
         "energy": np.array([100 * returned / work]),
         "reloaded": 100 * (told_again - y_again) / largest,
         "back inside": np.abs(off) <= 100 * state.error[1:] / largest,

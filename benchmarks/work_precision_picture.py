@@ -18,8 +18,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, StrMethodFormatter
 
-from archord.report.figure import new_figure, save
-from archord.report.files import replacing
+from archord.output.user_file import save_figure
+from archord.report.figure import new_figure
 from archord.report.table import Table
 
 STEM = "work_precision_"  # of the CSV tables; a case follows
@@ -119,8 +119,7 @@ def draw(tables: dict[str, pd.DataFrame], file: Path) -> None:
         place = {"loc": "center", "ncols": 1}
     on = spare[0] if len(spare) else figure
     on.legend(shown.values(), shown.keys(), fontsize=_TEXT, frameon=False, **place)
-    with replacing(file) as new:
-        save(figure, new)
+    save_figure(figure, file)
 
 
 def _draw_code(ax: Axes, code: str, points: pd.DataFrame) -> None:

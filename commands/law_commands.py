@@ -165,8 +165,9 @@ def _sampled(
     said = []
     silent = []
     for entry in chosen:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", LawRangeWarning)
+        with warnings.catch_warnings(
+            record=True, action="always", category=LawRangeWarning
+        ) as caught:
             state = sample(entry, joint, by_load, *options)
         told = [str(warning.message) for warning in caught]
         if says_nothing(state, by_load):
@@ -200,12 +201,9 @@ def _export(
     force: bool,
 ) -> int:
     from archord.postprocess.laws.general.general_law import general_law
-    from archord.postprocess.laws.law import LawRangeWarning
     from archord.postprocess.laws.laws import LAWS
 
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", LawRangeWarning)
-        LAWS["archord"].check(joint)
+    said = LAWS["archord"].doubts(joint)
     law = general_law(joint)
     about = law.about | {
         "units": {name: units[name] for name in ("length", "force", "stress") if name in units}
@@ -214,7 +212,6 @@ def _export(
         law = dataclasses.replace(law, length_unit=units["length"], force_unit=units["force"])
     law = dataclasses.replace(law, force=law.force * thickness, pin_length=thickness, about=about)
     print(*write(exports_of(law, exports, contact), inputs, force), sep="\n")
-    said = [str(warning.message) for warning in caught]
     has_element = any(export.suffix != ".json" for export in exports)
     if joint.friction and has_element and not contact.mu_static:
         said.append(

@@ -65,8 +65,7 @@ def write(texts: list[Text], inputs: list[Path], force: bool) -> list[Path]:
         check_target(target, inputs, force=force)
     if len({target.resolve() for target in targets}) < len(targets):
         raise InputError(targets[0], "is named for two files; choose different ones.")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UserWarning)
+    with warnings.catch_warnings(record=True, action="always", category=UserWarning) as caught:
         contents = [make() for _, make in texts]
     for target, content in zip(targets, contents, strict=True):
         with writing(target) as new:

@@ -7,10 +7,15 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from archord.output.folder import CHECKPOINT, FILES, MESH
 from archord.report.errors import InputError
+from archord.report.figure import save
 from archord.report.files import is_device, replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True) -> None:
@@ -47,3 +52,13 @@ def writing(path: Path) -> Iterator[Path]:
             yield new
     except OSError as error:
         raise InputError(path, f"cannot be written: {error.strerror or error}.") from None
+
+
+def save_figure(figure: Figure, target: Path) -> Path:
+    """Write ``figure`` as ``target``; returns it. Raises `InputError` if that cannot be written."""
+    try:
+        with writing(target) as new:
+            save(figure, new)
+    except ValueError as error:
+        raise InputError(error) from None
+    return target

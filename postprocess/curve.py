@@ -73,6 +73,11 @@ class RunCurve:
         return replace(self, **chosen, step=self.numbers[first])
 
 
+def rms(errors: Array) -> float:
+    """The root of the mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
 def on_first_loading(delta: Array, P: Array) -> np.ndarray:
     """Whether each of the steps ``(n,)`` is one of `RunCurve.loading`."""
     deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (delta, P))

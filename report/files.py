@@ -4,12 +4,15 @@ tables, a picture."""
 from __future__ import annotations
 
 import csv
+import json
 import os
 import shutil
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 Row = Mapping[str, object]
 _DEVICES = (Path("/dev/stdout"), Path("/dev/stderr"), Path("/dev/fd"), Path("/proc"))
@@ -38,6 +41,22 @@ def replacing(path: Path) -> Iterator[Path]:
         if real.exists():
             shutil.copymode(real, new)
         new.replace(real)
+
+
+def toml_beside(module: str, name: str) -> Any:
+    """The tables of the file of this ``name`` beside a ``module``, its ``__file__``."""
+    return tomllib.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
+
+
+def read_json(path: Path) -> Any:
+    """What a file of JSON holds."""
+    return json.loads(path.read_bytes())
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write ``text`` as a file."""
+    with replacing(path) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def is_device(path: Path) -> bool:
@@ -75,8 +94,7 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}.csv", folder / f"{name}.md"]
     write_rows(rows, files[0])
-    with replacing(files[1]) as new:
-        new.write_text(markdown, encoding="utf-8")
+    write_text(markdown, files[1])
     if draw is not None:
         files.append(folder / f"{name}.png")
         draw(files[-1])

@@ -12,11 +12,10 @@ import tempfile
 from pathlib import Path
 
 from archord.benchmarks.case import Case, paper_joint
+from archord.report.files import read_json
 
 ALLOWED = 1.1  # of what is kept
-KEPT: dict[str, dict[str, int]] = json.loads(
-    Path(__file__).with_name("counts.json").read_text(encoding="utf-8")
-)
+KEPT: dict[str, dict[str, int]] = read_json(Path(__file__).with_name("counts.json"))
 # ``elastic 0.12`` is the elastic joint of the paper with elements of 0.12 R on its arcs.
 CASES = [
     Case(f"{kind} {size:g}", paper_joint(size, steps, yield_stress))

@@ -33,8 +33,10 @@ from archord.benchmarks.cost.work_precision_codes import (
 )
 from archord.benchmarks.timing import Said
 from archord.geometry.basis import Array
+from archord.postprocess.curve import rms
 from archord.postprocess.run import Run
 from archord.report.by_name import ByName
+from archord.report.files import read_json
 from archord.report.table import Table
 from archord.scene.presets.joint import Scene
 
@@ -111,7 +113,7 @@ def _line(h: Array, v: Array, order: float) -> tuple[float, float]:
     ``v``."""
     A = np.stack([np.ones_like(h), h**order], axis=1)
     fit, *_ = np.linalg.lstsq(A, v, rcond=None)
-    misfit = np.sqrt(np.mean((A @ fit - v) ** 2))
+    misfit = rms(A @ fit - v)
     spread = np.ptp(v) or 1.0
     return float(fit[0]), float(misfit / spread)
 
@@ -204,7 +206,7 @@ def main(folder: Path, chosen: Sequence[str]) -> None:
         *("first family", "second family"),
         left=3,
     )
-    everything = json.loads(REFERENCES.read_text(encoding="utf-8"))
+    everything = read_json(REFERENCES)
     folder.mkdir(parents=True, exist_ok=True)
     for case in chosen or everything:
         everything[case] = references(case, folder, lambda line: print(line, flush=True), table)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from archord.report.figure import new_figure, save
-from archord.report.files import replacing
+from archord.output.user_file import save_figure
+from archord.report.figure import new_figure
 
 _COLOURS = {"elastic": "#0072B2", "plastic": "#D55E00"}
 _DASHES = {1: "-", 2: "--", 4: ":"}
@@ -45,8 +45,7 @@ def draw(costs: Sequence[Mapping[str, Any]], file: Path) -> None:
     ax.tick_params(labelsize=_TEXT - 1)
     ax.grid(True, linewidth=0.4)
     ax.legend(fontsize=_TEXT - 1)
-    with replacing(file) as new:
-        save(figure, new)
+    save_figure(figure, file)
 
 
 def _draw_slope(ax: Axes, ends: tuple[float, float], top: float, power: float) -> None:

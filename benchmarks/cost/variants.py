@@ -9,9 +9,7 @@ docs/development/linear_strategies.md says what was decided by it).
 
 from __future__ import annotations
 
-import json
 import sys
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,11 +18,11 @@ from statistics import median
 from archord.benchmarks.case import paper_joint, slug
 from archord.benchmarks.cost.scaling import launcher
 from archord.benchmarks.timing import Process, Said, Timing, time_all
-from archord.report.files import Row
+from archord.report.files import Row, read_json, toml_beside
 from archord.scene.file import resolved
 from archord.scene.presets.joint import Scene
 
-SETS = tomllib.loads(Path(__file__).with_name("variants.toml").read_text(encoding="utf-8"))["set"]
+SETS = toml_beside(__file__, "variants.toml")["set"]
 ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
 WATCHED = (
     *ABSENT,
@@ -102,11 +100,16 @@ class Variant:
             *self.options,
         )
 
-        def loaded() -> list[str]:
-            return json.loads(note.read_text(encoding="utf-8"))
-
         name = f"{self.case}, {self.name}"
-        return Process(name, command, folder, loaded, _A_DAY, clear=(place.name,), kind=place.name)
+        return Process(
+            name,
+            command,
+            folder,
+            lambda: read_json(note),
+            _A_DAY,
+            clear=(place.name,),
+            kind=place.name,
+        )
 
     def folder(self, parent: Path) -> Path:
         """Its output folder below ``parent``."""

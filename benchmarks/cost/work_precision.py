@@ -13,7 +13,7 @@ from archord.benchmarks.cost.work_precision_codes import CASES, Point, points, p
 from archord.benchmarks.timing import Said, Timing, time_all
 from archord.benchmarks.work_precision_picture import STEM, cases, draw, short_table
 from archord.report.by_name import ByName
-from archord.report.files import replacing, write_rows
+from archord.report.files import write_rows, write_text
 
 NAMES = ("P", "p0", "eps", "profile", "dissipation")
 
@@ -71,8 +71,7 @@ def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
     parts += [f"**{case}**\n\n{short_table(table)}" for case, table in tables.items()]
     text = "\n".join(parts)
     files += [folder / "work_precision.md", folder / "work_precision.png"]
-    with replacing(files[-2]) as new:
-        new.write_text(text, encoding="utf-8")
+    write_text(text, files[-2])
     draw(tables, files[-1])
     return text, files
 

@@ -10,12 +10,10 @@ at the last step: "P" (over E* R, of a lug in N/mm), "p0" (over E*), "eps" [rad]
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import shutil
 import subprocess
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -32,13 +30,14 @@ from archord.postprocess.run import Run
 from archord.presets.arc import ArcProfile
 from archord.report.by_name import ByName
 from archord.report.errors import InputError
+from archord.report.files import read_json, toml_beside
 from archord.report.version import VERSION
 from archord.scene.file import AnyScene, parse_any, resolved
 from archord.scene.sections.bodies import Pin
 
-DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
+DATA = toml_beside(__file__, "work_precision.toml")
 REFERENCES = Path(__file__).with_name("references.json")
-_KNOWN: dict[str, ByName] = json.loads(REFERENCES.read_text(encoding="utf-8"))
+_KNOWN: dict[str, ByName] = read_json(REFERENCES)
 CASES: dict[str, ByName] = {
     case: given | _KNOWN.get(case, {}) for case, given in DATA["cases"].items()
 }
@@ -232,7 +231,7 @@ def _peer(peer: Peer, case: str, size: float, order: int, steps: int, folder: Pa
     output = folder / "result.json"
 
     def read() -> ByName:
-        found = json.loads(output.read_text(encoding="utf-8"))
+        found = read_json(output)
         if found["failed"]:
             raise Failure(found["failed"])
         return {name: value for name, value in found.items() if value is not None}

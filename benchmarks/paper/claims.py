@@ -6,10 +6,8 @@ says plane strain.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -22,11 +20,10 @@ from archord.postprocess.judgement.convergence import group
 from archord.postprocess.laws.calibration import fit_curve
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
+from archord.report.files import toml_beside
 from archord.report.table import Table
 
-TEXTS: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)
+TEXTS: dict[str, dict[str, str]] = toml_beside(__file__, "claims.toml")
 GOOD = 0.05
 FAIR = 0.15
 _CORNER = 85  # degrees from the contact axis beyond which the block is held

@@ -7,7 +7,6 @@ groups.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, MILD_YIELD, PLANES, Runs
 from archord.geometry.basis import Array
 from archord.materials.material import Arrays, Plane
+from archord.output.user_file import save_figure
 from archord.postprocess.arrays.arc import read_contact
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
@@ -25,8 +25,8 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.postprocess.pictures.joint import field_panel
 from archord.report.by_name import ByName
-from archord.report.figure import new_figure, save
-from archord.report.files import replacing, write_rows
+from archord.report.figure import new_figure
+from archord.report.files import toml_beside, write_rows
 
 Part = dict[str, Any]  # columns by heading; a number or a text holds for all rows
 X = "delta/dR"
@@ -41,9 +41,7 @@ MARKS: dict[str, Part] = {
     "stress": {"marker": "x", "ms": 4},
 }
 LINES = ("-", ":", "--", "-.")
-LAYOUTS: dict[str, dict] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)
+LAYOUTS: dict[str, dict] = toml_beside(__file__, "figures.toml")
 
 
 def columns(parts: list[Part], **where: object) -> Arrays:
@@ -69,10 +67,7 @@ def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
     write_rows(rows, table)
     canvas = new_figure(9, 4.5)
     draw(canvas, parts, LAYOUTS[name])
-    picture = folder / f"{name}.png"
-    with replacing(picture) as new:
-        save(canvas, new)
-    return [table, picture]
+    return [table, save_figure(canvas, folder / f"{name}.png")]
 
 
 def rows_of(part: Part) -> Iterator[Part]:
@@ -303,6 +298,4 @@ def draw_zones(runs: Runs, file: Path) -> Path:
                 axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1
             )
             axes.set_title(f"plane {plane}, {axes.get_title()}", fontsize="medium")
-    with replacing(file) as new:
-        save(figure, new)
-    return file
+    return save_figure(figure, file)

@@ -16,7 +16,7 @@ from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_mis
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
 from archord.report.errors import InputError
-from archord.report.files import replacing
+from archord.report.files import write_text
 
 
 def chosen(names: Sequence[str]) -> list[str]:
@@ -61,10 +61,7 @@ def reproduce(
     if len(wanted) == len(FIGURES):
         pictures = [file.name for file in files if file.suffix == ".png"]
         files.append(folder / "report.md")
-        with replacing(files[-1]) as new:
-            new.write_text(
-                report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8"
-            )
+        write_text(report(runs, judged(runs, tables).markdown(), pictures), files[-1])
     return files
 
 

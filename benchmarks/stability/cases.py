@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -25,6 +24,7 @@ from archord.benchmarks.persson import persson_joint, theory
 from archord.benchmarks.stability.eye import drawn_eye
 from archord.presets.views import view_of
 from archord.report.by_name import ByName
+from archord.report.files import read_json, toml_beside
 from archord.scene.file import AnyScene, parse_any
 from archord.scene.presets.joint import Scene
 
@@ -42,11 +42,11 @@ _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
     found = {}
-    for group, table in _tables("cases.toml").items():
+    for group, table in toml_beside(__file__, "cases.toml").items():
         for name, keys in table.items():
             found[name] = _case(name, group, keys, _joint, "P/(E* R)")  # compared by default
     for file in ("problems.toml", "space.toml"):
-        problems = _tables(file)
+        problems = toml_beside(__file__, file)
         bases = problems.pop("base")
         for group, table in problems.items():
             for name, keys in table.items():
@@ -54,11 +54,6 @@ def cases() -> dict[str, Case]:
                 merged = _merged(base, keys)
                 found[name] = _case(name, group, merged, _problem, "")
     return found
-
-
-def _tables(file: str) -> ByName:
-    """The tables of a ``file`` beside this one."""
-    return tomllib.loads(FILE.with_name(file).read_text(encoding="utf-8"))
 
 
 def _merged(base: Any, keys: Any) -> Any:
@@ -194,7 +189,7 @@ def main() -> None:
     """Solve the joints that `FILE` lacks on fine meshes, and write after each. Raises RuntimeError
     if a run stops."""
     known = cases()
-    values = json.loads(FILE.read_text(encoding="utf-8"))
+    values = read_json(FILE)
     for name, case in known.items():
         needs_fine = any(expected.value == FINE for expected in case.expected)
         if needs_fine and name not in values:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.patches import Patch, Rectangle
 
-from archord.report.figure import new_figure, save
-from archord.report.files import replacing
+from archord.output.user_file import save_figure
+from archord.report.figure import new_figure
 
 # what happened, and its colour (ColorBrewer's blues and orange, which colour-blind readers tell
 # apart)
@@ -60,5 +60,4 @@ def draw(rows: Sequence[Mapping[str, object]], file: Path) -> None:
         frameon=False,
         fontsize=11,
     )
-    with replacing(file) as new:
-        save(figure, new)
+    save_figure(figure, file)

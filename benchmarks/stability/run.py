@@ -23,7 +23,7 @@ from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
 from archord.presets.views import view_of
 from archord.report.errors import InputError
-from archord.report.files import write_report
+from archord.report.files import read_json, write_report
 from archord.report.table import Table
 from archord.scene.file import AnyScene
 from archord.solver.path.stepping import Step, StepFailure
@@ -126,7 +126,7 @@ def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[str], No
     """
     table = cases()
     order = with_references(names)
-    fine = json.loads(FILE.read_text(encoding="utf-8"))
+    fine = read_json(FILE)
 
     def solved(name: str) -> Result:
         r = solve_case(table[name], folder)
@@ -159,7 +159,7 @@ def solve_case(case: Case, folder: Path) -> Result:
         outcome = case.attempt(folder, on_attempt=attempted)
         result.status = outcome.status
         result.message = outcome.message
-        report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
+        report = read_json(outcome.folder / "run.json")
         result.not_finite = not_finite(outcome.folder)
         result.warnings = report["warnings"]
         result.steps = len(outcome.steps)
@@ -202,9 +202,7 @@ def not_finite(folder: Path) -> list[str]:
     """The places in a run's files that hold a nan or an infinity."""
     constants: list[str] = []
     if (folder / "run.json").exists():
-        json.loads(
-            (folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append
-        )
+        json.loads((folder / "run.json").read_bytes(), parse_constant=constants.append)
     found = [f"run.json: {name}" for name in sorted(set(constants))]
     history = read_history(folder / "history.csv")
     found += [

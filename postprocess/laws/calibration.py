@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from archord.materials.material import Array
-from archord.postprocess.curve import RunCurve
+from archord.postprocess.curve import RunCurve, rms
 from archord.postprocess.judgement.convergence import Order, Refined, group
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
@@ -128,9 +128,8 @@ class CurveFit:
         left = ((law - data) ** 2).sum()
         spread = ((data - data.mean()) ** 2).sum()
         determination = 1 - left / spread
-        rms = np.sqrt(np.mean(off**2))
         largest = off[np.abs(off).argmax()]
-        return float(determination), float(rms), float(largest), len(off)
+        return float(determination), rms(off), float(largest), len(off)
 
     @property
     def serial_correlation(self) -> float:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.output.user_file import writing
+from archord.output.user_file import save_figure
 from archord.postprocess.laws.calibration import POOR, Calibration, dimensionless_law
 from archord.report.by_name import ByName
-from archord.report.figure import new_figure, save
+from archord.report.figure import new_figure
 from archord.report.table import Table
 
 _BENT = 0.5  # serial correlation that noise in ten steps or more hardly ever reaches
@@ -143,6 +143,4 @@ def draw_fit(calibration: Calibration, target: Path) -> Path:
     for axis in figure.axes:
         axis.set(xlabel="δ / ΔR", xlim=(0, None))
         axis.grid(alpha=0.3)
-    with writing(target) as new:
-        save(figure, new)
-    return target
+    return save_figure(figure, target)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.joint import FIXED_PAIRS, LawJoint, LawRangeWarning
+from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
 
 ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
 _FAR = 1e150  # no displacement, and its square is still a number
@@ -179,8 +179,13 @@ class Law:
         return np.where(valid, x, np.nan)
 
     def check(self, joint: LawJoint) -> None:
-        """Refuse a joint that lacks what the law needs, or whose P(delta) is another one; warn
-        where it is softer or stiffer."""
+        """Warn of the `doubts` of a joint."""
+        for said in self.doubts(joint):
+            warnings.warn(LawRangeWarning(said), stacklevel=4)
+
+    def doubts(self, joint: LawJoint) -> list[str]:
+        """By what a joint is softer or stiffer than the law's. Raises ValueError for one that lacks
+        what the law needs, or whose P(delta) is another one."""
         for name in self.needs:
             if getattr(joint, name) is None:
                 raise ValueError(f"{self.name}: this law needs {name}.")
@@ -190,27 +195,24 @@ class Law:
                 "be about twice too "
                 "high. Of a ring only hertz and persson hold, which give no displacement."
             )
-        said = joint.other_shapes if self.gives_displacement else []
-        if joint.hardens and self.plastic and not self.solved:
-            said.append(
-                "of perfect plasticity; of bodies that harden its P is too low beyond yield"
-            )
-        if joint.friction and not self.solved:
-            said.append(
-                f"without friction; with the coefficient {joint.friction:g} P is higher: in the "
-                "paper's elastic joint at 2 dR by 3.5 % with 0.1, by 10.5 % with 0.3"
-            )
-        if joint.large_strain and not self.solved:
-            said.append(
-                "of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, 1.6 % "
-                "at 2 %"
-            )
-        if self.solved:
-            said += joint.small_strain
-        if joint.fixed_pairs and self.solved:
-            said.append(FIXED_PAIRS)
-        for kind in said:
-            warnings.warn(LawRangeWarning(f"{self.name}: is a law {kind}"), stacklevel=4)
+        said = joint.unlike_solved
+        if not self.solved:
+            said = joint.other_shapes if self.gives_displacement else []
+            if joint.hardens and self.plastic:
+                said.append(
+                    "of perfect plasticity; of bodies that harden its P is too low beyond yield"
+                )
+            if joint.friction:
+                said.append(
+                    f"without friction; with the coefficient {joint.friction:g} P is higher: in "
+                    "the paper's elastic joint at 2 dR by 3.5 % with 0.1, by 10.5 % with 0.3"
+                )
+            if joint.large_strain:
+                said.append(
+                    "of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, "
+                    "1.6 % at 2 %"
+                )
+        return [f"{self.name}: is a law {kind}" for kind in said]
 
 
 def rising_root(f: Callable[[Array], Array], target: Array, start: float) -> Array:

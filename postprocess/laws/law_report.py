@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.output.user_file import writing
+from archord.output.user_file import save_figure
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import NOTHING, Law, LawState
-from archord.report.figure import new_figure, save
+from archord.report.figure import new_figure
 from archord.report.table import Table
 
 
@@ -113,6 +113,4 @@ def draw_laws(
         axis.set(xlabel=over, ylabel=label, xlim=(0, to), ylim=(0, None))
         axis.grid(alpha=0.3)
     axes[0].legend(frameon=False)
-    with writing(target) as new:
-        save(figure, new)
-    return target
+    return save_figure(figure, target)

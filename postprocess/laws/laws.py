@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
-from pathlib import Path
 
 import numpy as np
 
@@ -17,6 +15,7 @@ from archord.postprocess.laws.general import general_law as general
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import Law, LawState
 from archord.report.by_name import ByName
+from archord.report.files import toml_beside
 
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation
 _ALIKE = 0.01  # Dundurs' beta that counts as zero
@@ -114,7 +113,7 @@ _FUNCTIONS: dict[str, ByName] = {
         **_OF_LOAD,
     },
 }
-_WORDS = tomllib.loads((Path(__file__).parent / "laws.toml").read_text(encoding="utf-8"))
+_WORDS = toml_beside(__file__, "laws.toml")
 
 LAWS: dict[str, Law] = {
     name: Law(name, **_WORDS[name], **functions) for name, functions in _FUNCTIONS.items()

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from archord.materials.material import Array
+from archord.postprocess.curve import rms
 from archord.postprocess.laws.general.joint_curve import JointCurve, hermite
 from archord.postprocess.laws.run_steps import RunSteps, read_steps
 from archord.postprocess.run import Run
@@ -350,5 +351,4 @@ def _around(errors: Array) -> Array:
 
 def _sizes(errors: Array) -> str:
     """Rms and largest."""
-    rms = np.sqrt(np.mean(errors**2))
-    return f"rms {rms:.2%}, largest {np.abs(errors).max():.2%}"
+    return f"rms {rms(errors):.2%}, largest {np.abs(errors).max():.2%}"

@@ -25,7 +25,7 @@ from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import measures, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.patches import Patches
-from archord.postprocess.pictures.pictures import save_figure
+from archord.output.user_file import save_figure
 from archord.report.by_name import ByName
 from archord.report.figure import new_figure
 from archord.report.table import Table

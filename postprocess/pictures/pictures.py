@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.materials.material import Array
-from archord.output.user_file import writing
+from archord.output.user_file import save_figure
 from archord.postprocess.comparison import curves_of
 from archord.postprocess.curve import first_loading
 from archord.postprocess.pictures import joint, problems, solids
@@ -18,10 +18,10 @@ from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.presets.views import JointView, ProblemView
 from archord.report.errors import InputError
-from archord.report.figure import new_figure, save
+from archord.report.figure import new_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 _FEW = 10  # runs that get a name in the legend
 # what draws the fields, the contact and the forces of a kind of runs
@@ -29,16 +29,6 @@ _PANELS: dict[type, tuple[Any, Any, Any]] = {
     ProblemView: (problems.field_panel, problems.contact_panel, problems.load_panel),
     JointView: (joint.field_panel, joint.arc_panel, joint.force_panel),
 }
-
-
-def save_figure(figure: Figure, target: Path) -> Path:
-    """Write ``figure`` as ``target``; returns it. Raises `InputError` if that cannot be written."""
-    try:
-        with writing(target) as new:
-            save(figure, new)
-    except ValueError as error:
-        raise InputError(str(error)) from None
-    return target
 
 
 def draw_run(

@@ -35,6 +35,7 @@ from archord.postprocess.laws.general.hardening_model import block_leads, flows
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
 from archord.report.by_name import ByName
+from archord.report.files import read_json
 from archord.report.table import Table
 
 _RANGE = (0.05, 3.05)  # x of the data
@@ -208,7 +209,7 @@ def back_factors(joints: list[Changed]) -> dict[str, float]:
 def store(kind: str, model: ByName) -> None:
     """Write the ``model`` of this ``kind`` beside this file, and use it from now on. Of a plane
     that it leaves out the numbers stay."""
-    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    table = read_json(TABLE)
     table[kind] = {name: table[kind][name] | of_planes for name, of_planes in model.items()}
     TABLE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     factor_model.cache_clear()

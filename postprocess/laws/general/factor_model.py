@@ -14,7 +14,6 @@ law friction adds nothing.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from functools import cache
 from itertools import combinations_with_replacement
@@ -26,6 +25,7 @@ import numpy as np
 from archord.materials.material import Array
 from archord.postprocess.laws.general.elastic_model import Elastic
 from archord.report.by_name import ByName
+from archord.report.files import read_json
 
 TABLE = Path(__file__).parent / "factor_model.json"
 FRICTION = "friction"
@@ -141,7 +141,7 @@ def factor_model() -> dict[str, ByName]:
     """The models of `FRICTION` and `LARGE_STRAIN` that come with archord, by plane: ``gain``, the
     coefficients ``(3, N_TERMS)`` of `Plain.terms` of P, p0 and eps; ``error``, two numbers for
     `Plain.deviation`; and ``back error``, the factor on `Plain.scale`; 9 in 10 errors keep them."""
-    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    table = read_json(TABLE)
     for model in table.values():
         model["gain"] = {plane: np.array(values) for plane, values in model["gain"].items()}
     return table

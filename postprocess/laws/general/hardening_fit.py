@@ -56,6 +56,7 @@ from archord.postprocess.laws.general.yield_model import (
     mesh_excess,
     sides_of,
 )
+from archord.report.files import read_json
 from archord.report.table import Table
 
 Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
@@ -243,7 +244,7 @@ def main(folder: Path) -> None:
     model = fit_strain(joints)
     factors, table = errors_of(joints, predicted(joints, model))
     found = {name: [float(f"{value:.5g}") for value in values] for name, values in model.items()}
-    stored = json.loads(TABLE.read_text(encoding="utf-8"))
+    stored = read_json(TABLE)
     new = {
         "strain": stored["strain"] | found,
         "peak": stored["peak"] | fit_peak(joints, model),

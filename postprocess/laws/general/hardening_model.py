@@ -14,7 +14,6 @@ stronger block yields earlier, by the rise of the pin's curve (`felt`).
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
@@ -35,6 +34,7 @@ from archord.postprocess.laws.general.yield_model import (
     yield_places,
 )
 from archord.report.by_name import ByName
+from archord.report.files import read_json
 
 TABLE = Path(__file__).parent / "hardening_model.json"
 BODIES = ("pin", "block")
@@ -348,6 +348,6 @@ def hardening_model() -> dict[str, ByName]:
     """The model that comes with archord: ``strain``, the coefficients of `TERMS` by plane and body;
     ``peak``, the factor on `peak_rise` by plane; and ``error``, the factor on `unsure` that 9 in 10
     errors keep, by `kind`."""
-    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    table = read_json(TABLE)
     strain = {name: np.array(values) for name, values in table["strain"].items()}
     return table | {"strain": strain}

@@ -299,6 +299,13 @@ class LawJoint:
         ]
 
     @property
+    def unlike_solved(self) -> list[str]:
+        """What is unlike the joints that the general law is of, in words that follow "is a
+        law"."""
+        said = [*self.other_shapes, *self.small_strain]
+        return [*said, FIXED_PAIRS] if self.fixed_pairs else said
+
+    @property
     def onset(self) -> float:
         """``s = sigY R/(E* dR)``; infinite without a yield stress."""
         return (

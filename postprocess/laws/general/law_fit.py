@@ -26,7 +26,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, minimize
 
 from archord.materials.material import Array
-from archord.postprocess.curve import RunCurve
+from archord.postprocess.curve import RunCurve, rms
 from archord.postprocess.laws.general.elastic_model import (
     TABLE,
     Elastic,
@@ -63,6 +63,7 @@ from archord.postprocess.laws.general.yield_model import (
 )
 from archord.postprocess.run import Run
 from archord.report.by_name import ByName
+from archord.report.files import read_json
 from archord.report.table import Table
 
 # degrees in the joint's numbers and in x/(1 + x), and how many of these terms are taken
@@ -346,11 +347,10 @@ def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ..
     ]
     travel, toe = found = min(tries, key=lambda way: way.cost).x
     errors = off(found, run.back[1:])
-    rms = np.sqrt(np.mean(errors**2))
     first_of_reloading = run.loading + len(run.back) - 1
     reloaded = run.nodes[first_of_reloading:, :2]
     again = abs(off(found, reloaded[:1])[0]) if len(reloaded) else np.nan
-    return tuple(map(float, (deepest, travel, toe, rms, again)))
+    return tuple(map(float, (deepest, travel, toe, rms(errors), again)))
 
 
 def fit_side(joints: SolvedJoints, side: str) -> ByName:
@@ -421,8 +421,7 @@ def rms_largest(errors: Array) -> str:
     """The cell of ``errors`` ``(n,)``: their root mean square and the largest; a dash of none."""
     if not len(errors):
         return "-"
-    rms = np.sqrt(np.mean(errors**2))
-    return f"{rms:.2f}/{np.abs(errors).max():.1f}"
+    return f"{rms(errors):.2f}/{np.abs(errors).max():.1f}"
 
 
 def error_table(joints: SolvedJoints, kernels: ByName) -> Table:
@@ -462,7 +461,7 @@ def main(folder: Path | None) -> None:
         KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
         arrays: ByName = joints.compact()
         np.savez_compressed(DATA, **arrays)
-    print(error_table(stored_joints(), json.loads(KERNELS.read_text(encoding="utf-8"))).markdown())
+    print(error_table(stored_joints(), read_json(KERNELS)).markdown())
 
 
 def steps_count(numbers: Numbers) -> bool:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import general_law
-from archord.postprocess.laws.general.joint import FIXED_PAIRS, LawJoint, LawRangeWarning
+from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.by_name import ByName
 from archord.report.doubts import kind
@@ -146,11 +146,7 @@ def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:
         if not (is_thin or any(name in _OTHERS and value for name, value in given)):
             continue
         with suppress(TypeError, ValueError):  # its row tells why it is no joint
-            joint = LawJoint(**dict(given))
-            said = [*joint.other_shapes, *joint.small_strain]
-            if joint.fixed_pairs:
-                said.append(FIXED_PAIRS)
-            for what in said:
+            for what in LawJoint(**dict(given)).unlike_solved:
                 first.setdefault(kind(what), f"joint {row}: archord: is a law {what}")
     for text in first.values():
         warnings.warn(LawRangeWarning(text), stacklevel=3)

@@ -16,7 +16,6 @@ law_fit.py makes both.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
@@ -31,6 +30,7 @@ from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.joint_curve import Piece, interval
 from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
+from archord.report.files import read_json
 
 DATA = Path(__file__).parent / "yield_model.npz"
 KERNELS = Path(__file__).parent / "yield_model.json"
@@ -533,4 +533,4 @@ def stored_joints() -> SolvedJoints:
 @cache
 def yield_model(side: str) -> YieldModel:
     """The model of one of `SIDES` that comes with archord."""
-    return side_model(stored_joints(), side, json.loads(KERNELS.read_text(encoding="utf-8"))[side])
+    return side_model(stored_joints(), side, read_json(KERNELS)[side])

@@ -3,11 +3,10 @@ differs."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from archord.materials.material import Array
+from archord.postprocess.curve import rms
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import Identification
@@ -58,5 +57,4 @@ def _before(delta: Array) -> Array:
 
 
 def _sizes(errors: Array) -> str:
-    rms = math.sqrt(np.square(errors).mean())
-    return f"{rms:.2%} rms, {np.abs(errors).max():.2%} at worst, of the largest force"
+    return f"{rms(errors):.2%} rms, {np.abs(errors).max():.2%} at worst, of the largest force"

@@ -101,8 +101,7 @@ class Model:
         softness = machine[COMPLIANCE] * thickness
         curve = self.curve
         begin = curve.load / thickness
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             law = general_law(LawJoint.from_scene(scene), extrapolate=True)
             total = curve.deepest - machine[OFFSET]
             deepest = _of_joint(law, total, softness, np.maximum.accumulate(begin))

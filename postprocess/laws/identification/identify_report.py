@@ -5,22 +5,21 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from archord.output.user_file import writing
+from archord.output.user_file import save_figure
+from archord.postprocess.curve import rms
 from archord.postprocess.laws.general.general_law import outside
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import Estimate, Identification
 from archord.postprocess.laws.identification.unknowns import COMPLIANCE, OFFSET
-from archord.postprocess.laws.law import LawRangeWarning
 from archord.postprocess.laws.laws import LAWS
 from archord.report.by_name import ByName
-from archord.report.figure import new_figure, save
+from archord.report.figure import new_figure
 from archord.report.table import Table
 
 _ALIKE = 0.95  # correlation of two unknowns that are hardly told apart
@@ -95,11 +94,10 @@ def notes(found: Identification) -> list[str]:
     """How well the law meets the curve, a sentence each."""
     residuals = found.residuals
     largest = found.model.curve.largest
-    rms = math.sqrt(np.square(residuals).mean()) / largest
     worst = np.abs(residuals).max() / largest
     said = [
-        f"residuals: {rms:.2%} of the largest force rms, {worst:.2%} at worst, "
-        f"{len(residuals)} points"
+        f"residuals: {rms(residuals) / largest:.2%} of the largest force rms, {worst:.2%} at "
+        f"worst, {len(residuals)} points"
     ]
     softness = next((one for one in found.estimates if one.unknown.name == COMPLIANCE), None)
     if softness is not None and softness.value > 0 and not softness.is_bound:
@@ -196,10 +194,7 @@ def _doubts_of_law(found: Identification) -> list[str]:
     beyond = found.predicted.delta > 3 * joint.clearance
     if beyond.any():
         said.append(f"{beyond.sum()} points are beyond 3 clearances, where the law ends")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", LawRangeWarning)
-        LAWS["archord"].check(joint)
-    return said + [str(warning.message) for warning in caught]
+    return said + LAWS["archord"].doubts(joint)
 
 
 def _doubts_of_residuals(found: Identification) -> list[str]:
@@ -207,11 +202,11 @@ def _doubts_of_residuals(found: Identification) -> list[str]:
     r = found.residuals
     largest = found.model.curve.largest
     said = []
-    rms = math.sqrt(np.square(r).mean()) / largest
-    if rms > _MISSED:
+    missed = rms(r) / largest
+    if missed > _MISSED:
         said.append(
-            f"the law misses the curve by {rms:.0%} of its largest force: it is another joint, or "
-            "other units"
+            f"the law misses the curve by {missed:.0%} of its largest force: it is another joint, "
+            "or other units"
         )
     alike = np.corrcoef(r[:-1], r[1:])[0, 1]
     if alike > _SERIAL:
@@ -278,6 +273,4 @@ def draw(found: Identification, target: Path, solved: Any = None) -> Path:
     for axis in figure.axes:
         axis.set(xlabel=f"displacement of the joint [{units['displacement']}]")
         axis.grid(alpha=0.3)
-    with writing(target) as new:
-        save(figure, new)
-    return target
+    return save_figure(figure, target)

@@ -34,6 +34,7 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.page.skeleton import skeleton
 from archord.report.by_name import ByName
+from archord.report.files import read_json
 from archord.report.version import VERSION
 
 HERE = Path(__file__).parent
@@ -87,15 +88,15 @@ def law_data() -> tuple[str, bytes]:
         "sides": yield_model.SIDES,
         "step": yield_model.CURVE_STEP,
         "multiples": yield_model.MULTIPLES.tolist(),
-        "elastic": _json(elastic_model.TABLE),
-        "kernels": _json(yield_model.KERNELS),
-        "hardening": _json(hardening_model.TABLE)
+        "elastic": read_json(elastic_model.TABLE),
+        "kernels": read_json(yield_model.KERNELS),
+        "hardening": read_json(hardening_model.TABLE)
         | {
             "terms": hardening_model.TERMS,
             "strains": hardening_model.STRAINS.tolist(),
             "shares": hardening_model.SHARES.tolist(),
         },
-        "factors": {"products": factor_model.PRODUCTS, "models": _json(factor_model.TABLE)},
+        "factors": {"products": factor_model.PRODUCTS, "models": read_json(factor_model.TABLE)},
         "solved": yield_model.SOLVED_ERROR,
         "range": _range(),
         "metals": metals(),
@@ -161,10 +162,6 @@ def _in_mm(joint: LawJoint, length: float) -> JointCurve:
     """The law of a ``joint`` in mm and N, of a pin of this ``length``."""
     law = general_law.general_law(joint)
     return replace(law, length_unit="mm", force_unit="N", pin_length=length)
-
-
-def _json(path: Path) -> Any:
-    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _source(name: str) -> str:
