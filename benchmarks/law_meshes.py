@@ -29,10 +29,10 @@ def by_size(folder: Path) -> dict[LawJoint, dict[float, Array]]:
     ``folder``."""
     found: dict[LawJoint, dict[float, Array]] = defaultdict(dict)
     for path in sorted((folder / "cases").iterdir()):
-        curve = Run(path).curve
-        if len(curve.delta) == sum(curve.scene.load.stage_steps):
-            size = curve.scene.joint.relative_element_size or 0.0
-            found[LawJoint.from_scene(curve.scene)][size] = NodeRun.of(curve).nodes
+        run = Run(path)
+        if run.steps == sum(run.scene.load.stage_steps):
+            size = run.scene.joint.relative_element_size or 0.0
+            found[LawJoint.from_scene(run.scene)][size] = NodeRun.of(run).nodes
     return dict(found)
 
 

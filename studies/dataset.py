@@ -142,12 +142,25 @@ def _mesh_error(numbers: Numbers, x: Array) -> Array:
 
 
 def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:
-    """What the extrapolated forces differ from the forces of the finer run; 0 without one."""
-    fine = [run for run in runs if run.steps == 2 and run.loading == len(nodes)]
+    """What the extrapolated forces differ from the forces of the finer run; 0 without one.
+
+    Where steps were cut, both runs may have had the same ones, and their difference tells nothing.
+    There the error is twice the largest of the nodes before and behind whose steps were not:
+    forces of a cut run lie between the forces of the other and infinitely many steps.
+    """
+    n = len(nodes)
+    loading = [run for run in runs if run.loading == n]
+    fine = [run for run in loading if run.steps == 2]
     if not fine:
-        return np.zeros(len(nodes))
-    finer = fine[0].nodes[: len(nodes), 1]
-    return np.abs(finer / nodes[:, 1] - 1)
+        return np.zeros(n)
+    finer = fine[0].nodes[:n, 1]
+    error = np.abs(finer / nodes[:, 1] - 1)
+    cut = np.any([run.cut[:n] for run in loading], axis=0)
+    whole = np.arange(n) if cut.all() else np.flatnonzero(~cut)
+    behind = np.searchsorted(whole, np.arange(n)).clip(max=len(whole) - 1)
+    before = (behind - 1).clip(min=0)
+    beside = np.maximum(error[whole[before]], error[whole[behind]])
+    return np.where(cut, 2 * np.maximum(error, beside), error)
 
 
 def _row(

@@ -7,13 +7,14 @@ from collections import defaultdict
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import law_of_numbers
-from archord.postprocess.laws.general.law_fit import NodeRun
+from archord.postprocess.laws.general.law_fit import NodeRun, first_loading
 from archord.postprocess.laws.general.yield_model import Numbers, first_yield
 from archord.studies import dataset
 from archord.studies.dataset import NUMBERS, scenes, write_tables
@@ -43,7 +44,8 @@ def test_tables_have_error_bars_and_checksums(tmp_path, monkeypatch):
     x = np.array([1.0, 2.0, 3.0])
     coarse = np.column_stack([[*x, 2.5], [1.0, 2.0, 3.0, 2.0], np.ones(4), np.ones(4)])
     fine = np.column_stack([x, [1.1, 2.2, 3.0], np.ones(3), np.ones(3)])
-    solved = {Numbers(1.0, 0.5, 0.4, 0.4, 0.005, 0.3, 0.3): [NodeRun(coarse, 1), NodeRun(fine, 2)]}
+    runs = [NodeRun(coarse, 1, np.zeros(4, bool)), NodeRun(fine, 2, np.zeros(3, bool))]
+    solved = {Numbers(1.0, 0.5, 0.4, 0.4, 0.005, 0.3, 0.3): runs}
     monkeypatch.setattr(
         dataset, "solved_in", lambda folder, names: solved if names == {"a"} else {}
     )
@@ -62,6 +64,38 @@ def test_tables_have_error_bars_and_checksums(tmp_path, monkeypatch):
     monkeypatch.setattr(dataset, "solved_in", lambda folder, names: {})
     with pytest.raises(ValueError, match="no joint is solved"):
         write_tables(tmp_path, tmp_path)
+
+
+@pytest.mark.parametrize("parts", [(2, 2), (2, 8), (1, 4)])
+def test_the_error_of_steps_has_the_error_where_steps_were_cut(parts):
+    """Steps that were cut into so ``parts`` between two nodes, of errors in proportion to their
+    length. The difference of both runs told an error of 0 for one of 1 %."""
+    error = np.array([0.0, 0.02, 0.02, 0.02, 0.02, 0.02])
+    cut = np.array([0, 0, 1, 1, 0, 0], bool)
+    runs = []
+    for steps, in_cut in zip((1, 2), parts, strict=True):
+        in_all = np.where(cut, max(steps, in_cut), steps)
+        y = 1 + error / in_all
+        nodes = np.column_stack([np.arange(1.0, 7.0), y, y, y])
+        runs.append(NodeRun(nodes, steps, cut & (in_all > steps)))
+    nodes = first_loading(runs)
+    told = dataset._step_error(runs, nodes)
+    off = np.abs(nodes[:, 1] - 1)
+    assert off[cut].max() > 0.004
+    assert (told >= 0.99 * off).all()
+    np.testing.assert_allclose(told[~cut], error[~cut] / 2, rtol=1e-12)
+
+
+def test_a_run_tells_between_which_nodes_its_steps_were_cut():
+    load = SimpleNamespace(stage_steps=[2, 2, 1])
+    scene = SimpleNamespace(load=load)
+    columns = {"cutbacks": [0, 0, 0, 3, 0]}
+    ones = np.ones(5)
+    curve = SimpleNamespace(
+        scene=scene, E_star=1.0, dR=1.0, R=1.0, delta=ones, P=ones, p0=ones, eps=ones
+    )
+    run = NodeRun.of(SimpleNamespace(curve=curve, columns=columns))
+    assert run.cut.tolist() == [False, True, False]
 
 
 @pytest.mark.parametrize(("strain", "block", "largest"), [(0, 0.3, 5.5e-3), (1, 0.3, 6e-4)])

@@ -26,7 +26,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, minimize
 
 from archord.materials.material import Array
-from archord.postprocess.curve import RunCurve, rms
+from archord.postprocess.curve import rms
 from archord.postprocess.laws.general.elastic_model import (
     TABLE,
     Elastic,
@@ -155,14 +155,17 @@ class NodeRun:
     - ``nodes`` ``(n, 4)``: x, y, p0 R/(E* dR) and eps; the first ``loading`` of them are first
       loading
     - ``steps``: how many lie between two nodes
+    - ``cut`` ``(n,)``: whether one of the steps that lead to a node was cut
     """
 
     nodes: Array
     steps: int
+    cut: np.ndarray
 
     @classmethod
-    def of(cls, curve: RunCurve) -> NodeRun:
-        """That of a run which has all its steps."""
+    def of(cls, run: Run) -> NodeRun:
+        """That of a ``run`` which has all its steps."""
+        curve = run.curve
         each = curve.scene.load.stage_steps
         unit = curve.E_star * curve.dR
         x = curve.delta / curve.dR
@@ -170,7 +173,9 @@ class NodeRun:
         peak = curve.p0 * curve.R / unit
         of_steps = np.column_stack([x, y, peak, curve.eps])
         last_of_stages = np.cumsum(each) - 1
-        return cls(of_steps[last_of_stages], each[0])
+        first_of_stages = [0, *last_of_stages[:-1] + 1]
+        cut = np.add.reduceat(run.columns["cutbacks"], first_of_stages) > 0
+        return cls(of_steps[last_of_stages], each[0], cut)
 
     @property
     def loading(self) -> int:
@@ -197,10 +202,10 @@ def solved_joints(
         is_left_out = names is not None and run.name not in names
         if is_left_out or not (run / "run.json").exists():
             continue
-        curve = Run(run).curve
-        if len(curve.delta) < sum(curve.scene.load.stage_steps):
+        solved = Run(run)
+        if solved.steps < sum(solved.scene.load.stage_steps):
             continue
-        found[LawJoint.from_scene(curve.scene)].append(NodeRun.of(curve))
+        found[LawJoint.from_scene(solved.scene)].append(NodeRun.of(solved))
     return dict(found)
 
 
