@@ -23,6 +23,7 @@ from archord.report.figure import new_figure
 if TYPE_CHECKING:
     pass
 
+_WIDER = 1.5  # panel of bodies in space over the others
 _FEW = 10  # runs that get a name in the legend
 # what draws the fields, the contact and the forces of a kind of runs
 _PANELS: dict[type, tuple[Any, Any, Any]] = {
@@ -83,8 +84,11 @@ def draw_run(
     'joint.svg'
     """
     draws = panels_of(run, steps=steps, field=field, edges=edges, cut=cut)
-    figure = new_figure(5.0 * len(draws), 4.4)
-    panels = np.atleast_1d(figure.subplots(1, len(draws)))
+    widths = [1.0] * len(draws)
+    if run.kinematics.dimension == 3:
+        widths[0] = _WIDER
+    figure = new_figure(5.0 * sum(widths), 4.4)
+    panels = np.atleast_1d(figure.subplots(1, len(draws), width_ratios=widths))
     for axes, draw in zip(panels, draws, strict=True):
         draw(axes)
     return save_figure(figure, Path(target))

@@ -149,14 +149,17 @@ def draw_field(
     axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=extend)
 
 
-def field_values(run: Run, fields: Fields, field: str) -> tuple[Array, str, str]:
+def field_values(
+    run: Run, fields: Fields, field: str, *, smooth: bool = False
+) -> tuple[Array, str, str]:
     """A ``field`` of the cells ``(m,)`` or of the nodes ``(n,)`` in the unit of its label, the
     label, and the usual map of its colours: by default PEEQ, or von Mises stress where nothing has
-    yielded. Raises `InputError` for a field that the run does not have."""
+    yielded. A ``smooth`` one is of the nodes, where it is known there. Raises `InputError` for a
+    field that the run does not have."""
     yielded = fields.peeq is not None and fields.peeq.any()
     name = _FIELDS.get(field, field) or ("peeq" if yielded else "von_mises")
     label, scale = field_words(run, name)
-    values = scale * _values(run, fields, name)
+    values = scale * _values(run, fields, name, smooth)
     return values, label, OF_PEEQ if name == "peeq" else "viridis"
 
 
@@ -211,13 +214,15 @@ def _plain() -> Any:
     return ListedColormap([_ELASTIC])
 
 
-def _values(run: Run, fields: Fields, name: str) -> Array:
-    """A field of the cells ``(m,)`` or else of the nodes ``(n,)``. Raises `InputError`."""
+def _values(run: Run, fields: Fields, name: str, smooth: bool) -> Array:
+    """A field of the cells ``(m,)`` or else of the nodes ``(n,)``; the other way round if
+    ``smooth``. Raises `InputError`."""
     moved = {"displacement": np.linalg.norm(fields.displacement, axis=1)}
     for axis, along in zip("xyz", fields.displacement.T, strict=False):
         moved[f"u{axis}"] = along
     means = {name: values for name, values in fields.cell.items() if values.ndim == 1}
-    known = fields.nodal_fields() | moved | means
+    at_nodes = fields.nodal_fields() | moved
+    known = means | at_nodes if smooth else at_nodes | means
     if name not in known:
         names = ", ".join(dict.fromkeys([*_FIELDS, *known]))
         raise InputError(run.folder, f"has no field {name!r}; its fields are {names}.")

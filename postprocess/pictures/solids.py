@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from archord.materials.material import Array
-from archord.output.files.vtkhdf import SECOND_ORDER
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.pictures.problems import (
     OF_PEEQ,
@@ -30,8 +29,25 @@ from archord.report.errors import InputError
 
 AXES = "xyz"
 _STEEP = 0.45  # height of the view over the plane of the other two axes
-_DARKEST = 0.6  # brightness of a face that is seen from the side
+_DARKEST = 0.6  # brightness of a face in the shade
+_LIGHT = np.array([-0.4, 0.2, 1.0])  # where it comes from: right, up and towards the eye
+_SHARP = np.cos(np.radians(35.0))  # of the angle between the faces beside a sharp edge
+_LINE = 8e-4  # half the width of a line over the size of the picture
+_BEFORE = 2.0  # lengths of a line by which it is nearer than where it lies
+_INK = 0.25  # grey of lines
+_TETRAHEDRON = 10  # nodes
+_N_PIECES = 8
+# the nodes of the straight pieces of a tetrahedron of second order, in VTK's order
+_OF_TETRAHEDRON = [
+    [0, 4, 6, 7],
+    [4, 1, 5, 8],
+    [6, 5, 2, 9],
+    [7, 8, 9, 3],
+    *([6, 8, a, b] for a, b in [(4, 5), (5, 9), (9, 7), (7, 4)]),
+]
 _ELASTIC = 0.93  # grey of what has not yielded
+_HARDLY = 0.01  # of the largest PEEQ: what has not yielded, or hardly
+_BESIDE = 1e-5  # of the size: how far a cut is beside nodes, which would tear its face
 _PRESSED = 1e-6  # of the largest pressure: a facet that is pressed
 
 
@@ -40,10 +56,14 @@ class Skin(NamedTuple):
 
     - ``corners`` ``(k, 3, 3)``: seen from outside against the clock
     - ``values`` ``(k, 3)``: of the field at the corners
+    - ``edges`` ``(j, 2, 3)``: ends of the sides at which faces meet at a sharp angle
+    - ``beside`` ``(j, 2)``: the triangles on both sides of each
     """
 
     corners: Array
     values: Array
+    edges: Array
+    beside: np.ndarray
 
 
 class View(NamedTuple):
@@ -70,33 +90,83 @@ class View(NamedTuple):
         return np.stack([x @ self.right, x @ self.up], axis=-1)
 
 
+class _Layer(NamedTuple):
+    """``k`` triangles to paint.
+
+    - ``places`` ``(k, 3, 2)``: their corners as they are drawn
+    - ``nearness`` ``(k,)``: to the eye
+    - ``colours`` ``(k, 3, 4)``: of the corners
+    """
+
+    places: Array
+    nearness: Array
+    colours: Array
+
+
 def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
     """The boundary of the bodies with the ``values`` of the cells ``(m,)`` or the nodes ``(n,)``;
     nothing beyond the plane of a ``cut`` as "z=5". Raises `InputError`."""
     import pyvista
 
-    kind = SECOND_ORDER[fields.cells.shape[1]]
-    grid = pyvista.UnstructuredGrid({kind: fields.cells}, fields.coordinates)
+    kind, pieces = _pieces(fields.cells)
+    grid = pyvista.UnstructuredGrid({kind: pieces}, fields.coordinates)
     grid.point_data["displacement"] = fields.displacement
     of_cells = len(values) == len(fields.cells)
-    of_what = "cell_data" if of_cells else "point_data"
-    getattr(grid, of_what)["value"] = values
+    if of_cells:
+        grid.cell_data["value"] = np.repeat(values, _N_PIECES)
+    else:
+        grid.point_data["value"] = values
     if cut:
         axis, place = _plane_of(run, fields, cut)
+        off = np.abs(fields.coordinates[:, axis] - place).min()
+        margin = _BESIDE * float(np.ptp(fields.coordinates))
+        if off < margin:
+            place -= margin
         normal = np.eye(3)[axis]
         grid = grid.clip(normal=normal, origin=place * normal)
     grid.cell_data["middle"] = grid.cell_centers().points
-    surface = grid.extract_surface(nonlinear_subdivision=1).triangulate()
+    surface = grid.extract_surface().triangulate()
     triangles = surface.faces.reshape(-1, 4)[:, 1:].copy()
     corners = surface.points[triangles]
     outward = corners.mean(axis=1) - surface.cell_data["middle"]
-    along = (_normals(corners) * outward).sum(axis=1)
-    inside_out = along < 0
+    inside_out = (_normals(corners) * outward).sum(axis=1) < 0
     triangles[inside_out] = triangles[inside_out, ::-1]
     x = surface.points + surface.point_data["displacement"]
-    found = getattr(surface, of_what)["value"]
-    at_corners = np.stack([found] * 3, axis=1) if of_cells else found[triangles]
-    return Skin(x[triangles], at_corners)
+    if of_cells:
+        at_corners = np.stack([surface.cell_data["value"]] * 3, axis=1)
+    else:
+        at_corners = surface.point_data["value"][triangles]
+    corners = x[triangles]
+    ends, beside = _sharp(triangles, _normals(corners))
+    return Skin(corners, at_corners, x[ends], beside)
+
+
+def _pieces(cells: np.ndarray) -> tuple[int, np.ndarray]:
+    """VTK's number of the straight pieces of ``cells`` ``(m, 10 or 27)`` of second order, and their
+    nodes ``(8 m, 4 or 8)``. Pieces that are cut still meet, which curved cells do not."""
+    from pyvista import CellType
+    from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
+
+    if cells.shape[1] == _TETRAHEDRON:
+        return CellType.TETRA, cells[:, _OF_TETRAHEDRON].reshape(-1, 4)
+    node = np.reshape(vtkTriQuadraticHexahedron().GetParametricCoords(), (-1, 3))
+    corner = node[:8]
+    wanted = (corner[:, None] + corner) / 2
+    off = np.abs(wanted[:, :, None] - node).max(axis=3)
+    return CellType.HEXAHEDRON, cells[:, off.argmin(axis=2)].reshape(-1, 8)
+
+
+def _sharp(triangles: np.ndarray, normal: Array) -> tuple[np.ndarray, np.ndarray]:
+    """The ends ``(j, 2)`` of the sides at which ``triangles`` ``(k, 3)`` with these ``normal``
+    vectors meet at a sharp angle, and the two triangles ``(j, 2)`` beside each."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    ends, which, n_beside = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(which.ravel(), kind="stable")
+    of_two = n_beside == 2
+    pairs = order[np.repeat(of_two, n_beside)].reshape(-1, 2) // 3
+    first, second = np.moveaxis(normal[pairs], 1, 0)
+    is_sharp = (first * second).sum(axis=1) < _SHARP
+    return ends[of_two][is_sharp], pairs[is_sharp]
 
 
 def field_panel(
@@ -109,25 +179,31 @@ def field_panel(
     from matplotlib.tri import Triangulation
 
     fields = run.fields(step or shown_step(run))
-    values, label, map_name = field_values(run, fields, field)
+    values, label, map_name = field_values(run, fields, field, smooth=True)
     skin = skin_of(run, fields, values, cut)
     shown = skin.values
     if map_name == OF_PEEQ:
-        shown = np.where(shown == 0, np.nan, shown)
+        shown = np.where(shown <= _HARDLY * shown.max(), np.nan, shown)
     normal = _normals(skin.corners)
     size = np.abs(np.nan_to_num(shown)).mean(axis=1)
     view = _best_view(normal, size, cut)
     # Faces that look away are hidden, but their triangles can be nearer than those before them.
-    facing = np.flatnonzero(normal @ view.towards > 0)
-    nearness = skin.corners[facing].mean(axis=1) @ view.towards
-    order = facing[np.argsort(nearness)]
-    known = shown[np.isfinite(shown)]
-    colours = colours_for(known, map_name)
-    painted = _painted(colours, shown[order], normal[order], view)
-    places = view.flat(skin.corners[order]).reshape(-1, 2)
+    facing = normal @ view.towards > 0
+    colours = colours_for(shown[np.isfinite(shown)], map_name)
+    faces = _Layer(
+        view.flat(skin.corners[facing]),
+        skin.corners[facing].mean(axis=1) @ view.towards,
+        _painted(colours, shown[facing], normal[facing], view),
+    )
+    width = _LINE * np.ptp(view.flat(skin.corners), axis=(0, 1)).max()
+    lines = _lines(skin.edges[facing[skin.beside].any(axis=1)], view, width)
+    places, nearness, painted = (np.concatenate(parts) for parts in zip(faces, lines, strict=True))
+    order = np.argsort(nearness)
+    places = places[order].reshape(-1, 2)
     triangles = np.arange(len(places)).reshape(-1, 3)
     drawn = Triangulation(*places.T, triangles)
-    axes.add_collection(TriMesh(drawn, facecolors=painted.reshape(-1, 4), rasterized=True))
+    painted = painted[order].reshape(-1, 4)
+    axes.add_collection(TriMesh(drawn, facecolors=painted, rasterized=True))
     axes.autoscale_view()
     axes.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
     _draw_axes(axes, view)
@@ -178,15 +254,31 @@ def _best_view(normal: Array, size: Array, cut: str) -> View:
     return max(views, key=shows)
 
 
+def _lines(edges: Array, view: View, width: float) -> _Layer:
+    """The ``edges`` ``(j, 2, 3)`` as thin strips of two triangles each, twice this ``width``,
+    before the faces beside them."""
+    ends = view.flat(edges)
+    along = np.diff(ends, axis=1)
+    length = np.linalg.norm(along, axis=2, keepdims=True)
+    right, up = np.moveaxis(along / np.maximum(length, np.finfo(float).tiny), 2, 0)
+    aside = width * np.stack([-up, right], axis=2)
+    (a, b), (c, d) = (np.moveaxis(ends + sign * aside, 1, 0) for sign in (-1, 1))
+    strips = np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3, 2)
+    nearness = edges.mean(axis=1) @ view.towards
+    before = nearness + _BEFORE * np.linalg.norm(np.diff(edges, axis=1), axis=2)[:, 0]
+    ink = np.array([_INK, _INK, _INK, 1.0])
+    return _Layer(strips, before.repeat(2), np.broadcast_to(ink, (len(strips), 3, 4)))
+
+
 def _painted(colours: Colours, values: Array, normal: Array, view: View) -> Array:
     """Colours ``(k, 3, 4)`` of the corners of faces with these ``values`` ``(k, 3)``, darker where
-    the faces are seen from the side."""
+    the faces are in the shade."""
     span = max(colours.high - colours.low, np.finfo(float).tiny)
     scaled = (values - colours.low) / span
     painted = colours.map(np.clip(np.nan_to_num(scaled), 0, 1))
     painted[~np.isfinite(values), :3] = _ELASTIC
-    facing = np.abs(normal @ view.towards)
-    light = _DARKEST + (1 - _DARKEST) * facing
+    direction = _LIGHT @ np.stack(view) / np.linalg.norm(_LIGHT)
+    light = _DARKEST + (1 - _DARKEST) * np.maximum(normal @ direction, 0)
     painted[..., :3] *= light[:, None, None]
     return painted
 
@@ -201,7 +293,7 @@ def _scale(colours: Colours) -> Any:
 
 def _draw_axes(axes: Any, view: View) -> None:
     """Three arrows in a corner that show where x, y and z point."""
-    inset = axes.inset_axes([-0.08, -0.08, 0.26, 0.26])
+    inset = axes.inset_axes([-0.1, -0.16, 0.26, 0.26])
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
     inset.axis("off")
     ends = view.flat(np.eye(3))

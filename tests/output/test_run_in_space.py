@@ -259,22 +259,33 @@ def test_pictures_show_bodies_pressures_and_forces(folders, tmp_path):
     assert not (tmp_path / "no.png").exists()
 
 
-def test_the_skin_of_bodies_encloses_their_volume(folders):
-    """Triangles are seen from outside; a cut ends at its plane, where it has a face. A field of the
-    nodes has its values at the corners."""
-    run = archord.load(folders[CellType.tetrahedron])
+@pytest.mark.parametrize("kind", [CellType.tetrahedron, CellType.hexahedron])
+def test_the_skin_of_bodies_encloses_their_volume(folders, kind):
+    """Triangles are seen from outside; a cut ends at its plane, where it has a face without holes.
+    A field of the nodes has its values at the corners."""
+    run = archord.load(folders[kind])
     fields = run.fields()
     still = replace(fields, displacement=0 * fields.displacement)
     skin = skin_of(run, still, fields.von_mises)
-    corners = fields.coordinates[fields.cells[:, :4]]
-    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
-    assert np.linalg.det(skin.corners).sum() / 6 == pytest.approx(volume, rel=1e-5)
+    low = fields.coordinates.min(axis=0)
+    size = np.ptp(fields.coordinates, axis=0)
+    volume = np.linalg.det(skin.corners).sum() / 6
+    assert volume == pytest.approx(size.prod(), rel=1e-5)
     assert np.isin(skin.values, fields.von_mises).all()
     at_nodes = skin_of(run, still, fields.coordinates[:, 0], "x=0.4")
     x = at_nodes.corners[..., 0]
     np.testing.assert_allclose(at_nodes.values, x, atol=1e-7)
     assert x.max() == pytest.approx(0.4)
     assert np.isclose(x, 0.4).all(axis=1).any()
+    z = fields.coordinates[:, 2]
+    heights, n_nodes = np.unique(z.round(9), return_counts=True)
+    through_nodes = heights[n_nodes > 5][1:-1]
+    assert len(through_nodes) > 3
+    for cut, share in [("x=0.4", (0.4 - low[0]) / size[0])] + [
+        (f"z={height}", (height - low[2]) / size[2]) for height in through_nodes
+    ]:
+        left = np.linalg.det(skin_of(run, still, z, cut).corners).sum() / 6
+        assert left == pytest.approx(share * volume, rel=1e-3), cut
 
 
 @pytest.mark.mpi
