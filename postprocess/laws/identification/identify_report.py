@@ -27,7 +27,8 @@ _POOR = 0.3  # half an interval over its value that tells hardly anything
 _SERIAL = 0.5  # correlation of neighbouring residuals that noise hardly ever has
 _MISSED = 0.05  # rms of residuals over the largest force beyond which something is wrong
 _GAP = 3  # points before first touch that show where it is
-_LEAD = 5  # points by which a curve begins
+_LEAD = 5  # points by which a curve begins, at most
+_SHORT = 20  # points of a curve for each of them
 _ZERO = 0.02  # of the largest force: what noise may leave of none
 _RETURNED = 0.1  # share of the largest force by which the way back must leave first loading
 
@@ -167,7 +168,8 @@ def _reason(names: set[str], found: Identification) -> str:
 def _doubts_of_zero(found: Identification) -> list[str]:
     """A warning of a curve that begins with a force: the machine's own, or behind first touch."""
     curve = found.model.curve
-    begins = float(np.median(curve.load[:_LEAD]))
+    lead = max(1, min(_LEAD, len(curve.load) // _SHORT))
+    begins = float(np.median(curve.load[:lead]))
     if abs(begins) <= _ZERO * curve.largest:
         return []
     share = f"{abs(begins) / curve.largest:.1%} of the largest"

@@ -166,8 +166,9 @@ def test_a_force_that_the_machine_reads_without_a_load_is_told(sign):
     found = identify(scene, moved, ["joint.clearance"], stiffness=np.inf)
     assert "the curve begins at a force of" in said(found)
     assert "what the machine reads without a load" in said(found)
-    found = identify(scene, curve, ["joint.clearance"], stiffness=np.inf)
-    assert "the curve begins at a force" not in said(found)
+    for few in (curve, measured(ELASTIC, {}, 5, n=12, noise=0.002, soft=0.0)):
+        found = identify(scene, few, ["joint.clearance"], stiffness=np.inf)
+        assert "the curve begins at a force" not in said(found)
 
 
 def test_units_that_are_wrong_by_1000_end_at_a_bound():
