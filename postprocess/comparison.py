@@ -54,11 +54,10 @@ class Comparison:
         first = values[0]
         nothing = _NOTHING * np.abs(values).max(initial=0.0)
         difference = values - first
-        size = np.abs(first)
         with np.errstate(divide="ignore", invalid="ignore"):
-            relative = difference / size
+            relative = values / first - 1
         unknown = np.where(np.abs(difference) <= nothing, 0.0, np.nan)
-        return np.where(size > nothing, relative, unknown)
+        return np.where(np.abs(first) > nothing, relative, unknown)
 
 
 def compare_runs(runs: list[Run]) -> Comparison:

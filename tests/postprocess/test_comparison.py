@@ -110,6 +110,8 @@ def test_nothing_has_no_relative_difference(runs):
     values = np.array([[1e-14, 0.0, 1.0, 2.0], [-1e-14, 0.5, 1.1, 2.0]])
     changed = replace(compare_runs([Run(runs["coarse"])] * 2), values={"P": values})
     np.testing.assert_allclose(changed.relative("P")[1], [0, np.nan, 0.1, 0], atol=1e-12)
+    turned = replace(changed, values={"P": -values})
+    np.testing.assert_array_equal(turned.relative("P"), changed.relative("P"))
 
 
 def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
