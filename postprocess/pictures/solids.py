@@ -35,16 +35,30 @@ _SHARP = np.cos(np.radians(35.0))  # of the angle between the faces beside a sha
 _LINE = 8e-4  # half the width of a line over the size of the picture
 _BEFORE = 2.0  # lengths of a line by which it is nearer than where it lies
 _INK = 0.25  # grey of lines
-_TETRAHEDRON = 10  # nodes
 _N_PIECES = 8
-# the nodes of the straight pieces of a tetrahedron of second order, in VTK's order
+# the nodes of the straight pieces of cells of second order, in VTK's order
 _OF_TETRAHEDRON = [
     [0, 4, 6, 7],
     [4, 1, 5, 8],
     [6, 5, 2, 9],
     [7, 8, 9, 3],
-    *([6, 8, a, b] for a, b in [(4, 5), (5, 9), (9, 7), (7, 4)]),
+    [6, 8, 4, 5],
+    [6, 8, 5, 9],
+    [6, 8, 9, 7],
+    [6, 8, 7, 4],
 ]
+_OF_HEXAHEDRON = [
+    [0, 8, 24, 11, 16, 22, 26, 20],
+    [8, 1, 9, 24, 22, 17, 21, 26],
+    [24, 9, 2, 10, 26, 21, 18, 23],
+    [11, 24, 10, 3, 20, 26, 23, 19],
+    [16, 22, 26, 20, 4, 12, 25, 15],
+    [22, 17, 21, 26, 12, 5, 13, 25],
+    [26, 21, 18, 23, 25, 13, 6, 14],
+    [20, 26, 23, 19, 15, 25, 14, 7],
+]
+# by the nodes of a cell: VTK's number of its pieces, and the table
+_PIECES = {10: (10, _OF_TETRAHEDRON), 27: (12, _OF_HEXAHEDRON)}
 _ELASTIC = 0.93  # grey of what has not yielded
 _HARDLY = 0.01  # of the largest PEEQ: what has not yielded, or hardly
 _BESIDE = 1e-5  # of the size: how far a cut is beside nodes, which would tear its face
@@ -108,7 +122,9 @@ def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
     nothing beyond the plane of a ``cut`` as "z=5". Raises `InputError`."""
     import pyvista
 
-    kind, pieces = _pieces(fields.cells)
+    # straight pieces of cells still meet where they are cut, which curved cells do not
+    kind, table = _PIECES[fields.cells.shape[1]]
+    pieces = fields.cells[:, table].reshape(-1, len(table[0]))
     grid = pyvista.UnstructuredGrid({kind: pieces}, fields.coordinates)
     grid.point_data["displacement"] = fields.displacement
     of_cells = len(values) == len(fields.cells)
@@ -139,21 +155,6 @@ def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
     corners = x[triangles]
     ends, beside = _sharp(triangles, _normals(corners))
     return Skin(corners, at_corners, x[ends], beside)
-
-
-def _pieces(cells: np.ndarray) -> tuple[int, np.ndarray]:
-    """VTK's number of the straight pieces of ``cells`` ``(m, 10 or 27)`` of second order, and their
-    nodes ``(8 m, 4 or 8)``. Pieces that are cut still meet, which curved cells do not."""
-    from pyvista import CellType
-    from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
-
-    if cells.shape[1] == _TETRAHEDRON:
-        return CellType.TETRA, cells[:, _OF_TETRAHEDRON].reshape(-1, 4)
-    node = np.reshape(vtkTriQuadraticHexahedron().GetParametricCoords(), (-1, 3))
-    corner = node[:8]
-    wanted = (corner[:, None] + corner) / 2
-    off = np.abs(wanted[:, :, None] - node).max(axis=3)
-    return CellType.HEXAHEDRON, cells[:, off.argmin(axis=2)].reshape(-1, 8)
 
 
 def _sharp(triangles: np.ndarray, normal: Array) -> tuple[np.ndarray, np.ndarray]:
