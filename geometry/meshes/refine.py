@@ -25,6 +25,7 @@ _ELSEWHERE = 1e-4  # of the radius: more than the rounding of a file moves nodes
 _SAME = 1e-9  # distance in a reference cell
 _ROUND = 1e-4  # of the radius: how far corners of facets may be off their cylinder
 _FLAT = 0.02  # of the radius: facets of a smaller extent have no cylinder
+_ALIKE = 1e-8  # squared sine of the angle between normals that are the same
 _IN_METRES = 0.01  # of the radius: a facet set smaller than this is drawn in another unit
 
 
@@ -69,7 +70,9 @@ def cylinder_through(x: Array, facets: np.ndarray) -> Circle | None:
     triangles = x[facets[:, :3]]
     a, b, c = np.swapaxes(triangles, 0, 1)
     normal = unit(np.cross(b - a, c - a))
-    _, _, turned = np.linalg.svd(normal.T @ normal)  # across the axis twice, then along it
+    _, spread, turned = np.linalg.svd(normal.T @ normal)  # across the axis twice, then along it
+    if spread[1] < _ALIKE * spread[0]:
+        return None  # the corners of a strip of flat facets lie on any cylinder
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
     middle, radius = nearest_circle(corners @ turned[:2].T)
     height = (corners @ turned[2]).mean()

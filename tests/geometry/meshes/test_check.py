@@ -21,6 +21,7 @@ from archord.geometry.meshes.quality import (
     quality,
 )
 from archord.geometry.meshes.refine import Circle, refined
+from archord.geometry.shapes.boxes import boxes
 
 
 def grid(n, m, corner=(0.0, 0.0), size=(1.0, 1.0)):
@@ -523,3 +524,12 @@ def test_straight_sides_along_a_cylinder_have_no_sagitta():
     mesh = gmsh_to_mesh(MPI.COMM_SELF, _quarter_sleeves, circles)
     bodies = {"sleeve": "sleeve", "hub": "hub"}
     assert not check_mesh(mesh, bodies, pairs=[("sleeve outside", "hub inside")])
+
+
+def test_a_strip_of_flat_facets_is_no_arc():
+    """Its corners, on two lines, lie on any cylinder along it, of which its sides were straight."""
+    made = boxes(
+        {"low": (0, 0, 0, 2, 1, 0.5), "high": (0, 1, 0, 2, 1, 0.5)}, 0.5, "hexahedra", MPI.COMM_SELF
+    )
+    bodies = {"low": "low", "high": "high"}
+    assert not check_mesh(made, bodies, pairs=[("low top", "high bottom")])
