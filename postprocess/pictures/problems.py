@@ -24,6 +24,7 @@ _STYLES = ("-", "--", ":", "-.")  # of surfaces
 _ELASTIC = "0.93"  # grey of what has no plastic strain
 _UNLOADED = 1e-3  # of the largest force of a run: what is left after unloading
 OF_PEEQ = "inferno_r"  # its map of colours
+HARDLY = 0.01  # of the largest PEEQ: what has not yielded, or hardly
 _CONSTANT = 1e-9  # relative range of a field without a scale of colours
 # fields of edges alone
 OF_EDGES = ("hoop", "normal", "shear", "facet_pressure", "gap", "contact_shear")
@@ -145,21 +146,20 @@ def draw_field(
         drawn = axes.tripcolor(*x.T, flat, facecolors=of_triangles, **style)
     else:
         drawn = axes.tripcolor(*x.T, flat, values, shading="gouraud", **style)
+        if usual == OF_PEEQ:  # whose mask tripcolor does not take
+            drawn.set_array(np.ma.masked_less_equal(values, HARDLY * known.max()))
     extend = colours.cut(in_cells[shown])
     axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=extend)
 
 
-def field_values(
-    run: Run, fields: Fields, field: str, *, smooth: bool = False
-) -> tuple[Array, str, str]:
-    """A ``field`` of the cells ``(m,)`` or of the nodes ``(n,)`` in the unit of its label, the
-    label, and the usual map of its colours: by default PEEQ, or von Mises stress where nothing has
-    yielded. A ``smooth`` one is of the nodes, where it is known there. Raises `InputError` for a
-    field that the run does not have."""
+def field_values(run: Run, fields: Fields, field: str) -> tuple[Array, str, str]:
+    """A ``field`` of the nodes ``(n,)``, or of the cells ``(m,)`` if nodes have none, in the unit
+    of its label, the label, and the usual map of its colours: by default PEEQ, or von Mises stress
+    where nothing has yielded. Raises `InputError` for a field that the run does not have."""
     yielded = fields.peeq is not None and fields.peeq.any()
     name = _FIELDS.get(field, field) or ("peeq" if yielded else "von_mises")
     label, scale = field_words(run, name)
-    values = scale * _values(run, fields, name, smooth)
+    values = scale * _values(run, fields, name)
     return values, label, OF_PEEQ if name == "peeq" else "viridis"
 
 
@@ -214,15 +214,13 @@ def _plain() -> Any:
     return ListedColormap([_ELASTIC])
 
 
-def _values(run: Run, fields: Fields, name: str, smooth: bool) -> Array:
-    """A field of the cells ``(m,)`` or else of the nodes ``(n,)``; the other way round if
-    ``smooth``. Raises `InputError`."""
+def _values(run: Run, fields: Fields, name: str) -> Array:
+    """A field of the nodes ``(n,)`` or else of the cells ``(m,)``. Raises `InputError`."""
     moved = {"displacement": np.linalg.norm(fields.displacement, axis=1)}
     for axis, along in zip("xyz", fields.displacement.T, strict=False):
         moved[f"u{axis}"] = along
     means = {name: values for name, values in fields.cell.items() if values.ndim == 1}
-    at_nodes = fields.nodal_fields() | moved
-    known = means | at_nodes if smooth else at_nodes | means
+    known = means | fields.nodal_fields() | moved
     if name not in known:
         names = ", ".join(dict.fromkeys([*_FIELDS, *known]))
         raise InputError(run.folder, f"has no field {name!r}; its fields are {names}.")

@@ -16,6 +16,7 @@ import numpy as np
 from archord.materials.material import Array
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.pictures.problems import (
+    HARDLY,
     OF_PEEQ,
     Colours,
     colours_for,
@@ -60,7 +61,6 @@ _OF_HEXAHEDRON = [
 # by the nodes of a cell: VTK's number of its pieces, and the table
 _PIECES = {10: (10, _OF_TETRAHEDRON), 27: (12, _OF_HEXAHEDRON)}
 _ELASTIC = 0.93  # grey of what has not yielded
-_HARDLY = 0.01  # of the largest PEEQ: what has not yielded, or hardly
 _BESIDE = 1e-5  # of the size: how far a cut is beside nodes, which would tear its face
 _PRESSED = 1e-6  # of the largest pressure: a facet that is pressed
 
@@ -180,11 +180,11 @@ def field_panel(
     from matplotlib.tri import Triangulation
 
     fields = run.fields(step or shown_step(run))
-    values, label, map_name = field_values(run, fields, field, smooth=True)
+    values, label, map_name = field_values(run, fields, field)
     skin = skin_of(run, fields, values, cut)
     shown = skin.values
     if map_name == OF_PEEQ:
-        shown = np.where(shown <= _HARDLY * shown.max(), np.nan, shown)
+        shown = np.where(shown <= HARDLY * shown.max(), np.nan, shown)
     normal = _normals(skin.corners)
     size = np.abs(np.nan_to_num(shown)).mean(axis=1)
     view = _best_view(normal, size, cut)

@@ -81,7 +81,7 @@ def test_a_field_without_a_range_is_told_and_not_coloured(unloaded, stress, said
     """A body that is held all over has no stress: no scale that would end at nothing."""
     fields = unloaded.fields(2)
     cell = {"von_mises": np.full(len(fields.cells), stress)}
-    axes = _drawn(unloaded, replace(fields, cell=cell))
+    axes = _drawn(unloaded, replace(fields, cell=cell, nodal={}))
     assert len(axes) == 1
     assert axes[0].texts[0].get_text() == f"von Mises stress [MPa]: {said}"
 
@@ -91,7 +91,7 @@ def test_numbers_that_are_none_do_not_spoil_the_others(unloaded):
     fields = unloaded.fields(2)
     values = fields.von_mises.copy()
     values[:3] = np.nan
-    axes, _ = _drawn(unloaded, replace(fields, cell={"von_mises": values}))
+    axes, _ = _drawn(unloaded, replace(fields, cell={"von_mises": values}, nodal={}))
     assert axes.collections[0].get_clim() == (0, pytest.approx(np.nanmax(values)))
 
 
