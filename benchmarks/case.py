@@ -4,7 +4,7 @@ vary, and tables."""
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
@@ -12,6 +12,9 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.joint_mesh import mesh_joint
+from archord.geometry.shapes.sketch import Sketch
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome
 from archord.report.by_name import ByName
@@ -130,6 +133,17 @@ def _without_none(keys: Any) -> Any:
     if not isinstance(keys, dict):
         return keys
     return {key: value for key, value in keys.items() if value is not None}
+
+
+def meshed(sketch: Sketch) -> TaggedMesh:
+    """The mesh of a ``sketch``, of this rank alone."""
+    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+
+
+def named(words: Sequence[str], known: Container[str]) -> tuple[list[str], list[float]]:
+    """Of the ``words`` of a command those that are ``known``, and the others as numbers."""
+    names = [word for word in words if word in known]
+    return names, [float(word) for word in words if word not in known]
 
 
 def slug(name: str) -> str:

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import click
 
-from archord.commands.options import Group, argument, output, quiet
+from archord.commands.options import Group, argument, complain, output, quiet
 from archord.report.errors import InputError
 
 Say = Callable[[str], None]
@@ -36,8 +36,7 @@ def _conclude(printed: str, files: Iterable[Path], faults: list[str], quiet: boo
     """Print a benchmark's tables, what it wrote, and what is wrong; the exit code."""
     if not quiet:
         print(printed, *files, sep="\n")
-    for fault in faults:
-        print(f"archord: {fault}.", file=sys.stderr)
+    complain(*faults)
     return int(bool(faults))
 
 
@@ -67,7 +66,7 @@ def reproduce(figures: tuple[str, ...], output: Path, strain: str, quiet: bool) 
         files = make(figures or ["all"], output, comm, _telling(quiet), strain)
     except RuntimeError as error:
         if comm.rank == 0:
-            print(f"archord: {error}.", file=sys.stderr)
+            complain(str(error))
         return 3
     if not quiet:
         print(*files, sep="\n")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from archord.commands.law_files import exports_of, sentences, warn, write
-from archord.commands.options import argument, file, flag
+from archord.commands.law_files import exports_of, sentences, write
+from archord.commands.options import argument, file, flag, warn
 from archord.report.errors import InputError
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from archord.commands.law_files import Text, sentences, warn, write
-from archord.commands.options import argument, file, flag, output, overrides
+from archord.commands.law_files import Text, sentences, write
+from archord.commands.options import argument, file, flag, output, overrides, warn
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from archord.commands.law_files import exports_of, sentences, warn, write
+from archord.commands.law_files import exports_of, sentences, write
 from archord.commands.law_joint import joint_of, of_scene
-from archord.commands.options import argument, file, flag, overrides
+from archord.commands.options import argument, file, flag, overrides, warn
 from archord.report.by_name import ByName
 from archord.report.errors import InputError
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from archord.commands.options import warn
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,12 +27,6 @@ def sentences() -> Iterator[None]:
         yield
     except ValueError as error:
         raise InputError(str(error)) from error
-
-
-def warn(*messages: str) -> None:
-    """Print each of the warnings once."""
-    for message in dict.fromkeys(messages):
-        print(f"archord: warning: {message}.", file=sys.stderr)
 
 
 def exports_of(

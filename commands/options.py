@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,17 @@ import click
 Decorator = Callable[[Any], Any]
 PATH = click.Path(path_type=Path)
 _SENTENCE = 1000  # characters: longer than any
+
+
+def complain(*sentences: str) -> None:
+    """Print each of the sentences once, where errors go."""
+    for sentence in dict.fromkeys(sentences):
+        print(f"archord: {sentence}.", file=sys.stderr, flush=True)
+
+
+def warn(*messages: str) -> None:
+    """Print each of the warnings once."""
+    complain(*(f"warning: {message}" for message in messages))
 
 
 class Group(click.Group):

@@ -3,7 +3,6 @@ the next."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from pathlib import Path
@@ -11,6 +10,7 @@ from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from archord.commands.options import warn
 from archord.commands.ranks import on_terminal
 from archord.presets.views import view_of
 from archord.report.errors import InputError
@@ -166,12 +166,10 @@ class Progress:
             return
         usual = median(self._seconds)
         if m.seconds > _MUCH_LONGER * usual:
-            print(
-                f"archord: warning: step {m.step} took {m.seconds:.0f} s, {m.seconds / usual:.0f} "
+            warn(
+                f"step {m.step} took {m.seconds:.0f} s, {m.seconds / usual:.0f} "
                 f"times the median of the steps before it: {m.iterations} iterations and "
-                f"{m.cutbacks} cutbacks; smaller steps may be quicker.",
-                file=sys.stderr,
-                flush=True,
+                f"{m.cutbacks} cutbacks; smaller steps may be quicker"
             )
 
 

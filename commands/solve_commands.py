@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
@@ -10,7 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from archord.commands.options import PATH, SCENE, argument, flag, output, overrides, pictures, quiet
+from archord.commands.options import (
+    PATH,
+    SCENE,
+    argument,
+    complain,
+    flag,
+    output,
+    overrides,
+    pictures,
+    quiet,
+    warn,
+)
 
 if TYPE_CHECKING:
     from archord.scene.file import AnyScene
@@ -55,11 +65,8 @@ def solve(
         return _solve(lambda: load_scene(scene, overrides), folder, begun, force=force, **told)
     if output is not None and scene.is_dir():
         raise click.UsageError("-o does not go with a run folder")
-    folder, file = (
-        (scene, scene / "scene.toml")
-        if scene.is_dir()
-        else (output or Path("runs") / scene.stem, scene)
-    )
+    folder = scene if scene.is_dir() else output or Path("runs") / scene.stem
+    file = scene / "scene.toml" if scene.is_dir() else scene
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
@@ -87,8 +94,7 @@ def _solve(
         """The scene; what is to be doubted of it is told before it is solved."""
         scene = load()
         told.extend(scene.doubts)
-        for warning in told:
-            print(f"archord: warning: {warning}.", file=sys.stderr, flush=True)
+        warn(*told)
         return scene
 
     comm = MPI.COMM_WORLD
@@ -97,16 +103,10 @@ def _solve(
     if outcome.warnings:
         from archord.postprocess.tables import first_of_each_kind
 
-        for warning in first_of_each_kind(
-            [warning for warning in outcome.warnings if warning not in told]
-        ):
-            print(f"archord: warning: {warning}.", file=sys.stderr)
+        warn(*first_of_each_kind([said for said in outcome.warnings if said not in told]))
     if comm.rank == 0 and outcome.status != "done":
-        print(f"archord: {outcome.message}.", file=sys.stderr)
-        print(
-            f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.",
-            file=sys.stderr,
-        )
+        steps = f"{len(outcome.steps)} accepted steps are in {folder}"
+        complain(outcome.message, f"{outcome.status}; {steps}")
     elif comm.rank == 0 and not quiet:
         said = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
         if outcome.accuracy is not None and outcome.accuracy.estimated is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from archord.commands.options import argument, flag, output, overrides, quiet
+from archord.commands.options import argument, complain, flag, output, overrides, quiet, warn
 from archord.report.errors import InputError
 from archord.report.table import Table
 
@@ -91,12 +91,7 @@ def sweep(
         if gather:
             return design, mine, [], []
         ended, left, damaged = open_cases(mine, folder, retry=retry, force=force)
-        for result in damaged:
-            print(
-                f"archord: warning: {result.message}: the case is solved again.",
-                file=sys.stderr,
-                flush=True,
-            )
+        warn(*(f"{result.message}: the case is solved again" for result in damaged))
         if ended:
             say(f"{len(ended)} of {len(mine)} cases are there already")
         return design, mine, ended, left
@@ -127,20 +122,14 @@ def sweep(
         counts = Counter(result.status for result in known.values())
         told = ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
         say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
-        for result in (result for result in known.values() if result.damaged):
-            print(f"archord: warning: {result.message}.", file=sys.stderr)
-        for warning in warnings_of(design, folder):
-            print(f"archord: warning: {warning}.", file=sys.stderr)
+        damaged = [result.message for result in known.values() if result.damaged]
+        warn(*damaged, *warnings_of(design, folder))
         failed = [
-            (case, known[case.run])
+            f"case {case.number}, {case.run}: {result.status}: {result.message}"
             for case in mine
-            if known[case.run].status in ("stopped", "failed")
+            if (result := known[case.run]).status in ("stopped", "failed")
         ]
-        for case, result in failed:
-            print(
-                f"archord: case {case.number}, {case.run}: {result.status}: {result.message}.",
-                file=sys.stderr,
-            )
+        complain(*failed)
         return bool(failed)
 
     failed = agreed(comm, concluded)

@@ -50,6 +50,16 @@ class RunCurve:
         return self.scene.joint.dR
 
     @property
+    def x(self) -> Array:
+        """Displacement over the clearance."""
+        return self.delta / self.dR
+
+    @property
+    def unit(self) -> float:
+        """Unit of forces, ``E* dR``."""
+        return self.E_star * self.dR
+
+    @property
     def sigY(self) -> float | None:
         """Yield stress of the weaker body; None if neither yields."""
         known = [solid.yield_stress for solid in self.scene.solids.values()]

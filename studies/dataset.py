@@ -12,7 +12,6 @@ import csv
 import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,8 +25,7 @@ from archord.postprocess.laws.general.yield_model import (
     mesh_excess,
     sides_of,
 )
-from archord.report.by_name import ByName
-from archord.report.files import replacing, write_rows
+from archord.report.files import write_rows, write_text
 from archord.studies.law_design import FRESH, Drawn, Row, joints, sweep_file
 
 JOINTS = 5000
@@ -39,6 +37,7 @@ _TOLERANCE = 1e-10  # of the solver
 _ELASTIC = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]  # delta/dR
 _BACK = (0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.58, 0.48, 0.37, 0.25)  # parts of the deepest
 NUMBERS = ("plane strain", "p", "m", "n", "dR/R", "pin s", "block s")
+_COLUMNS = ("delta/dR", "P/(E* dR)", "error of P/(E* dR)", "p0 R/(E* dR)", "eps")
 
 
 def scenes(number: int) -> list[Row]:
@@ -75,11 +74,7 @@ def _runs(joint: Drawn) -> list[Row]:
 
 def write_sweep(number: int, file: Path) -> None:
     """Write the sweep of the first ``number`` joints."""
-    with replacing(file) as new:
-        text = sweep_file(scenes(number))
-        given = "[base.analysis]\n"
-        text = text.replace(given, f"{given}tolerance = {_TOLERANCE}\n", 1)
-        new.write_text(text, encoding="utf-8")
+    write_text(sweep_file(scenes(number), tolerance=_TOLERANCE), file)
 
 
 def write_tables(sweep: Path, folder: Path) -> list[Path]:
@@ -94,15 +89,13 @@ def write_tables(sweep: Path, folder: Path) -> list[Path]:
     table = []
     curves: list[dict[str, object]] = []
     for number, (numbers, runs) in enumerate(solved, 1):
-        named = dict(zip(NUMBERS, numbers, strict=True))
-        table.append({"joint": number} | _short(named))
-        curves += [{"joint": number} | _short(row) for row in _curve(numbers, runs)]
+        table.append({"joint": number} | _written(NUMBERS, numbers))
+        curves += [{"joint": number} | row for row in _curve(numbers, runs)]
     files = [folder / "joints.csv", folder / "curves.csv"]
     for file, rows in zip(files, (table, curves), strict=True):
         write_rows(rows, file)
     sums = folder / "SHA256SUMS"
-    with replacing(sums) as new:
-        new.write_text(checksums(files), encoding="utf-8")
+    write_text(checksums(files), sums)
     return [*files, sums]
 
 
@@ -112,7 +105,7 @@ def checksums(files: Iterable[Path]) -> str:
     return "".join(f"{digest}  {name}\n" for digest, name in digests)
 
 
-def _curve(numbers: Numbers, runs: Sequence[NodeRun]) -> Iterable[ByName]:
+def _curve(numbers: Numbers, runs: Sequence[NodeRun]) -> Iterable[dict[str, object]]:
     """First loading of the joint with these ``numbers``, extrapolated to infinitely many steps
     where it was solved twice, and the way back."""
     nodes = first_loading(list(runs))
@@ -163,25 +156,11 @@ def _step_error(runs: Sequence[NodeRun], nodes: Array) -> Array:
     return np.where(cut, 2 * np.maximum(error, beside), error)
 
 
-def _row(
-    way: str, x: float, y: float, error: float, p0: float = np.nan, eps: float = np.nan
-) -> ByName:
-    return {
-        "way": way,
-        "delta/dR": x,
-        "P/(E* dR)": y,
-        "error of P/(E* dR)": error,
-        "p0 R/(E* dR)": p0,
-        "eps": eps,
-    }
+def _row(way: str, *numbers: float) -> dict[str, object]:
+    """A row of curves.csv; a way back has no p0 and eps."""
+    return {"way": way} | _written(_COLUMNS[: len(numbers)], numbers)
 
 
-def _short(row: ByName) -> dict[str, object]:
-    """With six digits; nothing for what is not known."""
-    return {key: _written(value) for key, value in row.items()}
-
-
-def _written(value: Any) -> object:
-    if isinstance(value, str):
-        return value
-    return "" if np.isnan(value) else f"{value:.6g}"
+def _written(names: Iterable[str], numbers: Iterable[float]) -> dict[str, object]:
+    """The ``numbers`` by their ``names``, with six digits."""
+    return {name: f"{value:.6g}" for name, value in zip(names, numbers, strict=True)}

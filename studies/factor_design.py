@@ -26,22 +26,16 @@ from archord.studies.law_design import (
     END,
     Drawn,
     Row,
-    checking,
+    in_planes,
     joints,
     steady_nodes,
     sweep_file,
 )
 
 # how many joints of each kind of law_design.py
-_KINDS = {
-    "both": 50,
-    "block": 30,
-    "pin": 25,
-    "block weaker": 25,
-    "pin weaker": 25,
-    "elastic": 45,
-}
-JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
+JOINTS = in_planes(
+    {"both": 50, "block": 30, "pin": 25, "block weaker": 25, "pin weaker": 25, "elastic": 45}
+)
 _SMALLEST = 0.03  # coefficient of friction
 _SEED = 7200
 _FIRST = 0.05  # x
@@ -96,13 +90,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--element-size", type=float, default=ELEMENT_SIZE, help="of fresh ones")
     given = parser.parse_args()
-    share = 1.0
-    seed = _SEED
     if given.fresh:
         share = given.fresh / sum(JOINTS.values())
-        seed = 1000 * given.seed
-    text = sweep_file(rows(given.kind, share, seed, checks=bool(given.fresh)))
-    print(checking(text, given.element_size) if given.fresh else text, end="")
+        own = rows(given.kind, share, 1000 * given.seed, checks=True)
+        print(sweep_file(own, given.element_size), end="")
+        return
+    print(sweep_file(rows(given.kind, 1.0, _SEED)), end="")
 
 
 if __name__ == "__main__":

@@ -33,13 +33,14 @@ from archord.postprocess.laws.general.law_fit import steps_count
 from archord.postprocess.laws.general.yield_model import Numbers, first_yield
 from archord.studies.law_design import (
     CHECK_SIZE,
+    ELEMENT_SIZE,
     END,
     FRESH_WAY,
     Drawn,
     Row,
-    checking,
     earlier_model,
     fresh_nodes,
+    in_planes,
     joints,
     steady_nodes,
     sweep_file,
@@ -47,8 +48,7 @@ from archord.studies.law_design import (
 )
 
 # how many joints of each kind of law_design.py
-_KINDS = {"both": 84, "block": 54, "pin": 42, "block weaker": 42, "pin weaker": 42}
-JOINTS = {f"{plane} {kind}": n for plane in ("strain", "stress") for kind, n in _KINDS.items()}
+JOINTS = in_planes({"both": 84, "block": 54, "pin": 42, "block weaker": 42, "pin weaker": 42})
 PAIRS = 80  # of named metals, in each plane
 SOFT_PAIRS = 40  # the same, to fit to: with the softest metal as one body or both
 CLOSE_PAIRS = 40  # the same, of unlike metals that yield at nearly one stress
@@ -231,14 +231,13 @@ def main() -> None:
     given = parser.parse_args()
     if given.fresh:
         chosen = drawn(given.fresh / NUMBER, 1000 * given.seed)
-        text = checking(sweep_file(rows_to_check(chosen)), given.element_size)
+        rows = rows_to_check(chosen)
     elif given.metals:
-        rows = sweep_file(rows_to_fit(all_pairs(given.metals)))
-        text = checking(rows, given.element_size)
+        rows = rows_to_fit(all_pairs(given.metals))
     else:
-        text = sweep_file(rows_to_fit(drawn(1.0, _SEED, special=True)))
-    plane = 'plane = "strain"\n'
-    print(text.replace(plane, f"{plane}tolerance = {_TOLERANCE}\n", 1), end="")
+        rows = rows_to_fit(drawn(1.0, _SEED, special=True))
+    size = given.element_size if given.fresh or given.metals else ELEMENT_SIZE
+    print(sweep_file(rows, size, _TOLERANCE), end="")
 
 
 if __name__ == "__main__":

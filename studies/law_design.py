@@ -105,18 +105,18 @@ _OPENS = Path(__file__).with_suffix(".npz")
 _ELASTIC = Path(__file__).with_suffix(".json")
 ELEMENT_SIZE = 0.05  # over R, of the joints to fit to
 CHECK_SIZE = 0.025  # of joints to check the law on, unless another one is asked for
-_BASE = f"""
+_BASE = """
 [base.units]
 length = "R"
 stress = "E*"
 
 [base.analysis]
 plane = "strain"
-
+{tolerance}
 [base.joint]
 radius = 1.0
 clearance = 0.005
-relative_element_size = {ELEMENT_SIZE}
+relative_element_size = {size:g}
 
 [base.block]
 E = 2.0
@@ -272,11 +272,6 @@ def fresh(number: int, seed: int, of: Mapping[str, int] = FRESH) -> Iterator[Row
             yield from yielding_rows(joint, x, FRESH_WAY, joint.chance, law.residual)
 
 
-def checking(text: str, size: float) -> str:
-    """The sweep ``text`` with elements of this ``size`` over R."""
-    return text.replace(f"size = {ELEMENT_SIZE}", f"size = {size:g}")
-
-
 def fresh_nodes(joint: Drawn) -> Array:
     """The x at which a joint that yields is solved on first loading, to check a law."""
     x0 = joint.first
@@ -306,8 +301,16 @@ def yielding_rows(
         yield joint.own | {"load.displacement": [*x[: i + 1], *below, again, *x[i : i + 2]]}
 
 
-def sweep_file(rows: Iterable[Row]) -> str:
-    """The sweep of ``rows``, in short numbers."""
+def in_planes(kinds: Mapping[str, int]) -> dict[str, int]:
+    """How many joints are of each kind in both planes, by how many are in one."""
+    return {f"{plane} {kind}": n for plane in SMALLEST_S for kind, n in kinds.items()}
+
+
+def sweep_file(
+    rows: Iterable[Row], size: float = ELEMENT_SIZE, tolerance: float | None = None
+) -> str:
+    """The sweep of ``rows``, in short numbers, with elements of this ``size`` over R and a
+    ``tolerance`` of the solver, if any."""
 
     def short(value: Any, digits: int = 5) -> Any:
         if isinstance(value, list):
@@ -318,7 +321,8 @@ def sweep_file(rows: Iterable[Row]) -> str:
     for row in rows:
         pairs = [f"{key}={toml_value(short(value))}" for key, value in row.items()]
         lines.append("{" + ",".join(pairs).replace(" ", "") + "},\n")
-    return f"list = [\n{''.join(lines)}]\n{_BASE}"
+    given = f"tolerance = {tolerance}\n" if tolerance else ""
+    return f"list = [\n{''.join(lines)}]\n{_BASE.format(tolerance=given, size=size)}"
 
 
 def main() -> None:
@@ -332,8 +336,8 @@ def main() -> None:
     given = parser.parse_args()
     if given.fresh:
         of = {given.kind: 1} if given.kind else FRESH
-        rows = sweep_file(fresh(given.fresh, given.seed, of))
-        print(checking(rows, given.element_size), end="")
+        rows = fresh(given.fresh, given.seed, of)
+        print(sweep_file(rows, given.element_size), end="")
         return
     print(sweep_file(meshes() if given.meshes else training()), end="")
 

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from archord.benchmarks.axisymmetric.case import (
     NU,
@@ -25,10 +24,10 @@ from archord.benchmarks.axisymmetric.case import (
     one_body,
     perfectly_plastic,
 )
+from archord.benchmarks.case import meshed
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.geometry.shapes.sketch import Sketch
 from archord.postprocess.run import Run
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
@@ -48,7 +47,7 @@ def half_space_mesh(near: str, fine: float) -> TaggedMesh:
     sketch = Sketch(["body"], ["surface", "axis", "far"])
     _draw_half_space(sketch, fine, fine)
     sketch.sizes["body"] = f"{near} + 0.3 * Max(Sqrt(x*x + y*y) - {fine!r}, 0)"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def balls_sketch(near: str, *on_axis: float) -> Sketch:
@@ -74,7 +73,7 @@ def balls_sketch(near: str, *on_axis: float) -> Sketch:
 def balls_mesh() -> TaggedMesh:
     """The mesh of `balls_sketch`, with smaller elements at the edge of the contact."""
     finer_at_the_edge = "Min(0.03 + 0.15 * Sqrt((x - 1)^2 + y*y), 0.15)"
-    return mesh_joint(MPI.COMM_SELF, balls_sketch(finer_at_the_edge, _FINE), radius=1.0)
+    return meshed(balls_sketch(finer_at_the_edge, _FINE))
 
 
 def _draw_half_space(sketch: Sketch, fine: float, *on_axis: float) -> None:

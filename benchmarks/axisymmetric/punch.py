@@ -5,12 +5,10 @@ The drawing is of NAFEMS R0094, "Advanced finite element contact benchmarks", be
 
 from __future__ import annotations
 
-from mpi4py import MPI
-
 from archord.benchmarks.axisymmetric.case import NU, STEEL, Place, Study
+from archord.benchmarks.case import meshed
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.geometry.shapes.sketch import Sketch
 from archord.materials.elasticity import Elastic
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
@@ -42,7 +40,7 @@ def punch_mesh(finer: int) -> TaggedMesh:
     )
     size = f"(0.4 + 0.2 * Sqrt((x - 40.5)^2 + y*y)) / {finer}"
     sketch.sizes |= {"punch": size, "foundation": size}
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def punch_problem(finer: int = 1) -> Problem:

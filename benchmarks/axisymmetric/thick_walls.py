@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from archord.benchmarks.axisymmetric.case import (
     NU,
@@ -24,9 +23,9 @@ from archord.benchmarks.axisymmetric.case import (
     one_body,
     perfectly_plastic,
 )
+from archord.benchmarks.case import meshed
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.geometry.shapes.sketch import Sketch
 from archord.postprocess.run import Run
 from archord.solver.problem import Load, Problem, Support
@@ -55,7 +54,7 @@ def sphere_sketch(size: float) -> Sketch:
 
 def sphere_mesh(size: float = 0.08) -> TaggedMesh:
     """The mesh of `sphere_sketch`."""
-    return mesh_joint(MPI.COMM_SELF, sphere_sketch(size), radius=1.0)
+    return meshed(sphere_sketch(size))
 
 
 def cylinder_mesh(size: float = 0.05) -> TaggedMesh:
@@ -65,7 +64,7 @@ def cylinder_mesh(size: float = 0.05) -> TaggedMesh:
     below, outside, above, bore = sketch.path("body", *corners, corners[0])
     sketch.face("body", bore=[bore], outside=[outside], ends=[below, above])
     sketch.sizes["body"] = f"{size!r}"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def plastic_pressure() -> float:

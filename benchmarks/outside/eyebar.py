@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from mpi4py import MPI
-
 from archord.benchmarks.axisymmetric.case import NU, STEEL
+from archord.benchmarks.case import meshed
 from archord.benchmarks.outside.problem import Outside, Published, Values, stage_ends
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import Sketch
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import TabularHardening
 from archord.materials.j2 import J2Material
@@ -45,7 +44,7 @@ def eyebar_mesh(finer: int) -> TaggedMesh:
     sketch.sizes |= dict.fromkeys(
         sketch.faces, f"(0.8 + 0.2 * Abs(Sqrt(x*x + y*y) - {HOLE})) / {finer}"
     )
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def eyebar(finer: int) -> Problem:

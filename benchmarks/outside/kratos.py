@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
+from archord.benchmarks.case import meshed
 from archord.benchmarks.outside.neo_hooke import NeoHooke
 from archord.benchmarks.outside.problem import Outside, Published, Values, stage_ends
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import Sketch
 from archord.postprocess.run import Run
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
 
@@ -39,7 +39,7 @@ def iron_mesh(finer: int) -> TaggedMesh:
     sketch.sizes["iron"] = f"(0.12 + 0.2 * (y - 4)) / {finer}"
     far = "0.3 * (4 - y) + 0.15 * Max(x - 7, 0)"
     sketch.sizes["slab"] = f"(0.15 + {far}) / {finer}"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def ironing(kinematics: str, finer: int) -> Problem:
@@ -122,7 +122,7 @@ def press_fit_mesh(finer: int) -> TaggedMesh:
     size = 40 / finer
     sketch.sizes["block"] = f"Min({size}, {ROUND / 2} + 0.3 * {from_corner})"
     sketch.sizes["wall"] = f"{size} + 0.3 * (250 - Min(y, 250))"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def press_fit(finer: int) -> Problem:

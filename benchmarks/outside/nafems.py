@@ -12,10 +12,10 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
 from archord.benchmarks.axisymmetric.case import NU, STEEL
 from archord.benchmarks.axisymmetric.punch import ALUMINIUM, punch_problem
+from archord.benchmarks.case import meshed
 from archord.benchmarks.outside.problem import (
     Outside,
     Published,
@@ -26,7 +26,7 @@ from archord.benchmarks.outside.problem import (
 )
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import Sketch
 from archord.materials.elasticity import Elastic
 from archord.postprocess.run import Run
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
@@ -62,7 +62,7 @@ def roller_mesh(finer: int) -> TaggedMesh:
     )
     size = f"(1 + 0.2 * Max(Sqrt(x*x + y*y) - 7, 0)) / {finer}"
     sketch.sizes |= {"cylinder": size, "block": size}
-    mesh = mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    mesh = meshed(sketch)
     return replace(mesh, point_sets={"summit": np.array([above])})
 
 
@@ -113,7 +113,7 @@ def sheet_mesh(finer: int) -> TaggedMesh:
     )
     size = f"(4 + 0.3 * Abs(Sqrt(x*x + y*y) - {RADIUS})) / {finer}"
     sketch.sizes |= {"pin": size, "sheet": size}
-    mesh = mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    mesh = meshed(sketch)
     return replace(mesh, point_sets={"middle": np.array([_ORIGIN])})
 
 

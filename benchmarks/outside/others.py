@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from mpi4py import MPI
-
 from archord.benchmarks.axisymmetric.case import NU
+from archord.benchmarks.case import meshed
 from archord.benchmarks.outside.problem import (
     Outside,
     Published,
@@ -16,7 +15,7 @@ from archord.benchmarks.outside.problem import (
 )
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import Sketch
 from archord.materials.elasticity import Elastic
 from archord.postprocess.run import Run
 from archord.solver.problem import Body, Interaction, Load, Problem, Support
@@ -42,7 +41,7 @@ def balls_mesh(finer: int) -> TaggedMesh:
         axis = sketch.path(body, centre, (0.0, 0.0))
         sketch.face(body, **{name: arc, flat: across, f"{body} axis": axis})
         sketch.sizes[body] = f"(1 + 0.2 * Max(Sqrt(x*x + y*y) - 12, 0)) / {finer}"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def balls(finer: int) -> Problem:
@@ -77,7 +76,7 @@ def blocks_mesh(finer: int) -> TaggedMesh:
         near, right, away, left = sketch.path(body, *corners, corners[0])
         sketch.face(body, **{contact: [near], "right": [right], outer: [away], "left": [left]})
         sketch.sizes[body] = f"{size} / {finer}"
-    return mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    return meshed(sketch)
 
 
 def blocks(friction: float, finer: int) -> Problem:

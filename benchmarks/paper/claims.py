@@ -94,7 +94,7 @@ def peak_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     ratio = columns(tables["fig3"], plane=plane)["p0 R/(E* delta)"]
     off = np.abs(0.85 / ratio - 1)
     last_bad = np.flatnonzero(off > GOOD).max(initial=-1)
-    late = float(run.delta[last_bad + 1] / run.dR)
+    late = float(run.x[last_bad + 1])
     deviation = float(off[run.delta >= 0.499 * run.dR].max())
     said = (
         f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; "
@@ -117,7 +117,7 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     joint = LawJoint.from_scene(run.scene)
     laws = [find_law(name) for name in ("johnson", "radzimovsky")]
     at_limits = [float(law.force(joint, law.limit(joint))) for law in laws]
-    ends = [force / (run.E_star * run.dR) for force in at_limits]
+    ends = [force / run.unit for force in at_limits]
     said = (
         f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR "
         f"and by up to {deviation:.1%} from 0.2 dR on; "

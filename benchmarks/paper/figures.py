@@ -128,13 +128,13 @@ def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
     delta = run.delta if delta is None else delta
     inside = delta <= law.limit(joint) * (1 + 1e-9)
     force = np.full(len(delta), np.nan)
-    force[inside] = law.force(joint, delta[inside]) / (run.E_star * run.dR)
+    force[inside] = law.force(joint, delta[inside]) / run.unit
     return force
 
 
 def curve(run: RunCurve) -> Part:
     """P over delta."""
-    return {"plane": run.plane, X: run.delta / run.dR, Y: run.P / (run.E_star * run.dR)}
+    return {"plane": run.plane, X: run.x, Y: run.P / run.unit}
 
 
 def strength(run: RunCurve) -> float:
@@ -164,7 +164,7 @@ def fig2(runs: Runs, plane: Plane) -> list[Part]:
     run = runs.curve("elastic", plane)
     parts = []
     for fraction in (2.0, 1.5, 1.0, 0.5):
-        off = np.abs(run.delta / run.dR - fraction)
+        off = np.abs(run.x - fraction)
         k = int(np.argmin(off))
         eps, x, py = chord_profile(run, k + 1)
         along_chord = 2 * np.sin(eps / 2) * x
@@ -193,7 +193,7 @@ def fig3(runs: Runs, plane: Plane) -> list[Part]:
     """Peak pressure over delta: ours, Winkler with k = 0.85, Johnson."""
     run = runs.curve("elastic", plane)
     joint = LawJoint.from_scene(run.scene)
-    unit = run.E_star * run.dR
+    unit = run.unit
     force = law_force("johnson", run) * unit
     johnson = hertz(joint, force).peak_pressure / unit
     ours = run.p0 * run.R / unit
@@ -204,7 +204,7 @@ def fig3(runs: Runs, plane: Plane) -> list[Part]:
         "Johnson": johnson,
         "p0 R/(E* delta)": ours * run.dR / run.delta,
     }
-    return [{"plane": plane, X: run.delta / run.dR, "p0 R/(E* dR)": ours, **laws}]
+    return [{"plane": plane, X: run.x, "p0 R/(E* dR)": ours, **laws}]
 
 
 def fig4(runs: Runs, plane: Plane) -> list[Part]:
@@ -232,7 +232,7 @@ def fig5b(runs: Runs, plane: Plane) -> list[Part]:
     """The mean pressure over the projected area A over delta."""
     run = runs.curve(FULL_YIELD, plane)
     mean = run.P / (2 * run.R * np.sin(run.eps))
-    return [{"plane": plane, X: run.delta / run.dR, "P/(A sigY)": mean / strength(run)}]
+    return [{"plane": plane, X: run.x, "P/(A sigY)": mean / strength(run)}]
 
 
 def fig7(runs: Runs, plane: Plane) -> list[Part]:
@@ -241,14 +241,14 @@ def fig7(runs: Runs, plane: Plane) -> list[Part]:
     for joint in LAYOUTS["fig7"]["joints"]:
         run = runs.curve(joint, plane)
         unit = run.R * strength(run)
-        law = law_force("paper-plastic", run) * run.E_star * run.dR
+        law = law_force("paper-plastic", run) * run.unit
         named: Part = {
             "dR/R [%]": JOINTS[joint][0],
             "sigY/E* [%]": JOINTS[joint][1],
             "plane": plane,
         }
         forces = {"P/(R sigY)": run.P / unit, "eq. 12": law / unit, "P/P(eq. 12)": run.P / law}
-        parts.append(named | {X: run.delta / run.dR} | forces)
+        parts.append(named | {X: run.x} | forces)
     return parts
 
 
@@ -267,7 +267,7 @@ def fig9(runs: Runs, plane: Plane) -> list[Part]:
         ("plastic", FULL_YIELD, "paper-plastic"),
     ):
         run = runs.curve(joint, plane)
-        persson = persson_load(LawJoint.from_scene(run.scene), run.eps) / (run.E_star * run.dR)
+        persson = persson_load(LawJoint.from_scene(run.scene), run.eps) / run.unit
         delta = run.dR * (1 / np.cos(np.minimum(run.eps, 1.5)) - 1)  # eq. 5
         laws = {"Persson": persson, "eq. 9 or 12 at the same angle": law_force(name, run, delta)}
         parts.append({"joint": kind, "tan(eps/2)": np.tan(run.eps / 2)} | curve(run) | laws)
@@ -294,8 +294,6 @@ def draw_zones(runs: Runs, file: Path) -> Path:
     for plane, row in zip(PLANES, figure.subplots(len(PLANES), len(STAGES)), strict=True):
         run = runs.run(MILD_YIELD, plane)
         for stage, axes in zip(STAGES, row, strict=True):
-            field_panel(
-                axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1
-            )
+            field_panel(axes, run, int(np.argmin(np.abs(run.curve.x - stage))) + 1)
             axes.set_title(f"plane {plane}, {axes.get_title()}", fontsize="medium")
     return save_figure(figure, file)

@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 from mpi4py import MPI
 
+from archord.benchmarks.case import named
 from archord.benchmarks.space.calculix import solved_by_calculix
 from archord.benchmarks.space.case import Solved, solved
 from archord.benchmarks.space.joints import CASES
@@ -24,6 +26,7 @@ from archord.report.table import Table
 
 _HEADINGS = ("case", "quantity", "at", "reference", "+-")
 _OTHER = "--calculix"
+_CODES = {"archord": solved, "CalculiX": solved_by_calculix}
 _COST = ("error [%]", "dofs", "Newton", "GMRES", "s", "MB")
 
 
@@ -38,15 +41,16 @@ def rows(result: Solved) -> Iterator[tuple[str, ...]]:
         f"{result.seconds:.1f}",
         f"{peak_memory() / 1e6:.0f}",
     )
-    for reference, value in result.compared:
+    for compared in result.compared:
+        reference = compared.reference
         yield (
             result.case.name,
             reference.quantity,
             f"{reference.displacement:g}",
             f"{reference.value:.6g}",
             f"{reference.uncertainty:g}",
-            f"{value:.6g}",
-            f"{100 * (value / reference.value - 1):+.3f}",
+            f"{compared.value:.6g}",
+            f"{100 * compared.error:+.3f}",
             *cost,
         )
 
@@ -54,14 +58,12 @@ def rows(result: Solved) -> Iterator[tuple[str, ...]]:
 def main(arguments: Sequence[str]) -> None:
     """Print the table of the cases and sizes that the ``arguments`` name, of all cases on their own
     sizes without."""
-    chosen = [CASES[name] for name in arguments if name in CASES] or list(CASES.values())
-    sizes = [float(size) for size in arguments if size not in (*CASES, _OTHER)] or [0.0]
-    solve = solved_by_calculix if _OTHER in arguments else solved
-    table = Table(*_HEADINGS, "CalculiX" if _OTHER in arguments else "archord", *_COST, left=2)
-    for case in chosen:
-        for size in sizes:
-            for row in rows(solve(case, size)):
-                table.add(*row)
+    chosen, sizes = named([word for word in arguments if word != _OTHER], CASES)
+    code = "CalculiX" if _OTHER in arguments else "archord"
+    table = Table(*_HEADINGS, code, *_COST, left=2)
+    for name, size in product(chosen or CASES, sizes or [0.0]):
+        for row in rows(_CODES[code](CASES[name], size)):
+            table.add(*row)
     if MPI.COMM_WORLD.rank == 0:
         print(table)
 

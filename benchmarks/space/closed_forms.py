@@ -24,8 +24,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpi4py import MPI
-
 from archord.benchmarks.axisymmetric import balls, thick_walls
 from archord.benchmarks.axisymmetric.case import (
     Compared,
@@ -34,10 +32,10 @@ from archord.benchmarks.axisymmetric.case import (
     perfectly_plastic,
     solved,
 )
+from archord.benchmarks.case import meshed, named
 from archord.benchmarks.space import planes
 from archord.benchmarks.space.revolved import revolved
 from archord.benchmarks.space.sockets import AXIS, layer, pressed, socket_sketch
-from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.material import Material
 from archord.postprocess.run import Run
@@ -142,8 +140,7 @@ def mindlin(size: float) -> Iterator[Compared]:
 
 def socket(size: float) -> Iterator[Compared]:
     """A quarter of a ball in a conforming socket beside the same around an axis."""
-    sketch = socket_sketch(size / 6)
-    axial = mesh_joint(MPI.COMM_SELF, sketch, radius=1.0)
+    axial = meshed(socket_sketch(size / 6))
     with _run_of(pressed(axial, AXIS, kinematics="axisymmetric")) as run:
         expected = run.columns["press force"][-1]
     with _run_of(pressed(revolved(socket_sketch(size), 1), _QUARTER, symmetry=4)) as run:
@@ -172,18 +169,16 @@ FORMS = {
 
 def main(arguments: Sequence[str]) -> None:
     """Print the table of the forms and sizes that the ``arguments`` name."""
-    chosen = [name for name in arguments if name in FORMS] or list(FORMS)
-    sizes = [float(word) for word in arguments if word not in FORMS]
+    chosen, sizes = named(arguments, FORMS)
     table = Table("form", "size", "quantity", "by", "expected", "archord", "off", "goal", left=1)
-    for name in chosen:
+    for name in chosen or FORMS:
         form = FORMS[name]
         for size in sizes or [form.size]:
             for found, goal in zip(form.compare(size), form.goals, strict=True):
-                off = found.ours / found.reference - 1
                 numbers = (
                     f"{found.reference:.6g}",
                     f"{found.ours:.6g}",
-                    f"{off:+.1e}",
+                    f"{found.ours / found.reference - 1:+.1e}",
                     f"{goal:g}",
                 )
                 table.add(name, f"{size:g}", found.what, found.by, *numbers)

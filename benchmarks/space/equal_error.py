@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from archord.benchmarks.case import named
 from archord.benchmarks.peers.calculix import process
 from archord.benchmarks.space.case import PRESS, Case
 from archord.benchmarks.space.joints import CASES
@@ -171,12 +172,11 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="cases, and sizes of elements")
     parser.add_argument("--into", type=Path, help="folder of the work-precision benchmark")
     given = parser.parse_args()
-    chosen = [name for name in given.names if name in GOALS] or list(GOALS)
-    sizes = [float(word) for word in given.names if word not in GOALS] or SIZES
+    chosen, sizes = named(given.names, GOALS)
     headings = [f"{code}: {what}" for code in CODES for what in ("error [%]", "s")]
     table = Table("case", "size", "dofs", *headings, "times", left=1)
-    for name in chosen:
-        found = points(CASES[name], sizes)
+    for name in chosen or GOALS:
+        found = points(CASES[name], sizes or SIZES)
         for row in rows(name, found):
             table.add(*row)
         if given.into:

@@ -33,6 +33,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from archord.benchmarks.case import named
 from archord.benchmarks.space.joints import CASES
 from archord.geometry.meshes.cells import n_corners
 from archord.geometry.meshes.fenicsx import boxes, gathered, sectors
@@ -121,13 +122,11 @@ def _own_and_shared(cells: np.ndarray, part: np.ndarray, n_parts: int) -> tuple[
 
 def main(arguments: Sequence[str]) -> None:
     """Print the table of the case and the sizes that the ``arguments`` name."""
-    name = next((name for name in arguments if name in CASES), "elastic")
-    words = (*CASES, _OF_PARTS)
-    sizes = [float(size) for size in arguments if size not in words] or [1.2, 0.9, 0.7]
     of_parts = _OF_PARTS in arguments
+    names, sizes = named([word for word in arguments if word != _OF_PARTS], CASES)
     table = Table(*(_PARTS_HEADINGS if of_parts else _HEADINGS))
-    for size in sizes:
-        problem = CASES[name].problem(size)
+    for size in sizes or [1.2, 0.9, 0.7]:
+        problem = CASES[names[0] if names else "elastic"].problem(size)
         for cells in rows_of_parts(problem) if of_parts else [row(System(problem))]:
             table.add(*cells)
     if MPI.COMM_WORLD.rank == 0:

@@ -215,7 +215,7 @@ def fit_curve(
         moved, _ = solve(scaled(extrapolated), free)
         mesh = [abs(new - value) for new, value in zip(moved, values, strict=True)]
     residuals = tuple(
-        Residual(run.name, run.delta[rows] / run.dR, measured, fitted)
+        Residual(run.name, run.x[rows], measured, fitted)
         for (run, rows), measured, fitted in zip(chosen, data, law(values), strict=True)
     )
     dof = sum(map(len, data)) - len(free)
@@ -241,7 +241,7 @@ def _joint(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
 def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.bool_]:
     """Which steps ``(n,)`` of ``run`` lie in the range of ``delta/dR``, ends included. Raises
     `InputError` if none."""
-    load = run.delta / run.dR
+    load = run.x
     slack = 1e-9
     touching = (run.P > 0) & (run.p0 > 0)
     if not touching.any():
@@ -263,7 +263,7 @@ def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.
 
 def _scale(quantity: str, run: RunCurve) -> float:
     """What makes a quantity dimensionless."""
-    return run.E_star * run.dR / (1.0 if quantity == "P" else run.R)
+    return run.unit / (1.0 if quantity == "P" else run.R)
 
 
 @dataclass(frozen=True)

@@ -167,11 +167,9 @@ class NodeRun:
         """That of a ``run`` which has all its steps."""
         curve = run.curve
         each = curve.scene.load.stage_steps
-        unit = curve.E_star * curve.dR
-        x = curve.delta / curve.dR
-        y = curve.P / unit
-        peak = curve.p0 * curve.R / unit
-        of_steps = np.column_stack([x, y, peak, curve.eps])
+        y = curve.P / curve.unit
+        peak = curve.p0 * curve.R / curve.unit
+        of_steps = np.column_stack([curve.x, y, peak, curve.eps])
         last_of_stages = np.cumsum(each) - 1
         first_of_stages = [0, *last_of_stages[:-1] + 1]
         cut = np.add.reduceat(run.columns["cutbacks"], first_of_stages) > 0
