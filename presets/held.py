@@ -3,7 +3,7 @@ body."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, combinations, product
 
 import numpy as np
@@ -27,6 +27,9 @@ _APART = 0.01  # of the same: a gap between tied surfaces that is told of
 _ALIKE = 2.0  # ratio of a drawn overlap and an interference, up to which they mean the same fit
 _ADDS = 0.1  # of a fit: a drawn gap or overlap by which it is another one
 _ON_AXIS = 1e-9  # of the size of the mesh: a radius that is none
+# what is said of facets within a body, along which a load is spread, or which are moved
+_NOT_LOADED = ", where nothing can load them: give it the facets of the boundary alone"
+_HALF_HELD = ": look whether its elements are numbered as the set takes them"
 _BENT = 0.01  # of the length of an edge: how far it may depart from a line and be straight
 
 
@@ -53,11 +56,11 @@ def check(problem: Problem) -> list[str]:
             beyond_axis(whole.x) if around_axis else [],
             _pressed_axis(problem, whole) if around_axis else [],
             _shared(problem, whole, owner),
-            _half_loaded(problem, whole),
+            _within(whole, _spread(problem), _NOT_LOADED),
             _loose(moves, touching, excused),
         )
         failure = next(faults, "")
-        doubts += _half_held(problem, whole)
+        doubts += _within(whole, _moved(problem), _HALF_HELD)
         doubts += _sliding(problem, owner, moves) if in_space else []
         doubts += _moved_in_contact(problem, whole)
         doubts += _stiffened(problem, whole)
@@ -117,11 +120,11 @@ def _moved(problem: Problem) -> dict[str, str]:
     return found | {support.on: support.name for support in _supports(problem)}
 
 
-def _half_loaded(problem: Problem, whole: MeshArrays) -> Iterator[str]:
-    """What is said of facets inside a body along which a load is to be spread."""
-    for name in sorted(_spread(problem)):
+def _within(whole: MeshArrays, names: Iterable[str], then: str) -> Iterator[str]:
+    """What is said of facets inside a body in the sets of these ``names``, and ``then``."""
+    for name in sorted(names):
         for said in facets_within(whole, name):
-            yield f"{said}, where nothing can load them: give it the facets of the boundary alone"
+            yield f"{said}{then}"
 
 
 def _pressed_axis(problem: Problem, whole: MeshArrays) -> Iterator[str]:
@@ -130,19 +133,12 @@ def _pressed_axis(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     for load in _loads(problem):
         if load.kind != "pressure":
             continue
-        corners = _corners(whole, whole.facet_sets[load.on])
+        corners = _corners(whole, load.on)
         if np.abs(whole.x[corners, 0]).max(initial=0.0) <= _ON_AXIS * size:
             yield (
                 f"the pressure {load.name!r} is on {load.on!r}, which lies on the axis x = 0 and "
                 "has no area there, so that it would load nothing: give it a surface off the axis"
             )
-
-
-def _half_held(problem: Problem, whole: MeshArrays) -> Iterator[str]:
-    """Warnings of facets inside a body in a set whose other facets are on the boundary."""
-    for name in sorted(_moved(problem)):
-        for said in facets_within(whole, name):
-            yield f"{said}: look whether its elements are numbered as the set takes them"
 
 
 def _stiffened(problem: Problem, whole: MeshArrays) -> Iterator[str]:
@@ -151,7 +147,7 @@ def _stiffened(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     for load in _loads(problem):
         if load.kind != "force" or load.on not in whole.facet_sets:
             continue
-        corners = _corners(whole, whole.facet_sets[load.on])
+        corners = _corners(whole, load.on)
         x = whole.x[np.unique(corners)]
         extents = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
         if extents[-1] > _BENT * extents[0]:
@@ -170,8 +166,8 @@ def _moved_in_contact(problem: Problem, whole: MeshArrays) -> Iterator[str]:
     smooth = [part for part in problem.interactions if not _is_tied(part)]
     surfaces = [(part.name, name) for part in smooth for name in _surfaces(part)]
     for (on, by), (part, surface) in product(_moved(problem).items(), surfaces):
-        there = np.isin(whole.tags, whole.facet_sets.get(on, ()))
-        touching = np.isin(whole.tags, whole.facet_sets[surface])
+        there = whole.within(on)
+        touching = whole.within(surface)
         both = there & touching
         only_moved = there & ~touching
         only_touching = touching & ~there
@@ -195,8 +191,7 @@ def _shared(problem: Problem, whole: MeshArrays, owner: dict[str, str]) -> Itera
     for (first, one, faced), (second, other, also) in combinations(surfaces, 2):
         if first == second or faced != also:
             continue
-        tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
-        common = whole.facets[np.isin(whole.tags, [*tags])]
+        common = whole.facets[whole.within(one) & whole.within(other)]
         if len(common):
             at = _middle(whole, common[0])
             yield (
@@ -226,7 +221,7 @@ def _free(
     links: list[tuple[str, str, Array, Array]] = []
     for part in problem.interactions:
         names = _surfaces(part)
-        corners = whole.x[_corners(whole, whole.facet_sets[names[-1]])]
+        corners = whole.x[_corners(whole, names[-1])]
         middle = corners.mean(axis=1)
         sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
         frames = np.linalg.qr(sides, mode="complete")[0]  # the tangents, then the normal
@@ -382,17 +377,16 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
         yield f"{said}: of its interference of {wanted:g} only {left:.3g} presses them together"
 
 
-def _corners(whole: MeshArrays, tags: Sequence[int]) -> np.ndarray:
-    """The first corners ``(k, d)``, as many as span a facet, of the facets with these ``tags``."""
-    return whole.facets[np.isin(whole.tags, tags), : whole.dimension]
+def _corners(whole: MeshArrays, name: str) -> np.ndarray:
+    """The first corners ``(k, d)``, as many as span a facet, of the facets of a set."""
+    return whole.facets_of(name)[:, : whole.dimension]
 
 
 def _nodes(whole: MeshArrays, name: str, of_cells: bool = False) -> np.ndarray:
     """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone;
     none of another name."""
     if not of_cells and (name in whole.facet_sets or name in whole.point_sets):
-        in_set = np.isin(whole.tags, whole.facet_sets.get(name, ()))
         points = whole.point_sets.get(name, ())
-        return np.union1d(whole.facets[in_set], points).astype(np.int64)
+        return np.union1d(whole.facets_of(name), points).astype(np.int64)
     in_set = np.isin(whole.bodies, whole.cell_sets.get(name, ()))
     return np.unique(whole.cells[in_set])

@@ -79,21 +79,15 @@ class Bearing:
         around = [np.cos(k * angle) for k in range(_COSINES + 1)]
         along = [beside, beside**2, beside * np.cos(angle)]
         moved = (pin.coordinates[..., 0] - pin.X[..., 0])[inside]
-        w = np.sqrt(pin.weight[inside])
-        functions = w[:, None] * np.stack(around + along, axis=1)
-        coefficients, *_ = np.linalg.lstsq(functions, w * moved, rcond=None)
-        return float(coefficients[0])
+        return _first_of_fit(around + along, moved, pin.weight[inside])
 
     def peak(self, state: Accepted, strip: Strip) -> float:
         """The pressure on the load axis in a ``strip``, by an even parabola around it."""
         eps = state.once(f"{self.contact} eps", lambda: self.semi_angle(state))
         angle, pressure, weight = self._points(state, strip)
         near = angle <= max(_PEAK_FRACTION * eps, _LEAST)
-        w = np.sqrt(weight[near])
-        parabola = np.stack([w, w * angle[near] ** 2], axis=1)
-        coefficients, *_ = np.linalg.lstsq(parabola, w * pressure[near], rcond=None)
-        peak, _ = coefficients
-        return max(float(peak), 0.0)
+        parabola = [angle[near] ** 0, angle[near] ** 2]
+        return max(_first_of_fit(parabola, pressure[near], weight[near]), 0.0)
 
     def largest(self, state: Accepted, strip: Strip) -> float:
         """The largest mean pressure of a piece of a ``strip``."""
@@ -115,6 +109,15 @@ class Bearing:
         both_sides = zip(*found, strict=True)
         angle, pressure, weight = (np.concatenate(parts) for parts in both_sides)
         return angle, pressure, weight
+
+
+def _first_of_fit(functions: list[Array], values: Array, weight: Array) -> float:
+    """The coefficient of the first of ``functions`` ``(k,)`` whose sum fits ``values`` ``(k,)``
+    best, each by its ``weight``."""
+    w = np.sqrt(weight)
+    weighted = w[:, None] * np.stack(functions, axis=1)
+    coefficients, *_ = np.linalg.lstsq(weighted, w * values, rcond=None)
+    return float(coefficients[0])
 
 
 def mean_over(angle: Array, values: Array, weight: Array, span: float) -> float:

@@ -215,8 +215,8 @@ def _analysis(problem: Problem) -> ByName:
         "max_iterations": problem.max_iterations,
         "symmetry": symmetry,
     }
-    for key, attribute in (("kinematics", "kinematics"), ("gamma_factor", "gamma_factor")):
-        given = {getattr(part, attribute) for part in problem.interactions}
+    for key in ("kinematics", "gamma_factor"):
+        given = {getattr(part, key) for part in problem.interactions}
         if len(given) > 1:
             raise InputError(f"archord.Problem: interactions must have one {key}, not {given}.")
         if given:

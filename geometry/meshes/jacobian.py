@@ -8,8 +8,7 @@ which brings coefficients and values together.
 
 from __future__ import annotations
 
-from functools import cache
-from math import factorial
+from functools import cache, partial
 
 import basix
 import numpy as np
@@ -91,27 +90,15 @@ def _points(kind: basix.CellType, degree: int) -> Array:
 @cache
 def _bernstein_of_values(kind: basix.CellType, degree: int) -> Array:
     """The matrix ``(q, q)`` from values at the nodes to Bernstein coefficients."""
-    X = _points(kind, degree).T[:, :, None]  # (d, q, 1)
-    d = len(X)
-    powers: np.ndarray = np.indices((degree + 1,) * d).reshape(d, -1)
+    X = _points(kind, degree)
+    polynomials = partial(basix.tabulate_polynomials, basix.PolynomialType.bernstein)
     if is_simplex(kind):
-        powers = powers[:, powers.sum(axis=0) <= degree]
-        rest = degree - powers.sum(axis=0)
-        first = np.prod(X ** powers[:, None], axis=0)
-        last = (1 - X.sum(axis=0)) ** rest
-        choices = _choose(degree, *powers, rest)
-        values = choices * first * last
-    else:
-        along = [_choose(degree, i, degree - i) * x**i for x, i in zip(X, powers, strict=True)]
-        back = np.prod((1 - X) ** (degree - powers[:, None]), axis=0)
-        values = np.prod(along, axis=0) * back
+        return np.linalg.inv(polynomials(kind, degree, X).T)
+    values: Array = np.ones((len(X), 1))
+    for x in X.T:
+        along = polynomials(basix.CellType.interval, degree, x[:, None]).T
+        values = (values[:, :, None] * along[:, None]).reshape(len(X), -1)
     return np.linalg.inv(values)
-
-
-def _choose(degree: int, *parts: np.ndarray) -> Array:
-    """Multinomial coefficients of ``degree`` over ``parts`` ``(k,)``."""
-    factorials = np.array([factorial(n) for n in range(degree + 1)], dtype=float)
-    return factorials[degree] / np.prod(factorials[np.array(parts)], axis=0)
 
 
 @cache

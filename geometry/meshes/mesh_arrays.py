@@ -4,7 +4,7 @@ it."""
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -97,8 +97,7 @@ class MeshArrays:
         _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
         kept = np.sort(first)
         place_of = np.searchsorted(kept, first[which.ravel()])
-        ends = np.cumsum([len(nodes) for nodes in listed])
-        members = np.split(place_of, ends[:-1])
+        members = split(place_of, listed)
         node_tags, x, _ = gmsh.model.mesh.getNodes()
         order = np.argsort(node_tags)
 
@@ -161,7 +160,11 @@ class MeshArrays:
 
     def facets_of(self, name: str) -> np.ndarray:
         """Nodes ``(k, b)`` of the facets of a set; none if there is no such set."""
-        return self.facets[np.isin(self.tags, self.facet_sets.get(name, ()))]
+        return self.facets[self.within(name)]
+
+    def within(self, name: str) -> np.ndarray:
+        """Which of the `facets` are in a set; none if there is no such set."""
+        return np.isin(self.tags, self.facet_sets.get(name, ()))
 
     def with_sets(self, sets: Mapping[str, Sequence[str]]) -> MeshArrays:
         """This mesh with more facet ``sets``, each made of others. Raises ValueError for others
@@ -211,6 +214,12 @@ class MeshArrays:
         return replace(self, x=x)
 
 
+def split(joined: np.ndarray, parts: Iterable[Sized]) -> list[np.ndarray]:
+    """What is ``joined`` of ``parts`` of these lengths."""
+    ends = np.cumsum([len(part) for part in parts])
+    return np.split(joined, ends[:-1])
+
+
 def _counted(names: Iterable[str]) -> dict[str, int]:
     return {name: number for number, name in enumerate(names, 1)}
 
@@ -223,8 +232,7 @@ def _sides_of_sets(
     if not sets:
         return {}
     corners = new[np.concatenate(list(sets.values()))]
-    ends = np.cumsum([len(of_set) for of_set in sets.values()])
-    members = np.split(sides_between(kind, cells, corners), ends[:-1])
+    members = split(sides_between(kind, cells, corners), sets.values())
     return dict(zip(sets, members, strict=True))
 
 
@@ -236,8 +244,7 @@ def _one_tag_each(
 
     A member of one set has the set's number. Members of the same several sets share a new one.
     """
-    none = np.zeros(0, dtype=np.int64)
-    members = np.concatenate([none, *sets.values()]).astype(np.int64)
+    members = np.concatenate([_NONE, *sets.values()]).astype(np.int64)
     sizes = [len(found) for found in sets.values()]
     set_of = np.repeat(np.arange(len(sets)), sizes)
     distinct, first, which = np.unique(members, return_index=True, return_inverse=True)

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archord.materials.kinematics import kinematics
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arrays.fields import Fields
@@ -78,7 +77,7 @@ def field_panel(axes: Any, run: Run, step: int | None = None, field: str = "") -
 
 def frame(axes: Any, run: Run) -> None:
     """Name the coordinates of a panel that shows the bodies."""
-    across, up = kinematics(run.scene.analysis.plane).axes
+    across, up = run.kinematics.axes
     length = run.scene.units.length
     axes.set(aspect="equal", xlabel=f"{across} [{length}]", ylabel=f"{up} [{length}]")
 
@@ -235,7 +234,7 @@ def field_words(run: Run, name: str) -> tuple[str, float]:
         unit = row.unit
         if name == row.name:
             said = row.label
-    said = said.format(*kinematics(run.scene.analysis.plane).axes)
+    said = said.format(*run.kinematics.axes)
     if not unit:
         return said, 1.0
     unit_name = unit.format(**run.scene.units.model_dump())

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from archord.materials.kinematics import kinematics
 from archord.output.cell_fields import row_of
 from archord.postprocess.probes.edge import along_edge
 from archord.postprocess.probes.line import along_line
@@ -36,7 +35,7 @@ def probe(run: Probed, edge: str, quantity: str, step: int, line: Sequence[float
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
-    kind = kinematics(run.scene.analysis.plane)
+    kind = run.kinematics
     if line:
         quantity = quantity or "von_mises"
         found = along_line(run, line, quantity, step)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.vectors import unit
-from archord.materials.kinematics import kinematics
 from archord.materials.material import Array, Arrays
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.probes.angles import angles_about, rising
@@ -32,7 +31,7 @@ def along_edge(run: Probed, edge: str, quantity: str, step: int) -> Along:
     if fields.stress is not None:
         stress = fields.stress[nodes]
         stresses = _stresses(stress, tangent)
-        if kinematics(run.scene.analysis.plane).has_hoop:
+        if run.kinematics.has_hoop:
             stresses["along"] = stresses["hoop"]
             stresses["hoop"] = stress[..., 2]
     values = nodal(run, fields, quantity, nodes, **stresses)

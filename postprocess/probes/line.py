@@ -52,9 +52,18 @@ def _values(run: Probed, fields: Fields, x: Array, quantity: str) -> Array:
         of_cells = None
     if x.shape[1] == 3:
         return _in_cells(run, fields, x, quantity, of_cells)
-    if of_cells is None:
-        return _between_nodes(fields, x, nodal(run, fields, quantity))
-    return _of_cells(fields, x, of_cells)
+    values = nodal(run, fields, quantity) if of_cells is None else of_cells
+    found: Array = np.full(len(x), np.nan)
+    for body in fields.bodies.values():
+        cells = np.flatnonzero(fields.body == body)
+        nodes = fields.triangles[cells]
+        triangle, weights = _in_triangles(fields.coordinates[nodes.reshape(-1, 3)], x)
+        if of_cells is None:  # linear in the triangles that cells are drawn by
+            here = (weights * values[nodes.reshape(-1, 3)[triangle]]).sum(axis=1)
+        else:
+            here = values[cells[triangle // nodes.shape[1]]]
+        found = np.where(np.isnan(found) & (triangle >= 0), here, found)
+    return found
 
 
 def _least(quantity: str) -> float:
@@ -76,33 +85,6 @@ def _in_cells(
     else:
         values = np.einsum("ka,ka->k", weights, nodal(run, fields, quantity, nodes))
     return np.where(cell >= 0, values, np.nan)
-
-
-def _between_nodes(fields: Fields, x: Array, values: Array) -> Array:
-    """Nodal ``values`` at ``x`` ``(k, 2)``, linear in the triangles that cells are drawn by, NaN
-    outside the bodies."""
-    found: Array = np.full(len(x), np.nan)
-    for body in fields.bodies.values():
-        nodes = fields.triangles[fields.body == body].reshape(-1, 3)
-        triangle, weights = _in_triangles(fields.coordinates[nodes], x)
-        at_corners = values[nodes[triangle]]
-        here = (weights * at_corners).sum(axis=1)
-        found = np.where(np.isnan(found) & (triangle >= 0), here, found)
-    return found
-
-
-def _of_cells(fields: Fields, x: Array, values: Array) -> Array:
-    """The ``values`` of the cells in which ``x`` ``(k, 2)`` lie, NaN outside the bodies."""
-    found: Array = np.full(len(x), np.nan)
-    for body in fields.bodies.values():
-        cells = np.flatnonzero(fields.body == body)
-        triangles = fields.triangles[cells]
-        corners = fields.coordinates[triangles.reshape(-1, 3)]
-        triangle, _ = _in_triangles(corners, x)
-        cell = cells[triangle // triangles.shape[1]]
-        here = values[cell]
-        found = np.where(np.isnan(found) & (triangle >= 0), here, found)
-    return found
 
 
 def _in_triangles(corners: Array, x: Array) -> tuple[np.ndarray, Array]:

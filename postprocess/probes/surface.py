@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.materials.kinematics import kinematics
 from archord.postprocess.arrays.arc import undeformed
 from archord.postprocess.probes.angles import angles_about, rising
 from archord.postprocess.probes.probed import Along, Probed
@@ -44,7 +43,7 @@ def along_surface(run: Probed, edge: str, quantity: str, step: int) -> Along:
     if circle is None:
         return found
     centre, radius = circle
-    lengths = arc.weight / kinematics(run.scene.analysis.plane).measure(x)  # the weights of areas
+    lengths = arc.weight / run.kinematics.measure(x)  # the weights of areas
     length = lengths.sum(axis=1)
     middle = angles_about(np.einsum("fq,fqi->fi", lengths / length[:, None], x), centre)
     half = np.degrees(length / (2 * radius))

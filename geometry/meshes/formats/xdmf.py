@@ -14,7 +14,7 @@ from dolfinx.cpp.io import perm_vtk
 from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE, dimension_of
 from archord.geometry.meshes.cells import corners_of, in_basix_order, n_corners
 from archord.geometry.meshes.formats.beside import beside
-from archord.geometry.meshes.mesh_arrays import MeshArrays, require_known
+from archord.geometry.meshes.mesh_arrays import MeshArrays, require_known, split
 from archord.report.readable import require_memory
 
 _KINDS = {  # by how the names of topologies start
@@ -69,8 +69,7 @@ def read_xdmf(path: Path) -> MeshArrays:
     _, first, which = np.unique(
         np.concatenate(parts), axis=0, return_index=True, return_inverse=True
     )
-    ends = np.cumsum([len(part) for part in parts[:-1]])
-    _, *members = np.split(first[which.ravel()], ends)
+    _, *members = split(first[which.ravel()], parts)
     x, cells = in_basix_order(kind, x, cells.astype(np.int64), perm_vtk)
     return MeshArrays.of_sets(
         kind,
