@@ -106,7 +106,7 @@ def paper_joint(
     drops a key.
     """
     solid = {"E": E, "nu": 0.3} | ({"yield_stress": yield_stress} if yield_stress else {})
-    data: dict = {
+    data = {
         "joint": {"radius": 1.0, "clearance": 0.005, "element_size": element_size},
         "pin": solid,
         "block": solid,

@@ -39,7 +39,7 @@ def by_size(folder: Path) -> dict[LawJoint, dict[float, Array]]:
 def mesh_table(folder: Path) -> Table:
     """Errors of P by kind of joint and size of the elements, in per cent of P on the finest
     mesh."""
-    errors: dict[tuple[str, float], list[Array]] = defaultdict(list)
+    errors = defaultdict(list)
     for joint, solved in by_size(folder).items():
         finest = solved[min(solved)]
         usual = (finest[:, 0] >= _USUAL[0]) & (finest[:, 0] <= _USUAL[1])

@@ -20,7 +20,6 @@ from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.hardening_model import kind, strains
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.yield_model import elastic_pressure
-from archord.report.by_name import ByName
 from archord.report.table import Table
 from archord.scene.sections.plasticity import hardening_law
 from archord.studies.hardening_design import drawn
@@ -53,7 +52,7 @@ def law_joint(joint: Drawn) -> LawJoint:
     numbers = joint.numbers
     clearance = numbers.clearance
     pin_nu, nu = numbers.poisson
-    given: ByName = {"plane": numbers.plane, "pin_share": numbers.p}
+    given = {"plane": numbers.plane, "pin_share": numbers.p}
     for body, s in numbers.yielding._asdict().items():
         if f"{body}.hardening" in joint.own:
             law = hardening_law(s * clearance, joint.own[f"{body}.hardening"], 1.0)

@@ -41,7 +41,7 @@ def _solve(scene: Scene) -> tuple[list[Record], str]:
 def main() -> None:
     """Solve the cases and print the table."""
     table = Table("what", "reference", "by", "archord", "relative difference", "cost")
-    runs: list[list[Record]] = []  # whose balances are told: the Hertzian one has a single step
+    runs = []  # whose balances are told: the Hertzian one has a single step
 
     def compare(what: str, reference: float, source: str, ours: float, cost: str) -> None:
         table.add(

@@ -9,7 +9,6 @@ draws the picture of the tables of a folder there, and prints the short tables.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,8 +91,8 @@ def draw(tables: dict[str, pd.DataFrame], file: Path) -> None:
     rows = -(-len(tables) // columns)
     figure = new_figure(wide * columns, high * rows)
     grid = figure.subplots(rows, columns, squeeze=False)
-    panels: Sequence[Axes] = grid.ravel()[: len(tables)]
-    spare: Sequence[Axes] = grid.ravel()[len(tables) :]
+    panels = grid.ravel()[: len(tables)]
+    spare = grid.ravel()[len(tables) :]
     for unused in spare:
         unused.set_axis_off()
     for ax, (case, table) in zip(panels, tables.items(), strict=True):

@@ -96,7 +96,7 @@ def sweep(
             say(f"{len(ended)} of {len(mine)} cases are there already")
         return design, mine, ended, left
 
-    found: list = []
+    found = []
     agreed(
         comm, lambda: found.append(prepared())
     )  # rank 0 keeps what it found: the others need none of it

@@ -158,7 +158,7 @@ def _mean_in_bodies(system: System, parts: Sequence[PointFields], row: CellField
 def _mean_on_contact(system: System, row: CellField) -> Array:
     """The means ``(cells,)``. A facet in two interactions, each with another body, has the sum of
     their values over its one area."""
-    whole: Array = np.zeros(system.bulk.n_cells)
+    whole = np.zeros(system.bulk.n_cells)
     found = []
     for pair in system.contact.pairs:
         surface = pair.surface

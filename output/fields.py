@@ -143,7 +143,7 @@ class FieldWriter:
             return {}
         values = [v.reshape(*v.shape[:2], -1) for v in at_points.values()]
         recovered = self._recovery(np.concatenate(values, axis=2))
-        found: Arrays = {}
+        found = {}
         column = 0
         for row in CELL_FIELDS:
             of_points = at_points.get(f"points/{row.name}")

@@ -110,7 +110,7 @@ def solve_scene(
         watched = nullcontext(interrupt) if interrupt else Interrupt()
         status = "done"
         message = ""
-        failed: ByName = {}
+        failed = {}
         received = 0
         try:
             with watched as account.system.equilibrium.evaluation.interrupt:

@@ -69,7 +69,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
     load = tables[0]["load"]
     margin = _SAME * np.abs(load).max()
     step_by_step = all(_same_loads(table["load"], load, margin) for table in tables)
-    between: np.ndarray = np.zeros((len(runs), len(load)), dtype=bool)
+    between = np.zeros((len(runs), len(load)), dtype=bool)
     if not step_by_step:
         tables = [_on_first_loading(table) for table in tables]
         load = _shared_loads([table["load"] for table in tables], margin)

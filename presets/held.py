@@ -218,7 +218,7 @@ def _free(
     """The rigid motions of each body that neither supports nor contact without friction prevent;
     but a turn of a body in contact in a plane."""
     held = _held_places(problem, whole, cells)
-    links: list[tuple[str, str, Array, Array]] = []
+    links = []
     for part in problem.interactions:
         names = _surfaces(part)
         corners = whole.x[_corners(whole, names[-1])]
@@ -281,7 +281,7 @@ def _held_places(
     directions ``(k, d)``, or motions ``(1, 6)`` about the point of a coupling in space."""
     d = whole.dimension
     facets = {c.name: c.facets for c in problem.couplings}
-    given: list[tuple[str, str]] = [(s.on, f) for s in _supports(problem) for f in s.held(d)]
+    given = [(s.on, f) for s in _supports(problem) for f in s.held(d)]
     displaced = [load for load in _loads(problem) if load.kind == "displacement"]
     given += [(load.on, str(load.direction)) for load in displaced]
     fixed = [support for support in problem.supports if isinstance(support, Dirichlet)]
@@ -308,7 +308,7 @@ def require_facing(system: System) -> list[str]:
     """Warnings of fits that are not as drawn. Collective; raises ValueError where surfaces of an
     interaction as drawn do not face each other, a tie has nothing to tie, or a fit is drawn and
     given as an interference, too."""
-    warnings: list[str] = []
+    warnings = []
     for interface in system.contact.interfaces:
         part = interface.interaction
         closest = np.inf

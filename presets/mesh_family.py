@@ -126,7 +126,7 @@ class ProblemFamily:
         dimension = 3 if self.scene.in_space else 2
         if level and self.dofs * self.ratio**dimension > _MOST_DOFS:
             return None
-        changes: ByName = {"refine": self.scene.mesh.refine + level}
+        changes = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _FIRST_OF_SHAPE / self.ratio**level
             changes = {"shape": resized(self.shape, factor * self.shape.h, factor)}

@@ -21,7 +21,6 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.rigid_in_space import RigidBall, RigidCylinder
 from archord.materials.kinematics import kinematics
 from archord.presets.mesh_family import coarser
-from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene import parts
 from archord.scene.problem import ProblemScene
@@ -67,7 +66,7 @@ def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
     data = plain(scene)
     analysis = data.get("analysis", {})
     data["analysis"] = analysis | {"plane": "space" if in_space else "strain"}
-    make: Any = ProblemScene
+    make = ProblemScene
     return make(mesh_name(scene), None, **data)
 
 
@@ -187,7 +186,7 @@ def _load(load: parts.LoadSection) -> Load:
     core = None
     if load.core is not None:
         core = (tuple(load.core.centre), load.core.radius)
-    values: ByName = {load.kind: load.stages}
+    values = {load.kind: load.stages}
     return Load(load.name, load.on, load.direction, core=core, **values)
 
 

@@ -133,7 +133,7 @@ def mean_over(angle: Array, values: Array, weight: Array, span: float) -> float:
 
 def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
     """The measures of the preset in space whose shape the ``scene`` has; none of other scenes."""
-    shape: Any = scene.mesh.shape
+    shape = scene.mesh.shape
     if shape is None or shape.space is None:
         return
     stress = scene.units.stress

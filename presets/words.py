@@ -35,7 +35,7 @@ def words_of(problem: Problem, mesh_file: str, fields: str | bool = "nodes") -> 
     Materials and laws of one's own classes are told by class, representation and attributes. Raises
     `InputError` for what a scene refuses, and for conditions that it has no words for.
     """
-    make: Any = ProblemScene
+    make = ProblemScene
     return make("archord.Problem", None, **_sections(problem, mesh_file, fields))
 
 
@@ -150,7 +150,7 @@ def _own(part: Any) -> ByName:
 
 def _interaction(part: Interaction) -> ByName:
     disc = part.disc
-    words: ByName = {
+    words = {
         "name": part.name,
         "surfaces": [name for name in part.surfaces if isinstance(name, str)],
         "friction": part.friction,

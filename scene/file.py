@@ -40,7 +40,7 @@ def parse_scene(
 ) -> Scene:
     """The joint of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere.
     Raises `InputError`."""
-    scene: Any = Scene
+    scene = Scene
     return scene(source, origin, **data)
 
 
@@ -266,7 +266,7 @@ def put(data: ByName, section: str, name: str, value: Any, said: str) -> None:
 def require_key(section: str, name: str, said: str) -> None:
     """Raise `InputError`, beginning with ``said``, unless a kind of scene has the key ``name`` in
     this ``section``."""
-    kinds: list[Any] = [Scene, ProblemScene, *PRESETS.values()]
+    kinds = [Scene, ProblemScene, *PRESETS.values()]
     known = keys_of(kinds, section)
     if name in known:
         return

@@ -16,7 +16,7 @@ _NAMED = {
 def digests(mesh: Path) -> dict[str, str]:
     """SHA-256 of the file ``mesh``, by the name "", and of the files in its folder that it names,
     by their names. Raises OSError for a ``mesh`` that cannot be read."""
-    found: dict[str, str] = {}
+    found = {}
     left = [("", mesh)]
     while left:
         name, file = left.pop()

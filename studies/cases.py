@@ -284,7 +284,7 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         rows = combinations(varied)
     except InputError as error:
         raise InputError(path, error) from None
-    cases: list[Case] = []
+    cases = []
     faults: dict[str, list[int]] = {}
     for number, row in enumerate(rows, 1):
         try:
@@ -308,7 +308,7 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
 
 def factors(sweep: SweepFile) -> list[Factor]:
     """What is multiplied, the slowest first: list, zip, each key of the grid, Latin hypercube."""
-    found: list[Factor] = [("[[list]]", sweep.list_)] if sweep.list_ else []
+    found = [("[[list]]", sweep.list_)] if sweep.list_ else []
     if sweep.zip:
         rows = zip(*sweep.zip.values(), strict=True)
         found.append(("[zip]", [flattened(dict(zip(sweep.zip, row, strict=True))) for row in rows]))
@@ -353,10 +353,10 @@ def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
     """All dotted keys that vary. Raises `InputError` for one that no scene has or that cannot vary,
     and for a quantity that two factors give. Keys of a ``joint`` have two parts; the keys of other
     scenes may name a part between."""
-    keys: list[str] = []
+    keys = []
     given: dict[tuple[str, str], str] = {}
     for source, choices in found:
-        own: dict[tuple[str, str], str] = {}
+        own = {}
         for key in dict.fromkeys(key for choice in choices for key in choice):
             section, _, name = key.partition(".")
             if not name or ("." in name and joint):

@@ -87,7 +87,7 @@ def write_tables(sweep: Path, folder: Path) -> list[Path]:
     if not solved:
         raise ValueError(f"{sweep}: no joint is solved.")
     table = []
-    curves: list[dict[str, object]] = []
+    curves = []
     for number, (numbers, runs) in enumerate(solved, 1):
         table.append({"joint": number} | _written(NUMBERS, numbers))
         curves += [{"joint": number} | row for row in _curve(numbers, runs)]
@@ -111,7 +111,7 @@ def _curve(numbers: Numbers, runs: Sequence[NodeRun]) -> Iterable[dict[str, obje
     nodes = first_loading(list(runs))
     x, y, p0, eps = nodes.T
     mesh = _mesh_error(numbers, x)
-    errors: Array = np.hypot(mesh, _step_error(runs, nodes))
+    errors = np.hypot(mesh, _step_error(runs, nodes))
     for values in zip(x, y, errors * y, p0, eps, strict=True):
         yield _row("loading", *values)
     for run in runs:

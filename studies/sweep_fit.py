@@ -80,7 +80,7 @@ def fit_sweep(folder: Path, load_range: tuple[float, float]) -> SweepFit:
     """Fit k and c to P(delta) of every distinct case of the sweep in ``folder``, on its finest
     mesh, over ``load_range`` in clearances. Raises `InputError` where no case can be fitted."""
     distinct = read_sweep(folder / FILE).distinct
-    of: dict[str, str] = {}  # the names of the cases by the names of their curves
+    of = {}  # the names of the cases by the names of their curves
     runs = []
     rows = []
     left_out = []

@@ -81,7 +81,7 @@ def row(line: Line) -> dict[str, object]:
     point = line.point
     found = line.found
     errors = line.errors
-    entries: dict[str, object] = {
+    entries = {
         "code": point.code,
         "series": point.series,
         "mesh": f"{point.size:g} R",

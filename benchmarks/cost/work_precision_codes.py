@@ -154,7 +154,7 @@ def profile_error(pressure: Array, reference: Array) -> float:
 
 def quantities_of(run: Run) -> ByName:
     """What a ``run`` of the paper's joint found at its last step."""
-    found: ByName = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
+    found = {name: run.columns[column][-1] for name, column in _COLUMNS.items()}
     # the unbiased contact integrates one half of the pressure on either side
     sides = [_profile_of(arc, run.scene.plastic) for arc in run.contact().values()]
     return found | {"profile": np.mean(sides, axis=0), "dofs": run.summary["mesh"]["dofs"]}

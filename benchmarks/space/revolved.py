@@ -39,7 +39,7 @@ def _draw_faces(sketch: Sketch, gmsh: Any) -> dict[str, list[int]]:
         occ.addPoint(*place, 0.0)
     for start, stop, *centre in sketch.curves:
         (occ.addCircleArc if centre else occ.addLine)(start, *centre, stop)
-    drawn: dict[str, list[int]] = {}
+    drawn = {}
     for body, faces in sketch.faces.items():
         loops = [occ.addCurveLoop(sketch.around_face(face)) for face in faces]
         drawn[body] = [occ.addPlaneSurface([loop]) for loop in loops]

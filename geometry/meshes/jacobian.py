@@ -94,7 +94,7 @@ def _bernstein_of_values(kind: basix.CellType, degree: int) -> Array:
     polynomials = partial(basix.tabulate_polynomials, basix.PolynomialType.bernstein)
     if is_simplex(kind):
         return np.linalg.inv(polynomials(kind, degree, X).T)
-    values: Array = np.ones((len(X), 1))
+    values = np.ones((len(X), 1))
     for x in X.T:
         along = polynomials(basix.CellType.interval, degree, x[:, None]).T
         values = (values[:, :, None] * along[:, None]).reshape(len(X), -1)

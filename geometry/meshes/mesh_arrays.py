@@ -283,7 +283,7 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
     none."""
     groups = {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
-        of_type: dict[int, list[np.ndarray]] = defaultdict(list)
+        of_type = defaultdict(list)
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
             types, _, found = gmsh.model.mesh.getElements(dim, entity)
             for number, nodes in zip(types, found, strict=True):

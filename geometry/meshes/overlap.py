@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import permutations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from archord.geometry.meshes.cells import along, outer_sides, side_kind
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import place
 from archord.geometry.patches import Patches
-from archord.report.by_name import ByName
 
 # of a side: how deep bodies may overlap by their sides being straight, or curved
 _INTO_STRAIGHT = 0.02
@@ -155,8 +154,8 @@ def overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
     """Boundary vertices of a body, or middles of its cells there, that lie in another by more than
     is ``allowed``."""
     into = _INTO_CURVED if mesh.order > 1 else _INTO_STRAIGHT
-    outline: Any = _Outline if mesh.dimension == 2 else _Hull
-    outlines: ByName = {}
+    outline = _Outline if mesh.dimension == 2 else _Hull
+    outlines = {}
     for body, cells in inside.items():
         with suppress(ValueError):  # of a body in space whose boundary meets itself along an edge
             outlines[body] = outline.of(mesh, mesh.cells[cells])

@@ -201,8 +201,7 @@ def _widths(mesh: MeshArrays) -> Array:
     ends = mesh.x[edges[:, :2]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     longest = lengths.reshape(len(mesh.cells), -1).max(axis=1)
-    width: Array = (measures(mesh) / longest**d) ** (1 / (d - 1))
-    return width
+    return (measures(mesh) / longest**d) ** (1 / (d - 1))
 
 
 def poor_cells(mesh: MeshArrays, good: Quality) -> list[str]:

@@ -125,7 +125,7 @@ class TaggedMesh:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
         behind = np.isin(self.cells.indices, self.cells_behind(name))
         here = np.unique(self.cells.values[behind]).tolist()
-        parts: list[list[int]] = self.mesh.comm.allgather(here)
+        parts = self.mesh.comm.allgather(here)
         return set().union(*parts)
 
 

@@ -52,7 +52,7 @@ def read_contact(folder: str | Path, scene: Any, step: int) -> ByName:
         }
         if not any("angle" in arrays for arrays in found.values()):
             in_space = scene.analysis.plane == "space"
-            make: Any = PatchProfile if in_space else SurfaceProfile
+            make = PatchProfile if in_space else SurfaceProfile
             return {name: make(**arrays) for name, arrays in found.items()}
         profiles = {}
         for name in _OF_ARCS:

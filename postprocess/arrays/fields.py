@@ -127,7 +127,7 @@ class Fields:
         """The recovered fields of the nodes by name ``(n,)``, tensors by components, with the
         principal stresses "p1" to "p3" (the largest first), "principal_angle" (of the larger one in
         the plane, from the x axis) and "von_mises" of the stress."""
-        found: Arrays = {}
+        found = {}
         for name, values in self.nodal.items():
             if values.ndim == 1:
                 found[name] = values

@@ -42,7 +42,7 @@ class Moved:
 
 def moved_sets(system: System, mesh: DeckMesh) -> list[Moved]:
     """What supports and rigid discs move or hold."""
-    found: dict[tuple[str, int], Moved] = {}
+    found = {}
     drives = system.equilibrium.drives
     for support in system.problem.supports:
         name = support.facets

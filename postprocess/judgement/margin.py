@@ -117,7 +117,7 @@ def margins(
             raise InputError(f"{name} {value:g}: must be a positive number.")
     judged = _chosen(parts_of(run), part)
     applied = {"yield": load, "ultimate": load * factor}
-    strengths: dict[str, tuple[float, str]] = {}
+    strengths = {}
     checks = []
     if judged.by_hand is not no_sections:
         strengths = _strengths(run, judged, proof, tensile)
@@ -133,7 +133,7 @@ def margins(
         )
     else:
         last = _end_of_curve(body) if ultimate_peeq is None else ultimate_peeq
-        peeq: Array = np.asarray(run.columns[f"{body.name} peeq_max"])
+        peeq = np.asarray(run.columns[f"{body.name} peeq_max"])
         found, said = _by_elements(judged, peeq, applied, yield_peeq, last)
         checks += found
         notes += said
@@ -194,7 +194,7 @@ def _over_mesh(run: Run, part: Part, checks: Sequence[StrengthCheck]) -> list[st
     limits = {check.name: check.peeq for check in checks if check.peeq}
     if not limits:
         return []
-    largest: dict[str, list[float]] = defaultdict(list)
+    largest = defaultdict(list)
     for step in range(1, run.steps + 1):
         fields = run.fields(step)
         tag = fields.bodies[part.body.name]

@@ -22,7 +22,6 @@ from archord.postprocess.judgement.convergence import Order, Refined, group
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.report.by_name import ByName
 from archord.report.errors import InputError
 
 POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning
@@ -280,7 +279,7 @@ class Calibration:
         run = self.scenes[0].run
         found = self.joint.estimates
         parts = self.joint.residuals
-        numbers: ByName = {name: getattr(run, name) for name in ("E_star", "R", "dR", "plane")}
+        numbers = {name: getattr(run, name) for name in ("E_star", "R", "dR", "plane")}
         if not run.sigY:
             found.pop("c", None)
         for name, estimate in found.items():

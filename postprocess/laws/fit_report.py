@@ -20,7 +20,7 @@ _COLUMNS = ("run", "of", "value", "s.e.", "mesh", "95 % interval", "R2", "rms", 
 def parameters(calibration: Calibration) -> list[ByName]:
     """One row per fitted parameter, in numbers: value, errors (None where the mesh's is
     unknown), interval, quality of the fit."""
-    rows: list[ByName] = []
+    rows = []
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
     named += [("all together", calibration.joint)] if len(calibration.scenes) > 1 else []
     for run, fit in named:

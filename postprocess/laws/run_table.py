@@ -153,7 +153,7 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
         "angle": _cubic(x, steps.angle[touched] / root),
     }
     sharp = np.zeros(len(nodes))
-    tables: ByName = {"x": nodes, "toe": sharp, "touch": np.empty(0)}
+    tables = {"x": nodes, "toe": sharp, "touch": np.empty(0)}
     for name, cubic in cubics.items():
         tables[name], tables[f"d{name}"] = cubic.at(nodes)
     return tables | steps.units
@@ -230,7 +230,7 @@ def _errors_back(
     """Errors at the nodes of the way back from there, over the force it begins at; None of what
     does not yield and has not come back. And in words the errors of the unloadings that ``curve``
     is not made of."""
-    errors: dict[float, Array] = {}  # by the displacement that a way back begins at
+    errors = {}  # by the displacement that a way back begins at
     for way in _unloadings(steps, k):
         x = steps.x[way]
         y = steps.y[way]

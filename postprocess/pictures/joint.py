@@ -116,7 +116,7 @@ def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
         load = _load(scene, run.path[step - 1])
         for side, arc in arcs.items():
             angle, pressure = arc.facet_means()
-            style: ByName = {"ls": "-", "label": load}
+            style = {"ls": "-", "label": load}
             if both and side == "pin":
                 style = {"ls": "--"}
             axes.plot(np.degrees(angle), pressure, color=f"C{i}", lw=1.4, **style)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from archord.geometry.meshes.quality import measures, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.patches import Patches
 from archord.output.user_file import save_figure
-from archord.report.by_name import ByName
 from archord.report.figure import new_figure
 from archord.report.table import Table
 
@@ -145,7 +143,7 @@ def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
     around = [0, 1, 2] if mesh.kind == TRIANGLE else [0, 1, 3, 2]
     for k, (name, tags) in enumerate(mesh.cell_sets.items()):
         own = mesh.cells[np.isin(mesh.bodies, tags)]
-        style: ByName = {"facecolors": [faint(k % 8)], "zorder": -len(own)}
+        style = {"facecolors": [faint(k % 8)], "zorder": -len(own)}
         cells = PolyCollection(mesh.x[own][:, around], label=name, **style)
         axes.add_collection(cells)
     sides = mesh.x[along(sides_of(mesh.kind, mesh.cells))]
@@ -170,7 +168,7 @@ def _draw_solids(mesh: MeshArrays, target: Path) -> Path:
     from matplotlib import colormaps
 
     figure = new_figure(9.0, 8.0)
-    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    axes = figure.add_subplot(projection="3d", computed_zorder=False)
     faint = {"alpha": 0.25, "shade": False}
     outer, _ = outer_sides(mesh.kind, mesh.cells)
     axes.plot_trisurf(*mesh.x.T, triangles=_triangles(mesh, outer), color="0.9", **faint)

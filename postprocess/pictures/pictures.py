@@ -115,7 +115,7 @@ def panels_of(
         draw_contact = solids.contact_panel
     elif cut:
         raise InputError(run.folder, "is in a plane, where there is nothing to cut.")
-    draws: list[Callable[[Any], None]] = []
+    draws = []
     of_body = "" if edges and field in problems.OF_EDGES else field
     if run.scene.output.fields or of_body:
         first = numbers[0] if numbers else None

@@ -86,7 +86,7 @@ def shown_step(run: Run) -> int:
     """The step that a picture shows if none is asked for: the last one, but of a run that was
     unloaded by then the one with the largest load."""
     last = run.number(None)
-    sizes: Array = np.zeros(last)
+    sizes = np.zeros(last)
     for column in run.view.forces.values():
         force = np.abs(np.nan_to_num(run.columns[column]))
         if force.any():

@@ -100,7 +100,7 @@ def _pages_of(run: Run) -> Iterator[Figure]:
         f"{run.folder.resolve().name}: {run.status}, {run.steps} of {len(run.scene.targets)} steps"
     )
     room = _LINES
-    text: Any = figure
+    text = figure
     if run.scene.output.fields and run.kinematics.dimension == 2:
         mesh, text = figure.subfigures(2, 1, height_ratios=[1, 2.2])
         _draw_mesh(mesh.subplots(), run, run.fields(run.number(None)))

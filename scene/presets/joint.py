@@ -248,7 +248,7 @@ class Scene(Checked):
         """Warnings of keys that say nothing about this joint."""
         joint = self.joint
         load = self.load
-        found: list[str] = []
+        found = []
         if not joint.is_ring:
             found += unused(load, "load", "core_radius", 'joint.model = "ring"')
         if joint.edge_angle is None:

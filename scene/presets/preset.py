@@ -55,7 +55,7 @@ class Shape(Section):
     def arguments(self) -> ByName:
         """What draws it: lengths, and what is drawn."""
         found = self.model_dump(exclude={"space"}) | {"element_size": self.h}
-        space: Space | None = getattr(self, "space", None)
+        space = getattr(self, "space", None)
         return found if space is None else found | {"space": space.arguments()}
 
 

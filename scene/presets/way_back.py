@@ -32,7 +32,7 @@ def doubts_of_way_back(shape: Any, loads: Sequence[_Load]) -> Iterator[str]:
     not there."""
     if shape is None:
         return
-    places: tuple[str, ...] = _MOVED
+    places = _MOVED
     sign = 1.0
     cure = _WHOLE
     if shape.kind == "joint":

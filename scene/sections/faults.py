@@ -100,7 +100,7 @@ def _sentence(
     fault = context.get("error")
     if isinstance(fault, Fault):
         place += fault.place
-    value: Any = data.get(place[0])
+    value = data.get(place[0])
     label = _key_shown(place[0])
     if len(place) > 1 and isinstance(value, list):  # of tables, which are known by name or number
         at = (
@@ -147,7 +147,7 @@ def _kind_of(value: Any) -> Any:
 def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
     """What may stand in the place ``loc`` of an unknown key or section, and which of it may be
     meant."""
-    of_kind: ByName = {}
+    of_kind = {}
     place = [part for part in loc if isinstance(part, str)]
     for part in place[:-1]:
         if part in model.model_fields:

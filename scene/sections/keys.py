@@ -34,7 +34,7 @@ def key(
     that is absent (None) by default."""
     shown = example if other is None else other
     default = None if default is ... and other is not None else default
-    extra: Any = {
+    extra = {
         "unit": unit,
         "shown": default if shown is None else shown,
         "hidden": other is not None,

@@ -134,7 +134,7 @@ def _keys() -> ByName:
         for name, (kind, meaning) in law.parameters.items():
             types[name] = types[name] | kind if name in types else kind
             meanings.setdefault(name, []).append(f"{law.name}: {meaning}")
-    keys: ByName = {
+    keys = {
         name: (types[name] | None, key("; ".join(meanings[name]), default=None)) for name in types
     }
     names = Literal[tuple(law.name for law in LAWS)]  # type: ignore[valid-type]

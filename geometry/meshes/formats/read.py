@@ -164,7 +164,7 @@ def _read(source: str | Path | ModuleType, order: int, sizes: Sizes) -> MeshArra
             source.model.mesh.setOrder(order)
         return MeshArrays.from_gmsh(source)
     path = Path(source)
-    readers: dict[str, Callable[[Path], MeshArrays]] = {
+    readers = {
         ".msh": _read_gmsh,
         ".inp": read_abaqus,
         ".xdmf": read_xdmf,

@@ -25,7 +25,6 @@ from numpy.polynomial import chebyshev
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import line_contact
-from archord.report.by_name import ByName
 
 TABLE = Path(__file__).parent / "elastic_model.json"
 FARTHEST = 3.8  # delta/dR at the end of the polynomials; what is fitted ends at 3
@@ -136,7 +135,7 @@ class ElasticModel:
     @classmethod
     def from_json(cls, text: str) -> ElasticModel:
         """The model in ``text``, as `to_json` writes it."""
-        tables: ByName = {name: np.array(rows) for name, rows in json.loads(text).items()}
+        tables = {name: np.array(rows) for name, rows in json.loads(text).items()}
         return cls(**{name: Polynomials(rows[:, :4], rows[:, 4:]) for name, rows in tables.items()})
 
 

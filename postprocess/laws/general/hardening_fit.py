@@ -130,7 +130,7 @@ class Hardened:
             if np.isinf(self.numbers.yielding[i]):
                 continue
             body = BODIES[i]
-            higher: Array = found.s.copy()
+            higher = found.s.copy()
             higher[i] *= 1 + _SMALL
             of_higher = self.lost(higher, rises)
             of_s = (of_higher.force - lost.force) / _SMALL
@@ -160,7 +160,7 @@ def feedback(of: Array, numbers: Numbers, body: str, at: At) -> Array:
 def fit_strain(joints: list[Hardened], start: Model | None = None) -> Arrays:
     """The coefficients by plane and body, by Gauss and Newton's method, from the ``start`` of a fit
     to nearly the same joints: each joint counts like five points."""
-    model: Arrays = dict(start or {})
+    model = dict(start or {})
     for plane in sorted({joint.numbers.plane for joint in joints}):
         own = [joint for joint in joints if joint.numbers.plane == plane]
         names = [f"{plane} {body}" for body in BODIES]

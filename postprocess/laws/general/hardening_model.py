@@ -176,8 +176,7 @@ def terms(numbers: Numbers, body: str, at: At) -> Array:
     for k, name in enumerate(INPUTS):
         inputs[k] = of[name]
     one, other, third = _FACTORS.T
-    product: Array = inputs[one] * inputs[other] * inputs[third]
-    return product
+    return inputs[one] * inputs[other] * inputs[third]
 
 
 def begins_of(numbers: Numbers) -> Callable[[Array], Array]:
@@ -272,7 +271,7 @@ def hardened_loss(numbers: Numbers, given: Flows, x: Array) -> Loss:
     slope = spline_slopes(np.log(x), lost.force) / x
     peak = lost.peak + table["peak"][numbers.plane] * peak_rise(found, rises, lost)
     wrong = table["error"][kind(numbers)] * unsure(rises, lost)
-    error: Array = np.sqrt(lost.deviation**2 + wrong**2)
+    error = np.sqrt(lost.deviation**2 + wrong**2)
     way_error = np.hypot(lost.way_error, wrong)  # of the travel, too
     return lost._replace(slope=slope, deviation=error, peak=peak, way_error=way_error)
 
@@ -302,8 +301,7 @@ def block_leads(numbers: Numbers, given: Flows, x: Array) -> Array:
     found = strains(numbers, given, tuple(x))
     lacking = 1 - found.s[1] / found.s[0]
     _, rise = rises_of(given, found)
-    leads: Array = np.clip(lacking / _LEADS, 0.0, 1.0) * np.exp(-rise / _SPREADS)
-    return leads
+    return np.clip(lacking / _LEADS, 0.0, 1.0) * np.exp(-rise / _SPREADS)
 
 
 def felt(numbers: Numbers, s: Array, rises: Array) -> Yielding:
@@ -321,7 +319,7 @@ def unsure(rises: Array, lost: Loss) -> Array:
     large: ln of the rise of the curves, at least `_LEAST`, where `_YIELDED` of P and more is
     ``lost`` to yielding, and less before. ``rises`` ``(2, k)`` is what `rises_of` tells."""
     across = 2 * np.log(WIDE) * rises
-    of_curves: Array = np.sqrt(_LEAST**2 + (across**2).sum(axis=0))
+    of_curves = np.sqrt(_LEAST**2 + (across**2).sum(axis=0))
     return of_curves * _share(lost.force, _YIELDED)
 
 
@@ -339,8 +337,7 @@ def peak_rise(found: Strains, rises: Array, lost: Loss) -> Array:
 def _share(lost: Array, whole: float) -> Array:
     """How far the part that is lost, of which ``lost`` ``(k,)`` is the logarithm of the rest, comes
     to ``whole``; 1 beyond."""
-    share: Array = np.clip((1 - np.exp(lost)) / whole, 0.0, 1.0)
-    return share
+    return np.clip((1 - np.exp(lost)) / whole, 0.0, 1.0)
 
 
 @cache

@@ -133,7 +133,7 @@ def most_telling(design: Array, right: Array, number: int) -> list[int]:
     and Luo 1989)."""
     rest = design / np.linalg.norm(design, axis=0)
     missed = right.copy()
-    chosen: list[int] = []
+    chosen = []
     for _ in range(number):
         length = np.linalg.norm(rest, axis=0)
         if length.max() < _DEPENDENT:
@@ -233,8 +233,8 @@ def fit_law(
 ) -> tuple[ElasticModel, SolvedJoints, ByName]:
     """The elastic model, the joints that yield as the processes take them, and the processes'
     kernels by side."""
-    elastic: dict[Numbers, Array] = {}
-    yielding: dict[Numbers, list[NodeRun]] = {}
+    elastic = {}
+    yielding = {}
     for numbers, runs in solved.items():
         if np.isinf(numbers.yielding).all():
             elastic[numbers] = runs[0].nodes

@@ -73,5 +73,4 @@ def monotone_slopes(at: Array, values: Array) -> Array:
 def smooth_step(t: Array) -> Array:
     """From 0 for ``t <= 0`` to 1 for ``t >= 1``, without a kink."""
     inside = np.clip(t, 0.0, 1.0)
-    step: Array = inside**2 * (3 - 2 * inside)
-    return step
+    return inside**2 * (3 - 2 * inside)

@@ -137,7 +137,7 @@ class Model:
         iterations; residuals beyond ``scale`` count less."""
         chosen = np.flatnonzero(np.arange(len(z)) != held)
         low, high = self.bounds[:, chosen]
-        known: dict[bytes, Array] = {}  # residuals of this fit, which the Jacobian needs again
+        known = {}  # residuals of this fit, which the Jacobian needs again
 
         def whole(part: Array) -> Array:
             found = z.copy()
