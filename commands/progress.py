@@ -45,7 +45,7 @@ class Progress:
         self._seconds: list[float] = []
         self._begun = self._spoken = perf_counter()
         self.materials = scene.materials
-        self.moving: Any = None
+        self.moving = None
         if not silent and on_terminal():
             from rich.progress import Progress as Moving
             from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn

@@ -77,7 +77,7 @@ class Report:
         ]
         facts = account.facts()
         facts["mesh"]["worst_cells"] = worst_cells
-        self.content: ByName = {
+        self.content = {
             "status": "running",
             "message": "",
             "started": before.get("started", now),

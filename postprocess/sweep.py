@@ -70,7 +70,7 @@ class Sweep:
                 )
         self.cases = self._read("cases.csv", _FIRST)
         names = list(self.cases)
-        self.keys: list[str] = names[len(_FIRST) : names.index("message")]
+        self.keys = names[len(_FIRST) : names.index("message")]
 
     def __len__(self) -> int:
         """Number of cases."""

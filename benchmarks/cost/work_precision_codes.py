@@ -38,9 +38,7 @@ from archord.scene.sections.bodies import Pin
 DATA = toml_beside(__file__, "work_precision.toml")
 REFERENCES = Path(__file__).with_name("references.json")
 _KNOWN: dict[str, ByName] = read_json(REFERENCES)
-CASES: dict[str, ByName] = {
-    case: given | _KNOWN.get(case, {}) for case, given in DATA["cases"].items()
-}
+CASES = {case: given | _KNOWN.get(case, {}) for case, given in DATA["cases"].items()}
 OURS = "archord"
 CALCULIX = "CalculiX"
 ANGLES = np.linspace(0.0, np.pi / 2, 401)  # of pressure profiles, from the contact axis

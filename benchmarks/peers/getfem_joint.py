@@ -58,8 +58,8 @@ class Joint:
 
     def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
         self.md = md = gf.Model("real")
-        self.laws: list[tuple] = []
-        self.kept: list = []  # a model does not keep what it consists of alive
+        self.laws = []
+        self.kept = []  # a model does not keep what it consists of alive
         for name, value in (("lambda", LAME), ("mu", MU), ("sigY", 1e9), ("r", 1 / size)):
             md.add_initialized_data(name, [value])
         meshes = {

@@ -50,7 +50,7 @@ class Goal:
     panel: str
 
 
-GOALS: Mapping[str, Goal] = {
+GOALS = {
     "elastic": Goal(5e-4, 10.0, "space_elastic"),
     "A": Goal(4e-3, 8.0, "space_plastic"),
 }

@@ -11,7 +11,6 @@ hexahedra of 20 nodes), each on several meshes. They agree within the uncertaint
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -124,7 +123,7 @@ def _over_middle(depth: float, value: float, uncertainty: float) -> Reference:
     return Reference(name, DEEP, value, uncertainty, partial(pressure_over_middle, depth))
 
 
-CASES: Mapping[str, Case] = {
+CASES = {
     "elastic": Case(
         "elastic",
         lambda size: joint(Size(size)),

@@ -24,14 +24,14 @@ THICKNESSES = (0.2, 0.5, 1.0, 2.0, 4.0)  # over R
 _RADIUS = 10.0
 _STEPS = (1, 2, 4)  # of the four whose loads stand in the table
 STEEL = {"E": 210000.0, "nu": 0.3}
-JOINT: ByName = {
+JOINT = {
     "radius": _RADIUS,
     "clearance": 0.05,
     "block_size": 40.0,
     "relative_element_size": 0.15,
     "growth": 0.35,
 }
-_SCENE: ByName = {
+_SCENE = {
     "joint": JOINT,
     "pin": STEEL,
     "block": STEEL | {"yield_stress": 300.0},

@@ -34,9 +34,9 @@ class SecondOrder:
         self.corners = n_corners(kind)
         self._vertices, vertex = np.unique(nodes[:, : self.corners], return_inverse=True)
         parts = [vertex.reshape(m, -1)]
-        self.between: list[np.ndarray] = []
+        self.between = []
         # nodes ``(e, b)`` of the entities with a node in the middle, and its weights ``(b,)``
-        self._middles: list[tuple[np.ndarray, Array]] = []
+        self._middles = []
         n_nodes = len(self._vertices)
         for dim in range(1, dimension_of(kind) + 1):
             of_dim = basix.cell.subentity_types(kind)[dim][0]

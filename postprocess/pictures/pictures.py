@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _WIDER = 1.5  # panel of bodies in space over the others
 _FEW = 10  # runs that get a name in the legend
 # what draws the fields, the contact and the forces of a kind of runs
-_PANELS: dict[type, tuple[Any, Any, Any]] = {
+_PANELS = {
     ProblemView: (problems.field_panel, problems.contact_panel, problems.load_panel),
     JointView: (joint.field_panel, joint.arc_panel, joint.force_panel),
 }

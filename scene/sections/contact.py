@@ -7,7 +7,7 @@ from archord.scene.sections.keys import require
 
 # The parameters of each law, with their meaning. They are positive numbers, by the names of the
 # class's own, which is in solver/contact/laws/named.py.
-CONTACT_LAWS: dict[str, dict[str, str]] = {
+CONTACT_LAWS = {
     "frictionless": {},
     "coulomb": {},
     "tied": {},

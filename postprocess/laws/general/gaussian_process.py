@@ -71,7 +71,7 @@ class Process:
         self.kernel = kernel
         self.points = points
         self.factor = np.zeros((len(points), len(points)))
-        self.inverses: list[Array] = []
+        self.inverses = []
         for start in range(0, len(points), _BLOCK):
             columns = slice(start, start + _BLOCK)
             left = kernel.between(points[start:], points[columns])
