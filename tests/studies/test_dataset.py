@@ -91,9 +91,7 @@ def test_a_run_tells_between_which_nodes_its_steps_were_cut():
     scene = SimpleNamespace(load=load)
     columns = {"cutbacks": [0, 0, 0, 3, 0]}
     ones = np.ones(5)
-    curve = SimpleNamespace(
-        scene=scene, E_star=1.0, dR=1.0, R=1.0, delta=ones, P=ones, p0=ones, eps=ones
-    )
+    curve = SimpleNamespace(scene=scene, unit=1.0, R=1.0, x=ones, P=ones, p0=ones, eps=ones)
     run = NodeRun.of(SimpleNamespace(curve=curve, columns=columns))
     assert run.cut.tolist() == [False, True, False]
 
