@@ -96,7 +96,9 @@ def test_a_run_tells_between_which_nodes_its_steps_were_cut():
     assert run.cut.tolist() == [False, True, False]
 
 
-@pytest.mark.parametrize(("strain", "block", "largest"), [(0, 0.3, 5.5e-3), (1, 0.3, 6e-4)])
+@pytest.mark.parametrize(
+    ("strain", "block", "largest"), [(0, 0.3, 5.5e-3), (1, 0.3, 6e-4), (0, np.inf, 6e-4)]
+)
 def test_the_error_of_the_mesh_is_larger_where_a_block_yields_in_plane_stress(
     strain, block, largest
 ):

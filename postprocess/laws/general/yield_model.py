@@ -190,7 +190,7 @@ def mesh_excess(side: str, yielding: Yielding, u: Array) -> Array:
     """ln of P and of p0 of elements of 5 %R over P and p0 of 2 %R, by multiples ``u`` ``(k,)`` of
     about the x of first yield. It is felt in plane stress where a block yields before the pin
     (benchmarks/law_meshes.py); if the mesh's error is of first order, two thirds of it are left."""
-    if side != "stress block":
+    if side != "stress block" or np.isinf(yielding.block):
         return np.zeros_like(u)
     pins_lead = (1 - yielding.block / yielding.pin) / _STRONGER["stress"][0]
     beyond = np.log(np.maximum(u / _EXCESS_BEGINS, 1.0))
