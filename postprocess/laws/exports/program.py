@@ -141,7 +141,9 @@ def _of_tables(curve: JointCurve) -> Program:
         "FORCE": force,
         "WIDEST": float(curve.widest),
     }
-    functions = ["force", "deeper", "residual", "expected_error"]
+    functions = ["force", "deeper", "residual"]
+    if np.isfinite([curve.error, curve.back_error]).all():
+        functions.append("expected_error")
     rule = _STATE if curve.yields else f"{_STATE} {_ELASTIC}"
     if curve.radius is not None:
         functions += [*_ELEMENT_FUNCTIONS, "stored_energy"]

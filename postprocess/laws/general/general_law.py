@@ -64,7 +64,7 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     joint : LawJoint
         The joint, with ``plane`` and ``nu``.
     extrapolate : bool
-        Give the law even if the joint is `outside` the range.
+        Give the law even if the joint is `outside` the range; its expected errors are nan.
 
     Returns
     -------
@@ -100,6 +100,9 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
         "outside": reason or "nothing: inside the range of solved joints",
         "expected error": "unknown" if reason else _error_in_words(law),
     }
+    if reason:
+        unknown = np.full(len(NODES), np.nan)
+        law = replace(law, error=unknown, back_error=unknown)
     pressure = joint.unit / joint.radius
     return replace(
         law,

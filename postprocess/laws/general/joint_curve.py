@@ -80,7 +80,7 @@ class JointCurve:
     angle, dangle : array
         eps/sqrt(y) and its slope; nan if unknown.
     error : array
-        The expected error of y on loading, over y, straight between nodes.
+        The expected error of y on loading, over y, straight between nodes; nan if unknown.
     back_error : array
         The same on the way back, over the largest y.
     length, force, pressure : float
@@ -136,7 +136,8 @@ class JointCurve:
     def yields(self) -> bool:
         """Whether the way back is another than first loading, or is known less well."""
         same = np.array_equal(self.y, self.back) and np.array_equal(self.dy, self.dback)
-        known = not self.back_error.any() or np.array_equal(self.back_error, self.error)
+        alike = np.array_equal(self.back_error, self.error, equal_nan=True)
+        known = not self.back_error.any() or alike
         return not (same and known and (self.ratio == 1).all() and (self.dratio == 0).all())
 
     @property

@@ -186,8 +186,8 @@ def _of_joint(
 @dataclass(frozen=True)
 class Estimate:
     """What is known of an unknown: ``value``, its 95 % interval ``low`` to ``high``, by how much
-    the law's own error may move it, ``by_law``, whether it ``is_bound`` to the end of what was
-    allowed, and whether the curve is ``blind`` to it."""
+    the law's own error may move it, ``by_law``, nan where that is unknown, whether it ``is_bound``
+    to the end of what was allowed, and whether the curve is ``blind`` to it."""
 
     unknown: Unknown
     value: float
@@ -295,9 +295,9 @@ def _judged(model: Model, found: Any, scale: float) -> Identification:
     correlation = np.full((len(z), len(z)), np.nan)
     correlation[np.ix_(known, known)] = covariance / np.outer(deviation[known], deviation[known])
     predicted = model.predicted(z)
-    error = np.nan_to_num(predicted.error) / model.curve.largest
-    by_law = np.zeros(len(z))
-    by_law[known] = np.abs(inverse @ (J.T @ (error * inside)))
+    error = np.where(inside, predicted.error, 0.0) / model.curve.largest
+    by_law = np.full(len(z), np.nan)
+    by_law[known] = np.abs(inverse @ (J.T @ error))
     reach = np.where(known, stdtrit(freedom, _CONFIDENCE) * deviation, np.inf)
     curvature = np.zeros(len(z))
     curvature[known] = 1 / np.diag(inverse)

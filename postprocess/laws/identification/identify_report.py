@@ -77,7 +77,8 @@ def estimates_table(found: Identification) -> Table:
     for one in as_read(found).estimates:
         name = one.unknown.name
         interval = f"{one.low:.5g} .. {one.high:.5g}"
-        table.add(name, units[name], f"{one.value:.5g}", interval, f"{one.by_law:.2g}")
+        by_law = "unknown" if math.isnan(one.by_law) else f"{one.by_law:.2g}"
+        table.add(name, units[name], f"{one.value:.5g}", interval, by_law)
     return table
 
 

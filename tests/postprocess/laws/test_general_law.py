@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from hypothesis import strategies as some
 from archord.materials.elasticity import contact_modulus
 from archord.materials.hardening import LinearHardening, TabularHardening
 from archord.materials.named import metals
+from archord.postprocess.laws.exports.export import export_law
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.general_law import (
     CLEARANCES,
@@ -325,6 +327,18 @@ def test_what_is_outside_is_said(change: dict, said: str) -> None:
     found = outside(replace(inside, **change))
     assert said in found
     assert bool(found) == bool(said)
+
+
+@pytest.mark.parametrize("stress", [None, 250.0])
+def test_nobody_expects_the_error_of_a_law_outside(stress: float | None) -> None:
+    """It was 0.015 % of a force that was too large by a factor of 1e38, in exports, too."""
+    joint = LawJoint(10.0, 1.0, 115e3, stress, stress, plane="strain", nu=0.3)
+    law = general_law(joint, extrapolate=True)
+    assert np.isnan(law.at([0.5, 1.0], [0.0, 2.0]).error).all()
+    assert law.yields == (stress is not None)
+    assert "expected_error" not in export_law(law, Path("law.py"))
+    inside = general_law(replace(joint, clearance=0.1))
+    assert "expected_error" in export_law(inside, Path("law.py"))
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])

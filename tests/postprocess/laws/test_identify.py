@@ -181,6 +181,23 @@ def test_units_that_are_wrong_by_1000_end_at_a_bound():
 
 
 @pytest.mark.usefixtures("_begun_at_the_scene")
+def test_the_error_by_the_law_is_unknown_of_points_beyond_the_law():
+    """They counted as if the law had no error there: a clearance that is known to 0.005 mm by
+    points up to 3 dR was told to 0.0004 mm with as many points beyond."""
+    scene = archord.load_scene(ELASTIC)
+    keys = ["joint.clearance"]
+    inside = identify(scene, measured(ELASTIC, {}, 7, n=60, soft=0.0), keys, stiffness=np.inf)
+    assert 0 < inside.estimates[0].by_law < 0.1 * scene.joint.dR
+    with pytest.warns(UserWarning, match="it goes on straight"):
+        beyond = measured(ELASTIC, {}, 7, turns=(-0.1, 4.0, 0.6), n=60, soft=0.0)
+    found = identify(scene, beyond, keys, stiffness=np.inf)
+    assert "points are beyond 3 clearances" in said(found)
+    assert np.isnan(found.estimates[0].by_law)
+    assert "unknown" in str(estimates_table(found))
+    assert json.loads(as_json(found))["estimates"][0]["by_law"] is None
+
+
+@pytest.mark.usefixtures("_begun_at_the_scene")
 def test_an_interval_that_ends_at_what_was_allowed_is_told():
     """With 5 % noise the curve knows the yield stress to 15 MPa. Bounds of 226 and 236 MPa were
     its 95 % interval, as if the curve had told it."""
