@@ -14,6 +14,7 @@ but for the linear displacement at the same node. So the product has unit rows t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from locale import localeconv
 from typing import Any
 
 import basix.ufl
@@ -217,8 +218,9 @@ def _aggregates(A: PETSc.Mat, entries: PETSc.Mat, sweeps: Sweeps) -> PETSc.PC:
 
 def _use_options(solver: PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> None:
     options = PETSc.Options(prefix)
+    point = localeconv()["decimal_point"]  # PETSc reads numbers as the program's locale has them
     for name, value in wanted.items():
-        options[name] = value
+        options[name] = str(value).replace(".", point) if isinstance(value, float) else value
     solver.setOptionsPrefix(prefix)
     solver.setFromOptions()
 
