@@ -45,6 +45,7 @@ _BISECTIONS = 60  # of ln(ratio)
 _LARGEST = 7.0  # ln(ratio)
 _SOFTER = 0.9  # slope of the way back where it opens over that up to the first step, at most
 _LEAST = 1e-3  # slope at an end over the slope of the last two nodes
+_REMEDY = "a last target of 0 for the load, as load.displacement = [2.0, 0.0], gives it"
 
 
 class _Cubic(NamedTuple):
@@ -75,7 +76,7 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
     were not used, and of mesh and steps, as far as the run knows; ``about`` tells them.
 
     Raises `InputError` without contact, with fewer than 6 steps of first loading, where the force
-    does not rise on it, and if the run yields and does not unload.
+    does not rise on it, and if the run yields or rubs and does not unload.
     """
     steps = read_steps(run, of)
     k = _steps_of_loading(steps)
@@ -165,6 +166,7 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
     start = loading.x[-len(k) - 1]
     least = _ELASTIC * np.ptp(steps.x) * steps.y.max()
     if steps.dissipated.max() <= least:
+        _require_way_back(steps, k)
         x, f, df = (values[-len(k) - 1 :] for values in loading)
         same = _Cubic(x - start, f, df)
         ratio: Array = np.ones(len(loading.x))
@@ -192,6 +194,17 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
     if not len(off):
         said += f", extended from {steps.load(y[0])} to none"
     return _WayBack(curve, ratio, way, said)
+
+
+def _require_way_back(steps: RunSteps, k: np.ndarray) -> None:
+    """Raise `InputError` of a run that does not yield, but rubs, and never comes back from the
+    steps ``k``: it would come back by other forces."""
+    rubbed = steps.run.columns.get("friction_dissipation", [0.0])
+    if max(rubbed) > 0 and not _unloadings(steps, k):
+        raise InputError(
+            f"{steps.run.folder}: has friction and never unloads, so its way back is unknown; "
+            f"{_REMEDY}."
+        )
 
 
 def _last_unloading(steps: RunSteps, k: np.ndarray, least: float) -> np.ndarray:

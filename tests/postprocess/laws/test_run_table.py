@@ -187,6 +187,7 @@ def test_friction_makes_the_way_back_of_an_elastic_joint_known_less_well() -> No
     assert off < curve.at(0.6 * deepest, deepest).error < 0.06 * P.max()
     assert curve.at(0.6 * deepest).error < 0.1 * off
     assert not run_table(elastic_run).yields
+    assert not run_table(synthetic(x, yields=False, friction_dissipation=[0.1] * len(x))).yields
     almost = P / np.where(back, 0.9501, 1.0)
     assert not run_table(synthetic(x, yields=False, P=list(almost))).yields
 
@@ -275,6 +276,12 @@ after_a_fit[13] = after_a_fit[12]
         (synthetic(path(END), P=[0.0] * 20), None, "has 0 steps"),
         (synthetic(path(END)), None, "yields and never unloads"),
         (synthetic(path(0.3, 0.0, END)), None, "yields and never unloads"),
+        # it comes back by forces that are lower, by 3 % of the largest with a coefficient of 0.3
+        (
+            synthetic(path(END), yields=False, friction_dissipation=[0.1] * 20),
+            None,
+            "has friction and never unloads",
+        ),
         (synthetic(path(END, 1.8, n=20), keep=21), None, "unloads in 2 steps"),
         (
             synthetic(path(END), yields=False, P=falling),
