@@ -16,6 +16,7 @@ from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.report.version import VERSION
 from archord.scene.file import resolved
+from archord.scene.parts import turns
 
 _OPEN = 1e-6  # of the largest force: nothing touches
 
@@ -225,12 +226,15 @@ def _columns_of_load(run: Run, of: str | None) -> list[str]:
     if of not in loads and (of or len(loads) > 1):
         raise InputError(run.folder, f"--of must name one of its loads: {', '.join(loads)}.")
     of = of or loads[0]
-    if next(load.kind for load in scene.load if load.name == of) == "pressure":
-        raise InputError(
-            run.folder,
-            f"{of!r} is a pressure over a volume that it displaces; a table has "
-            "forces per length of a pin. history.csv has pressure over volume.",
-        )
+    load = next(load for load in scene.load if load.name == of)
+    other = ""
+    if load.kind == "pressure":
+        other = "a pressure over a volume that it displaces"
+    elif turns(load.direction):
+        other = "a moment over an angle"
+    if other:
+        said = f"{of!r} is {other}; a table has forces per length of a pin. history.csv has it"
+        raise InputError(run.folder, f"{said}.")
     names = [f"{of} displacement", f"{of} force"]
     if len(scene.interaction) == 1 and not scene.fits:
         names.append(f"{scene.interaction[0].name} largest pressure")

@@ -315,6 +315,22 @@ def test_a_pressure_is_no_force_per_length(tmp_path) -> None:
         run_table(run)
 
 
+def test_a_moment_is_no_force_per_length(tmp_path) -> None:
+    """A moment per unit length, in N, was called the total force of the whole pin."""
+    problem = archord.Problem(
+        archord.rectangles({"low": (0, 0, 2, 1), "high": (0.5, 1, 1, 1)}, size=0.5),
+        [archord.Body(name, archord.Elastic(1e3, 0.3)) for name in ("low", "high")],
+        [archord.Interaction("contact", ("high bottom", "low top"))],
+        [archord.Support("low bottom"), archord.Support("axis", on="crank", fixed="xy")],
+        [archord.Load("turn", on="crank", direction="rotation", displacement=0.01)],
+        [archord.Coupling("crank", facets="high top", point=(1.0, 2.0))],
+        steps=6,
+    )
+    run = archord.solve(problem, tmp_path / "run")
+    with pytest.raises(InputError, match="'turn' is a moment over an angle"):
+        run_table(run)
+
+
 def test_runs_of_steel_that_hardens_become_laws(tmp_path, capsys, refused) -> None:
     """A joint and a lug: a table of every second step is right at the others within its error, on
     both ways; the command writes it."""
