@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from io import TextIOWrapper
 from time import perf_counter
 
 
@@ -14,6 +15,8 @@ def main() -> None:
     gc.set_threshold(
         200_000, 1, 1
     )  # imports make 100 thousand objects and no garbage: looking for it takes 0.04 s
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: of signs a terminal lacks
     from archord.cli import run
 
     code = run(sys.argv[1:], begun)

@@ -64,7 +64,7 @@ def run_on_ranks(command: str, work: Callable[[], int]) -> int:
             sys.stdout.reconfigure(line_buffering=False)
         return work()
     if launcher_rank() != 0:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     code = work()
     if code == 1 and launcher_rank() == 0:
         said = (

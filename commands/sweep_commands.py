@@ -74,7 +74,7 @@ def sweep(
             if comm.rank == 0 and not quiet:
                 print(text, flush=True)
         except OSError:
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
     def prepared():
         design = read_sweep(source, overrides)

@@ -100,6 +100,15 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
         assert bool(printed) == bool(quiet.stdout)
 
 
+def test_a_terminal_that_lacks_a_sign_shows_its_number():
+    """The reference of scenes has one; it ended in a traceback."""
+    command = [sys.executable, "-m", "archord", "scene", "--reference"]
+    environment = ENVIRONMENT | {"PYTHONIOENCODING": "latin-1"}
+    found = subprocess.run(command, env=environment, capture_output=True, timeout=300)
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert "\\u2265" in found.stdout.decode("latin-1")
+
+
 @pytest.mark.parametrize("quiet", [[], ["-q"]])
 def test_a_terminal_shows_how_far_a_solve_is(tmp_path, quiet):
     """Between two lines of steps, in one line that moves; nothing of it with -q."""
