@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.geometry.curve import Curve
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
@@ -144,3 +145,42 @@ def test_means_of_facets_do_not_scatter_where_surfaces_slid(monkeypatch):
     exact = facet_means(1.5)
     for means, fine in zip(found, exact, strict=True):
         assert np.abs(means - fine).max() < 1e-3 * fine.mean()
+
+
+def _slot(mesh, in_space):
+    """A slab that is pressed into a slot, and pushed half out of it."""
+    names = ("low", "mid", "high")
+    supports = [archord.Support("low bottom"), archord.Support("high top")]
+    if in_space:
+        sides = [f"{name} {side}" for name in names for side in ("back", "front")]
+        supports += [archord.Support(side, fixed="z") for side in sides]
+    fits = {"a": ("mid bottom", "low top"), "b": ("high bottom", "mid top")}
+    return archord.Problem(
+        mesh,
+        [archord.Body(name, archord.Elastic(1000.0, 0.3)) for name in names],
+        [archord.Interaction(name, pair, interference=0.02) for name, pair in fits.items()],
+        supports,
+        [archord.Load("push", on="mid left", direction="x", displacement=1.0)],
+        steps=5,
+    )
+
+
+def test_a_press_fit_in_space_leaves_its_slot_as_in_the_plane(tmp_path):
+    """Forces and energies of a slice, over its thickness, as surfaces slide over each other's
+    edges; what is drawn together is released in proportion to the length."""
+    low = {name: 0.5 * k for k, name in enumerate(("low", "mid", "high"))}
+    thick = 0.25
+    flat = archord.rectangles({name: (0, y, 2, 0.5) for name, y in low.items()}, thick)
+    slice_ = {name: (0, y, 0, 2, 0.5, thick) for name, y in low.items()}
+    solids = archord.boxes(slice_, 0.25, "hexahedra")
+    plane, space = (
+        archord.solve(_slot(mesh, is_solid), tmp_path / str(is_solid)).columns
+        for mesh, is_solid in ((flat, False), (solids, True))
+    )
+    for name in ("elastic_energy", "a force y", "work"):
+        found = np.array(space[name]) / thick
+        largest = np.abs(plane[name]).max()
+        np.testing.assert_allclose(found, plane[name], atol=0.01 * largest, rtol=0)
+    assert space["a contact area"][-1] == pytest.approx(thick * 1.0, rel=0.02)
+    released = space["elastic_energy"][-1] / space["elastic_energy"][0]
+    assert released == pytest.approx(0.5, rel=0.05)
