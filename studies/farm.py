@@ -110,7 +110,8 @@ def solve_case(case: Case, folder: Path, force: bool = False) -> Result:
     try:
         result = _solved(case, run, force)
     except Exception as error:
-        sentence = " ".join(f"{type(error).__name__}: {error}".split())
+        kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
+        sentence = " ".join(f"{kind}{error}".split()).removesuffix(".")
         with suppress(OSError):
             replace_file(
                 run / FAILURE, f"{sentence}\n\n{''.join(traceback.format_exception(error))}"

@@ -161,6 +161,18 @@ def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused, ca
     assert {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()} == before
 
 
+def test_a_case_that_is_refused_is_told_in_one_sentence(tmp_path, capsys):
+    """By the scene of the sweep, and the key."""
+    scene = Path(__file__).parents[2] / "scenes" / "ball.toml"
+    base = scene.read_text(encoding="utf-8").replace("ball.msh", "nowhere.msh")
+    (tmp_path / "base.toml").write_text(base, encoding="utf-8")
+    file = tmp_path / "some.sweep.toml"
+    file.write_text('base = "base.toml"\n[grid]\npath.steps = [1]\n', encoding="utf-8")
+    assert sweep(file, "-o", tmp_path / "out", "-q") == 3
+    said = f'{file}: mesh.file = "{tmp_path / "nowhere.msh"}" must be a file that is there.\n'
+    assert capsys.readouterr().err.endswith(f": failed: {said}")
+
+
 def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     """A case that finds no equilibrium, and one with an error that nobody foresaw: noted, exit code
     3, and left alone until --retry. The error's traceback is in failure.txt, its sentence in the
