@@ -37,6 +37,7 @@ _INSIDE = 1 + 1e-9  # of the last node, but for round-off
 _NUMBER = 1e300  # beyond it nothing is a displacement
 # which files of earlier versions lack
 _NEWER = ("length_unit", "force_unit", "pin_length", "radius")
+_UNKNOWN = ("peak", "dpeak", "angle", "dangle", "error", "back_error")  # which nan may be
 _BEND = np.sqrt(2) - 1
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
@@ -316,7 +317,32 @@ class JointCurve:
                     given[f.name] = np.array(value, float) if f.type == "Array" else value
         except (KeyError, TypeError) as error:
             raise ValueError(f"is no table of a joint's law: {error}") from None
-        return cls(**given)
+        curve = cls(**given)
+        fault = curve._fault()
+        if fault:
+            raise ValueError(f"is no table of a joint's law: {fault}")
+        return curve
+
+    def _fault(self) -> str:
+        """What makes this no table, in words; empty if nothing does."""
+        for name in ("length", "force", "pressure"):
+            value = getattr(self, name)
+            if not (isinstance(value, float | int) and 0 < value < np.inf):
+                return f"{name} = {value!r} must be a positive number"
+        if self.touch.shape not in ((0,), (3,)):
+            return "touch must have three numbers, or none"
+        rises = self.x.ndim == 1 and len(self.x) > 1 and self.x[0] == 0
+        if not (rises and (np.diff(self.x) > 0).all()):
+            return "x must rise from 0"
+        for f in fields(self):
+            values = getattr(self, f.name)
+            if f.type != "Array" or f.name == "touch":
+                continue
+            if values.shape != self.x.shape:
+                return f"{f.name} must have as many numbers as x"
+            if f.name not in _UNKNOWN and not np.isfinite(values).all():
+                return f"{f.name} must have numbers alone"
+        return ""
 
 
 def first_touch(touch: Array, x: Array) -> tuple[Array, Array]:

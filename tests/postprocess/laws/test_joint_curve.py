@@ -3,6 +3,7 @@ shapes."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -107,6 +108,26 @@ def test_json_keeps_every_digit() -> None:
     np.testing.assert_array_equal(again.at(X, 1.0).load, curve.at(X, 1.0).load)
     with pytest.raises(ValueError, match="no table"):
         JointCurve.from_json("{}")
+
+
+@pytest.mark.parametrize(
+    ("key", "change", "said"),
+    [
+        ("x", lambda x: x[::-1], "x must rise from 0"),
+        ("x", lambda x: [*x[:20], x[21], x[20], *x[22:]], "x must rise from 0"),
+        ("ratio", lambda ratio: ratio[:-1], "ratio must have as many numbers as x"),
+        ("y", lambda y: [*y[:9], None, *y[10:]], "y must have numbers alone"),
+        ("touch", lambda touch: touch[:2], "touch must have three numbers, or none"),
+        ("force", lambda force: -force, "force = -1.0 must be a positive number"),
+        ("length", lambda length: None, "length = None must be a positive number"),
+    ],
+)
+def test_a_file_that_was_changed_is_no_table(key, change, said) -> None:
+    """Forces of most of them were numbers, without a word."""
+    data = json.loads(yielding_curve().to_json())
+    data[key] = change(data[key])
+    with pytest.raises(ValueError, match=said):
+        JointCurve.from_json(json.dumps(data))
 
 
 def test_any_shape_is_taken() -> None:
