@@ -4,13 +4,14 @@ before it is used."""
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from archord.report.errors import InputError, in_sentences
+from archord.report.errors import InputError, in_sentences, require_between, require_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 _KINDS = "a mesh or CAD file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
+_MOST_TIMES = 6  # that cells are cut
 _LONGEST = 40  # characters of a value in a message
 CHANGES = ("scale", "order", "refine", "size", "sizes", "sets")  # but for the circles
 # centre and radius, and the axis of a cylinder
@@ -56,7 +58,7 @@ class Mesh:
     Raises
     ------
     InputError
-        For a source that is none of these.
+        For a source that is none of these, and for values out of range.
 
     Examples
     --------
@@ -75,12 +77,20 @@ class Mesh:
     sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the source; raise `InputError`."""
+        """Check the source and what changes it; raise `InputError`."""
         source = self.source
         known = isinstance(source, (str, Path, tuple, ModuleType))
         if not known and not hasattr(source, "facet_sets"):
             text = json.dumps(source, default=repr)[:_LONGEST]
             raise InputError(f"archord.Mesh: the source must be {_KINDS}, not {text}.")
+        require_between(self, "scale", 0, math.inf, "must be positive and finite")
+        require_of(self, self.order in (None, 1, 2, 3), "order", "must be 1, 2 or 3")
+        is_number_of_times = self.refine in range(_MOST_TIMES + 1)
+        said = f"must be a whole number from 0 to {_MOST_TIMES}"
+        require_of(self, is_number_of_times, "refine", said)
+        for key in ("circles", "sizes", "sets"):
+            by_name = getattr(self, key) is None or isinstance(getattr(self, key), Mapping)
+            require_of(self, by_name, key, "must be a dictionary by names of sets")
 
     @classmethod
     def of(cls, given: Any) -> Mesh:
