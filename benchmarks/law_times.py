@@ -16,7 +16,7 @@ from collections import defaultdict
 from dataclasses import replace
 from time import process_time
 
-from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.general_law import law_of_joint
 from archord.postprocess.laws.general.hardening_model import kind, strains
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.yield_model import elastic_pressure
@@ -73,7 +73,7 @@ def milliseconds(joint: LawJoint) -> float:
         strains.cache_clear()
         elastic_pressure.cache_clear()
         begun = process_time()
-        general_law.__wrapped__(joint)
+        law_of_joint.__wrapped__(joint)
         times.append(1e3 * (process_time() - begun))
     return statistics.median(times)
 
@@ -85,7 +85,7 @@ def later_laws() -> Table:
         laws = forms(law_joint(drawing))
         try:
             for joint in laws:
-                general_law(joint)
+                law_of_joint(joint)
         except ValueError:  # hardens more than the law covers
             continue
         by_kind[kind(drawing.numbers)].append([milliseconds(joint) for joint in laws])

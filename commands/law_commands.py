@@ -200,11 +200,11 @@ def _export(
     inputs: list[Path],
     force: bool,
 ) -> int:
-    from archord.postprocess.laws.general.general_law import general_law
+    from archord.postprocess.laws.general.general_law import law_of_joint
     from archord.postprocess.laws.laws import LAWS
 
     said = LAWS["archord"].doubts(joint)
-    law = general_law(joint)
+    law = law_of_joint(joint)
     about = law.about | {
         "units": {name: units[name] for name in ("length", "force", "stress") if name in units}
     }

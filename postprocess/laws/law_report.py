@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from archord.output.user_file import save_figure
-from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.general_law import law_of_joint
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import NOTHING, Law, LawState
 from archord.report.figure import new_figure
@@ -33,7 +33,7 @@ def sample(
         return law.at_load(joint, load, extrapolate)._replace(load=load)
     state = law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
     if deepest:
-        found = general_law(joint, extrapolate=True).at(steps, deepest * joint.clearance)
+        found = law_of_joint(joint, extrapolate=True).at(steps, deepest * joint.clearance)
         error = found.error if np.isfinite(state.error).any() else NOTHING
         quantities = found.load, found.stiffness, found.peak_pressure, found.angle, error
         state = LawState(

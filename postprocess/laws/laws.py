@@ -25,7 +25,7 @@ _DEEPEST = (
 
 
 def _archord(joint: LawJoint, delta: Array) -> LawState:
-    found = general.general_law(joint, extrapolate=True).at(delta)
+    found = general.law_of_joint(joint, extrapolate=True).at(delta)
     return LawState(
         delta, found.load, found.stiffness, found.peak_pressure, found.angle, found.error
     )

@@ -4,6 +4,7 @@ error."""
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import fields, replace
 from functools import lru_cache
 
@@ -26,7 +27,7 @@ from archord.postprocess.laws.general.hardening_model import (
     hardened_loss,
     largest_gain,
 )
-from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent, line_contact_level
 from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
@@ -55,7 +56,6 @@ LARGEST_GAIN = 3.2  # of s_eff/s at 3 dR; solved joints reach 2.6
 _STEEPEST = 0.999
 
 
-@lru_cache(maxsize=64)
 def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     """The law of a joint, from the joints that archord has solved.
 
@@ -77,15 +77,28 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
         For a joint without ``plane`` or ``nu``; and, without ``extrapolate``, for a ring and for a
         joint outside the range.
 
+    Warns
+    -----
+    LawRangeWarning
+        Of a joint whose forces are others than the law's, as in a small block or with a whole pin.
+
     Examples
     --------
     >>> from archord.postprocess.laws.general.general_law import general_law
-    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
     >>> joint = LawJoint(radius=10.0, clearance=0.05, E_star=115e3, plane="strain", nu=0.3)
     >>> law = general_law(joint)
     >>> print(f"{law.at(0.05).load:.0f}")
     6342
     """
+    for said in joint.unlike_solved:
+        warnings.warn(LawRangeWarning(f"archord: is a law {said}"), stacklevel=2)
+    return law_of_joint(joint, extrapolate)
+
+
+@lru_cache(maxsize=64)
+def law_of_joint(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
+    """As `general_law`, without a warning."""
     plane_and_nu(joint)
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
     if reason and not extrapolate:
@@ -93,11 +106,12 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     law = law_of_numbers(
         joint_numbers(joint), flows(joint), joint.friction, large_strain=joint.large_strain
     )
+    unlike = "; ".join(f"is a law {said}" for said in joint.unlike_solved)
     about = {
         "title": f"a pin joint in plane {joint.plane}, by archord's law of solved joints",
         "archord": VERSION,
         "joint": _in_numbers(joint),
-        "outside": reason or "nothing: inside the range of solved joints",
+        "outside": reason or unlike or "nothing: inside the range of solved joints",
         "expected error": "unknown" if reason else _error_in_words(law),
     }
     if reason:
@@ -210,7 +224,7 @@ def outside(joint: LawJoint) -> str:
     Examples
     --------
     >>> from archord.postprocess.laws.general.general_law import outside
-    >>> from archord.postprocess.laws.general.joint import LawJoint
+    >>> from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
     >>> outside(LawJoint(radius=10.0, clearance=1.0, E_star=115e3, plane="strain", nu=0.3))
     'dR/R = 0.1 is outside 0.001 to 0.02'
     """

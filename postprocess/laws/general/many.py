@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.general_law import law_of_joint
 from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.by_name import ByName
@@ -177,4 +177,4 @@ def _is_given(value: Any) -> bool:
 @lru_cache(maxsize=4096)
 def _law(given: tuple[tuple[str, Any], ...]) -> JointCurve:
     """The law of the joint with the parameters ``given``. Raises ValueError, TypeError."""
-    return general_law(LawJoint(**dict(given)))
+    return law_of_joint(LawJoint(**dict(given)))

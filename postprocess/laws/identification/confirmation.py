@@ -7,7 +7,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.curve import rms
-from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.general_law import law_of_joint
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import Identification
 from archord.report.by_name import ByName
@@ -33,7 +33,7 @@ def compared(found: Identification, delta: Array, load: Array) -> list[str]:
     """How far the law and the measured curve are from what was solved, ``delta`` and ``load``
     ``(k,)``, over the largest force."""
     scene = found.scene
-    law = general_law(LawJoint.from_scene(scene), extrapolate=True)
+    law = law_of_joint(LawJoint.from_scene(scene), extrapolate=True)
     predicted = law.at(delta, _before(delta)).load * scene.thickness
     measured = found.model.curve
     turn = int(np.argmax(delta))

@@ -22,7 +22,7 @@ from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.general_law import general_law, outside
+from archord.postprocess.laws.general.general_law import law_of_joint, outside
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.identification.measured import MeasuredCurve
@@ -102,7 +102,7 @@ class Model:
         curve = self.curve
         begin = curve.load / thickness
         with warnings.catch_warnings(action="ignore"):
-            law = general_law(LawJoint.from_scene(scene), extrapolate=True)
+            law = law_of_joint(LawJoint.from_scene(scene), extrapolate=True)
             total = curve.deepest - machine[OFFSET]
             deepest = _of_joint(law, total, softness, np.maximum.accumulate(begin))
             deepest = np.where(curve.displacement < curve.deepest, deepest, 0.0)
