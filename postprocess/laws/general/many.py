@@ -21,6 +21,7 @@ from archord.report.by_name import ByName
 from archord.report.doubts import kind
 
 KNOWN = tuple(field.name for field in fields(LawJoint))
+_IDLE = ("k", "c", "length")  # parameters of other laws
 # parameters by which forces are others than the law's, and which the law does not know
 _OTHERS = ("block_size", "whole", "fixed_pairs")
 
@@ -59,8 +60,8 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     Raises
     ------
     ValueError
-        For columns that no joint has, for arrays of different lengths, for displacements that
-        are not of as many joints, and for tables of pandas whose indexes differ.
+        For columns that no joint has or that change nothing, for arrays of different lengths, for
+        displacements that are not of as many joints, and for tables of pandas whose indexes differ.
 
     Warns
     -----
@@ -158,6 +159,11 @@ def _rows(joints: Mapping[str, Any]) -> list[tuple[tuple[str, Any], ...]]:
     unknown = [name for name in columns if name not in KNOWN]
     if unknown:
         raise ValueError(f"{', '.join(unknown)}: no parameter of a joint; {', '.join(KNOWN)} are.")
+    for name in _IDLE:
+        usual = getattr(LawJoint, name)
+        if any(_is_given(value) and value != usual for value in np.ravel(columns.get(name, usual))):
+            said = "changes nothing here: forces are the general law's, per unit length"
+            raise ValueError(f"{name}: {said}.")
     try:
         every = np.broadcast_arrays(*map(np.atleast_1d, columns.values()))
     except ValueError:

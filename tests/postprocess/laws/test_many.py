@@ -92,6 +92,16 @@ def test_tables_whose_rows_have_another_order_are_refused():
         loads(SAME | columns, 0.05)
 
 
+def test_a_column_that_changes_nothing_is_refused():
+    """A length made no force the whole pin's, and no coefficient of Winkler's law counted."""
+    table = SAME | {"clearance": [0.05, 0.06]}
+    for idle in ({"length": [20.0, None]}, {"k": 0.9}, {"c": [1.0, 1.2]}):
+        with pytest.raises(ValueError, match="changes nothing here: forces are"):
+            loads(table | idle, 0.05)
+    usual = {"length": None, "k": 0.85, "c": [1.0, 1.0]}
+    np.testing.assert_array_equal(loads(table | usual, 0.05).load, loads(table, 0.05).load)
+
+
 def test_a_flag_is_true_or_false():
     """A large strain of 2 was counted twice."""
     found = loads(SAME | {"clearance": 0.05, "large_strain": [1, 2]}, 0.05)
