@@ -10,6 +10,7 @@ from time import perf_counter
 import click
 
 from archord.commands.options import Group, argument, complain, output, quiet
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 
 Say = Callable[[str], None]
@@ -50,7 +51,7 @@ def _conclude(printed: str, files: Iterable[Path], faults: list[str], quiet: boo
     help="analysis.strain of all runs",
 )
 @quiet()
-def reproduce(figures: tuple[str, ...], output: Path, strain: str, quiet: bool) -> int:
+def reproduce(figures: Names, output: Path, strain: str, quiet: bool) -> int:
     """Solve what the paper's figures need, and write each as CSV and picture; all of them with a
     report.
 
@@ -187,9 +188,7 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
     "--limit", type=click.FloatRange(1.0), default=600.0, help="seconds that a process may take"
 )
 @quiet("what failed")
-def work_precision(
-    output: Path, only: tuple[str, ...], repeats: int, limit: float, quiet: bool
-) -> int:
+def work_precision(output: Path, only: Names, repeats: int, limit: float, quiet: bool) -> int:
     """Time series of meshes, elastic and elasto-plastic, archord's and other codes', and set error
     against time.
 

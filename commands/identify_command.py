@@ -10,6 +10,7 @@ import click
 
 from archord.commands.law_files import Text, sentences, write
 from archord.commands.options import argument, file, flag, output, overrides, warn
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,8 +53,8 @@ _NUMBERS = "identified.json"
 def identify(
     curve: Path,
     scene: Path | None,
-    overrides: tuple[str, ...],
-    frees: tuple[str, ...],
+    overrides: Names,
+    frees: Names,
     delta: str | None,
     load: str | None,
     offset: str,

@@ -16,7 +16,7 @@ from click.core import ParameterSource
 from archord.commands.law_files import exports_of, sentences, write
 from archord.commands.law_joint import joint_of, of_scene
 from archord.commands.options import argument, file, flag, overrides, warn
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names, Words
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -99,9 +99,9 @@ def laws() -> int:
 @flag("--force", "overwrite exports")
 @sentences()
 def law(
-    names: tuple[str, ...],
+    names: Names,
     scene: Path | None,
-    overrides: tuple[str, ...],
+    overrides: Names,
     by_load: bool,
     to: float,
     points: int,
@@ -193,7 +193,7 @@ def _contact(options: dict[str, float | None]) -> Contact:
 
 def _export(
     joint: LawJoint,
-    units: dict[str, str],
+    units: Words,
     thickness: float,
     exports: tuple[Path, ...],
     contact: Contact,

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names, Words
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ _REFUSED = {
 
 
 def joint_of(
-    scene: Path | None, overrides: tuple[str, ...], given: ByName, needed: dict[str, str]
-) -> tuple[LawJoint, dict[str, str], float]:
+    scene: Path | None, overrides: Names, given: ByName, needed: Words
+) -> tuple[LawJoint, Words, float]:
     """The joint of the scene, which the options given change as ``--set`` would, or of the options
     alone; the names of the units; and the thickness. ``needed`` has the law by each parameter that
     one needs."""
@@ -81,7 +81,7 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _ask_for(missing: list[str], needed: dict[str, str]) -> str:
+def _ask_for(missing: list[str], needed: Words) -> str:
     """The sentence that asks for all that is ``missing`` of a joint; ``needed`` has the law by
     parameter."""
     names = ", ".join(map(_option, missing))
@@ -98,8 +98,8 @@ def _ask_for(missing: list[str], needed: dict[str, str]) -> str:
 
 
 def _joint_of_scene(
-    path: Path, overrides: tuple[str, ...], values: ByName, needed: dict[str, str]
-) -> tuple[LawJoint, dict[str, str], float]:
+    path: Path, overrides: Names, values: ByName, needed: Words
+) -> tuple[LawJoint, Words, float]:
     """As `joint_of`, of the scene ``path``."""
     from archord.postprocess.laws.general.joint import LawJoint
 
@@ -136,7 +136,7 @@ def _joint_of_scene(
     return joint, units, found.thickness
 
 
-def law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
+def law_scene(path: Path, overrides: Names) -> Scene:
     """The scene in ``path``. The closed-form laws are of the paper's joint alone: raises
     `InputError` for a scene that has none."""
     from archord.scene.file import load_scene

@@ -10,6 +10,7 @@ import click
 
 from archord.commands.options import SCENE, argument, file, flag, output, overrides, pictures
 from archord.commands.ranks import terminal_width
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 
 
@@ -119,7 +120,7 @@ def picture(
     folder: Path,
     steps: tuple[int, ...],
     field: str,
-    edges: tuple[str, ...],
+    edges: Names,
     cut: str,
     output: Path | None,
 ) -> int:
@@ -217,7 +218,7 @@ def probe(
 @output("deck to write [<scene name>.inp]")
 @overrides()
 @flag("--force", "overwrite a file that is there")
-def export_deck(scene: Path, output: Path | None, overrides: tuple[str, ...], force: bool) -> int:
+def export_deck(scene: Path, output: Path | None, overrides: Names, force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target
     from archord.postprocess.decks.deck import write_deck

@@ -21,6 +21,7 @@ from archord.commands.options import (
     quiet,
     warn,
 )
+from archord.report.by_name import Names
 
 if TYPE_CHECKING:
     from archord.scene.file import AnyScene
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 def solve(
     begun: float,
     scene: Path,
-    overrides: tuple[str, ...],
+    overrides: Names,
     output: Path | None,
     force: bool,
     restart: bool,
@@ -154,7 +155,7 @@ def scene(
 @output("picture to draw [<name>.png]")
 @overrides()
 @pictures("the mesh with its named sets")
-def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: bool) -> int:
+def mesh(file: Path, output: Path | None, overrides: Names, pictures: bool) -> int:
     """Print what is in a mesh: kind and order of its cells, named sets, circles and warnings; and
     draw it.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from archord.commands.options import argument, complain, flag, output, overrides, quiet, warn
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 from archord.report.table import Table
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 @quiet()
 def sweep(
     file: Path,
-    overrides: tuple[str, ...],
+    overrides: Names,
     output: Path | None,
     dry_run: bool,
     array: str,

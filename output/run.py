@@ -31,7 +31,7 @@ from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
 from archord.presets.account import account_of
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
 from archord.solver.contact.quadrature import points_by
@@ -225,7 +225,7 @@ class _Output:
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
             m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
-        self._on_root(lambda: self._report.unseal())
+        self._on_root(self._report.unseal)
         profiles = self.account.profiles()
         self._write_arrays(m, profiles)
         self._write_tables(m, step, profiles)
@@ -237,8 +237,7 @@ class _Output:
         if given is not None:
             write_mesh(given, self.folder)
         replace_file(self.folder / "scene.toml", self._scene)
-        write_history(self.folder / "history.csv", self.account.columns, [])
-        self._report.write()
+        self._replace_tables()
 
     def add(self, step: Step, position: Position, work: Work) -> Record:
         """Write an accepted output step, and return its record. Collective."""
@@ -324,7 +323,7 @@ class _Output:
         return found if self.system.comm.rank == 0 else []
 
 
-def _arrays(profiles: Mapping[str, EdgeProfile], names: tuple[str, ...]) -> ByName:
+def _arrays(profiles: Mapping[str, EdgeProfile], names: Names) -> ByName:
     """The arrays of all ``profiles`` that have these ``names``, as contact.h5 names them."""
     return {
         f"{side}/{name}": getattr(profile, name)

@@ -22,7 +22,7 @@ from archord.measures.record import Record
 from archord.output.files.disk import replace_file
 from archord.output.files.seal import report_text, seals_of
 from archord.presets.joint_doubts import APART
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.doubts import Told, kind, tell
 from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
@@ -50,7 +50,7 @@ class Report:
         self,
         path: Path,
         account: Account,
-        worst_cells: dict[str, float],
+        worst_cells: Amounts,
         begun: float,
         steps: list[Record],
         before: ByName,
@@ -157,7 +157,7 @@ class Report:
             "accepted_steps": len(self.steps),
         }
 
-    def _seconds(self) -> dict[str, float]:
+    def _seconds(self) -> Amounts:
         seconds = dict(self.system.timer.seconds)
         before_solving = seconds.pop(BEFORE_SOLVING, 0.0)
         seconds["setup"] -= before_solving

@@ -20,6 +20,7 @@ import numpy as np
 from archord.materials.material import Array, Arrays
 from archord.postprocess.curve import first_loading, gap_name
 from archord.postprocess.run import Run
+from archord.report.by_name import Words
 from archord.report.errors import InputError
 from archord.scene.file import scene_keys
 
@@ -40,7 +41,7 @@ class Comparison:
     ``unlike`` have other values from run to run."""
 
     runs: list[Run]
-    labels: dict[str, str]  # of "load" and of the quantities
+    labels: Words  # of "load" and of the quantities
     step_by_step: bool
     load: Array  # (n,)
     values: Arrays  # (r, n)
@@ -121,7 +122,7 @@ def _on_first_loading(table: Arrays) -> Arrays:
     return {name: values[first] for name, values in table.items()}
 
 
-Curves = tuple[list[Arrays], dict[str, str], Array]
+Curves = tuple[list[Arrays], Words, Array]
 
 
 def curves_of(runs: Sequence[Run]) -> Curves:

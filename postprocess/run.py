@@ -35,7 +35,7 @@ from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.probes.ask import probe
 from archord.postprocess.probes.probe import Probe
 from archord.presets.views import view_of
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName, Words
 from archord.report.errors import InputError
 from archord.scene.file import load_scene
 
@@ -56,9 +56,9 @@ class _Report(BaseModel):
     status: str
     message: str
     warnings: list[str]
-    versions: dict[str, str]
-    seconds: dict[str, float]
-    totals: dict[str, float]
+    versions: Words
+    seconds: Amounts
+    totals: Amounts
     steps: list[ByName]
     mesh: ByName = {}
     bodies: dict[str, Annotated[list[int], Field(min_length=1)]] = {}
@@ -313,7 +313,7 @@ class Run:
             )
         return int(step)
 
-    def _read_history(self) -> tuple[dict[str, list[float]], dict[str, str]]:
+    def _read_history(self) -> tuple[dict[str, list[float]], Words]:
         """Columns of history.csv by name, and their units."""
         path = self.folder / "history.csv"
         try:

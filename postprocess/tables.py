@@ -15,6 +15,7 @@ from archord.postprocess.comparison import COMMON, COMPARED, Comparison, differi
 from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
+from archord.report.by_name import Words
 from archord.report.doubts import kind, of_cases
 from archord.report.table import Table
 
@@ -125,7 +126,7 @@ def names_of(runs: Iterable[Run]) -> list[str]:
 def first_of_each_kind(warnings: list[str]) -> list[str]:
     """Each kind of warning once, at the first step that gave it; kinds differ in more than their
     numbers."""
-    first: dict[str, str] = {}
+    first: Words = {}
     for warning in warnings:
         first.setdefault(kind(warning), warning)
     return list(first.values())

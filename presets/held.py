@@ -15,6 +15,7 @@ from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.motions import AXISYMMETRIC, PLANE, SPACE, free_motions
 from archord.geometry.meshes.quality import beyond_axis, place
 from archord.materials.material import Array
+from archord.report.by_name import Words
 from archord.solver.conditions import Dirichlet
 from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.pair import Pair
@@ -113,7 +114,7 @@ def _spread(problem: Problem) -> set[str]:
     return pressed | {coupling.facets for coupling in distributing}
 
 
-def _moved(problem: Problem) -> dict[str, str]:
+def _moved(problem: Problem) -> Words:
     """The sets whose nodes move as is prescribed, and what prescribes it."""
     found = {c.facets: c.name for c in problem.couplings if c.kind == "rigid"}
     found |= {load.on: load.name for load in _loads(problem) if load.kind != "pressure"}
@@ -180,7 +181,7 @@ def _moved_in_contact(problem: Problem, whole: MeshArrays) -> Iterator[str]:
             )
 
 
-def _shared(problem: Problem, whole: MeshArrays, owner: dict[str, str]) -> Iterator[str]:
+def _shared(problem: Problem, whole: MeshArrays, owner: Words) -> Iterator[str]:
     """What is said of facets that two interactions have, facing the same body in both: what is
     between them would be counted twice."""
     surfaces = [
@@ -207,14 +208,12 @@ def _middle(whole: MeshArrays, facet: np.ndarray) -> str:
     return place(corners.mean(axis=0))
 
 
-def _faced(part: Interaction, name: str, owner: dict[str, str]) -> str:
+def _faced(part: Interaction, name: str, owner: Words) -> str:
     """The body that the surface ``name`` of an interaction meets, "" for a rigid disc."""
     return next((owner[other] for other in _surfaces(part) if other != name), "")
 
 
-def _free(
-    problem: Problem, whole: MeshArrays, cells: dict[str, str], owner: dict[str, str]
-) -> dict[str, list[str]]:
+def _free(problem: Problem, whole: MeshArrays, cells: Words, owner: Words) -> dict[str, list[str]]:
     """The rigid motions of each body that neither supports nor contact without friction prevent;
     but a turn of a body in contact in a plane."""
     held = _held_places(problem, whole, cells)
@@ -260,7 +259,7 @@ def _loose(
         )
 
 
-def _sliding(problem: Problem, owner: dict[str, str], moves: dict[str, list[str]]) -> Iterator[str]:
+def _sliding(problem: Problem, owner: Words, moves: dict[str, list[str]]) -> Iterator[str]:
     """Warnings of bodies in contact without friction that nothing keeps from sliding."""
     smooth = [part for part in problem.interactions if not (part.friction or _is_tied(part))]
     bodies = {owner[name] for part in smooth for name in _surfaces(part)}
@@ -275,7 +274,7 @@ def _sliding(problem: Problem, owner: dict[str, str], moves: dict[str, list[str]
 
 
 def _held_places(
-    problem: Problem, whole: MeshArrays, cells: dict[str, str]
+    problem: Problem, whole: MeshArrays, cells: Words
 ) -> dict[str, list[tuple[Array, Array]]]:
     """Where supports and displacements hold each body, and along what: places ``(k, d)`` and
     directions ``(k, d)``, or motions ``(1, 6)`` about the point of a coupling in space."""

@@ -19,7 +19,7 @@ from archord.measures.record import WORST, Record
 from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
 from archord.presets.joint import joint_problem
 from archord.presets.joint_doubts import before_steps, ending, step_checks
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.timer import Timer
 from archord.scene.presets.joint import Scene
 from archord.solver.path.system import System
@@ -129,7 +129,7 @@ class JointMeasures:
         """Displacement and force that do the load's work: delta and P. Collective."""
         return np.array(self.delta()), np.array(self.system.drive_force(""))
 
-    def forces(self) -> dict[str, float]:
+    def forces(self) -> Amounts:
         """Downward force of the whole joint at pin, contact and block's support. Collective."""
         contact = -self.system.contact_force("contact")[1]
         block = self.system.reaction("block")[1]

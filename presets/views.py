@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from archord.measures.record import Record
 from archord.presets.mesh_family import MeshFamily, ProblemFamily
+from archord.report.by_name import Amounts, Names, Words
 from archord.scene.presets.joint import Scene
 
 _CURVES = ("delta", "P", "p0", "eps", "peeq_max")
@@ -34,8 +35,8 @@ class ProblemView:
     """The runs of a general ``scene``."""
 
     path_name: str = "load_factor"  # the column that tells how far the load is
-    needed: tuple[str, ...] = ()  # columns that every run has, with finite numbers
-    sides: tuple[str, ...] = ()  # all surfaces of contact.h5 in their order, where that is known
+    needed: Names = ()  # columns that every run has, with finite numbers
+    sides: Names = ()  # all surfaces of contact.h5 in their order, where that is known
 
     def __init__(self, scene: Any) -> None:
         self.scene = scene
@@ -46,12 +47,12 @@ class ProblemView:
         return bool(self.scene.interaction)
 
     @property
-    def forces(self) -> dict[str, str]:
+    def forces(self) -> Words:
         """The column of the force of every load, by the load's name."""
         return {load.name: f"{load.name} force" for load in self.scene.load}
 
     @property
-    def pulls(self) -> dict[str, str]:
+    def pulls(self) -> Words:
         """The `forces` that are resultants: pressures and moments are left out."""
         pulling = {
             load.name
@@ -108,7 +109,7 @@ class ProblemView:
         """The meshes that are solved to the ``accuracy``."""
         return ProblemFamily(self.scene)
 
-    def quantities(self, last: Record) -> dict[str, float]:
+    def quantities(self, last: Record) -> Amounts:
         """What benchmarks compare at the step ``last``: all columns."""
         return last.values
 
@@ -129,12 +130,12 @@ class JointView(ProblemView):
     has_contact = True
 
     @property
-    def forces(self) -> dict[str, str]:
+    def forces(self) -> Words:
         """The column of the force on the joint."""
         return {"P": "P"}
 
     @property
-    def pulls(self) -> dict[str, str]:
+    def pulls(self) -> Words:
         """The same."""
         return self.forces
 
@@ -193,7 +194,7 @@ class JointView(ProblemView):
         bodies yield."""
         return MeshFamily(self.scene, accuracy / 2 if self.scene.plastic else accuracy)
 
-    def quantities(self, last: Record) -> dict[str, float]:
+    def quantities(self, last: Record) -> Amounts:
         """What benchmarks compare at the step ``last``, without units."""
         E_star = self.scene.E_star
         R = self.scene.joint.radius

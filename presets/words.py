@@ -15,7 +15,7 @@ from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.materials.material import Material
 from archord.report.attributes import attributes_of, described
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.errors import InputError
 from archord.scene.problem import ProblemScene
 from archord.scene.sections.contact import CONTACT_LAWS
@@ -126,7 +126,7 @@ def _hardening(law: Hardening) -> ByName | None:
     return {"yield_stress": yield_stress, "hardening": parameters}
 
 
-def _moduli(material: Any, plane: str) -> dict[str, float]:
+def _moduli(material: Any, plane: str) -> Amounts:
     """E and nu of the elastic moduli of ``material`` in a ``plane``, as if it were isotropic."""
     tangent = material.elastic_tangent
     along = float(tangent[0, 0])

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names
 from archord.report.errors import InputError
 from archord.report.readable import require_file
 from archord.scene.presets.joint import CHOSEN, Scene
@@ -20,7 +20,7 @@ from archord.scene.problem import ProblemScene
 from archord.scene.sections.faults import keys_of, shortened
 from archord.scene.sections.loading import LOADS
 
-ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
+ALTERNATIVES: dict[str, list[Names]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
     "load": [(*LOADS, "pressure", "path")],
 }
@@ -94,7 +94,7 @@ def in_order(overrides: Iterable[str], by: str = "") -> list[str]:
     materials, so that what they drop is what the file says, not another override. Raises
     `InputError`, which begins with ``by``, for two keys that are alternatives, as two loads are."""
     last = {override.partition("=")[0].strip(): override for override in overrides}
-    given: dict[tuple[str, ...], str] = {}
+    given: dict[Names, str] = {}
     for key, override in last.items():
         part, _, name = key.rpartition(".")
         section, *_ = part.split(".")

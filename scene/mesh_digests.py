@@ -7,13 +7,15 @@ import re
 from functools import lru_cache
 from pathlib import Path
 
+from archord.report.by_name import Words
+
 _NAMED = {
     ".inp": re.compile(rb"^\s*\*.*INPUT\s*=\s*([^,\r\n]+)", re.IGNORECASE | re.MULTILINE),
     ".xdmf": re.compile(rb">\s*([^<>:]+):/"),  # of data items
 }
 
 
-def digests(mesh: Path) -> dict[str, str]:
+def digests(mesh: Path) -> Words:
     """SHA-256 of the file ``mesh``, by the name "", and of the files in its folder that it names,
     by their names. Raises OSError for a ``mesh`` that cannot be read."""
     found = {}

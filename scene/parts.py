@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import Words
 from archord.scene.presets.known import AnyShape
 from archord.scene.sections.bodies import NotNegative, Solid
 from archord.scene.sections.contact import CONTACT_LAWS, PARAMETERS_IN_WORDS, require_parameters
@@ -118,7 +119,7 @@ class OwnSection(Section):
 
     kind: Name = key("the class", example="Archard")
     text: str = key("what Python prints of the object", example="Archard(rate=1e-8)")
-    attributes: dict[str, str] = key("its attributes, by which a change is known", default={})
+    attributes: Words = key("its attributes, by which a change is known", default={})
 
 
 class OwnMaterial(OwnSection):
@@ -196,7 +197,7 @@ class InteractionSection(Section):
     )
 
     @property
-    def quantities(self) -> dict[str, str]:
+    def quantities(self) -> Words:
         """Units of what the law tells besides forces, by name."""
         return self.own.quantities if self.own else {}
 

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from archord.report.by_name import Words
 from archord.report.units import scale_lacks
 from archord.scene.columns import require_different
 from archord.scene.parts import (
@@ -147,7 +148,7 @@ class ProblemScene(Checked):
                     f"must not be the name of {'another' if other == section else 'a'} {other}, too"
                 )
                 require(not alike, (section, part.name, "name"), said)
-        used: dict[str, str] = {}
+        used: Words = {}
         for part, name in [(i, name) for i in self.interaction for name in i.surfaces]:
             place = ("interaction", part.name, "surfaces")
             other = used.setdefault(name, part.name)

@@ -175,7 +175,7 @@ class _Search:
                 self._tell(level)
                 curve = finer
                 level = finer_level
-                self.substeps = 2 * self.substeps
+                self.substeps *= 2
                 continue
             apart = step_error(curve, finer)
             is_evidence = apart <= before or not has_friction
@@ -189,7 +189,7 @@ class _Search:
             self._tell(replace(level, step_error=error_before))
             curve = finer
             level = finer_level
-            self.substeps = 2 * self.substeps
+            self.substeps *= 2
             self.step_error = error
             if (is_evidence and 2 * error <= self.asked) or self.substeps >= MOST_SUBSTEPS:
                 return curve, replace(level, step_error=error)

@@ -14,6 +14,7 @@ from archord.postprocess.judgement.convergence import Refined, group, twins
 from archord.postprocess.laws.calibration import POOR, check_compatible, fit_curve
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run
+from archord.report.by_name import Words
 from archord.report.errors import InputError
 from archord.report.table import Table
 from archord.report.version import VERSION
@@ -39,7 +40,7 @@ class SweepFit:
     ``left_out`` with the reason."""
 
     rows: list[Row]
-    notes: dict[str, str]
+    notes: Words
     left_out: list[tuple[str, str]]
 
     def __str__(self) -> str:

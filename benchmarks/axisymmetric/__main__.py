@@ -22,6 +22,7 @@ from archord.benchmarks.peers.calculix import process
 from archord.benchmarks.timing import run_once
 from archord.output.folder import MESH
 from archord.presets.words import words_of
+from archord.report.by_name import Names
 from archord.report.table import Table
 
 STUDIES = (ring.STUDY, punch.STUDY)
@@ -29,7 +30,7 @@ CASES = (*thick_walls.CASES, *balls.CASES, *(study.case() for study in STUDIES))
 FINER = (1, 2, 4)
 
 
-def rows(case: Case) -> Iterator[tuple[str, ...]]:
+def rows(case: Case) -> Iterator[Names]:
     """Solve a ``case``; its rows of the table."""
     start = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
@@ -44,7 +45,7 @@ def rows(case: Case) -> Iterator[tuple[str, ...]]:
         yield (case.name, what, f"{reference:.6g}", by, f"{ours:.6g}", off, *cost)
 
 
-def study_rows(study: Study, finer: int) -> Iterator[tuple[str, ...]]:
+def study_rows(study: Study, finer: int) -> Iterator[Names]:
     """Solve a ``study`` by archord and by CalculiX on one mesh; the rows of the table."""
     problem = study.problem(finer)
     with tempfile.TemporaryDirectory() as name:

@@ -12,7 +12,7 @@ import numpy as np
 from archord.benchmarks.cost.work_precision_codes import CASES, Point, points, profile_error
 from archord.benchmarks.timing import Said, Timing, time_all
 from archord.benchmarks.work_precision_picture import STEM, cases, draw, short_table
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.files import write_rows, write_text
 
 NAMES = ("P", "p0", "eps", "profile", "dissipation")
@@ -31,7 +31,7 @@ class Line:
         return {} if self.timing.failure else self.timing.runs[-1].result
 
     @property
-    def errors(self) -> dict[str, float]:
+    def errors(self) -> Amounts:
         """Relative errors by quantity against the reference of the code's kinematics."""
         case = CASES[self.point.case]
         kinematics = self.found.get("kinematics", "current")

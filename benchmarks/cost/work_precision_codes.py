@@ -28,7 +28,7 @@ from archord.benchmarks.timing import Failure, Process, solving
 from archord.geometry.basis import Array
 from archord.postprocess.run import Run
 from archord.presets.arc import ArcProfile
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Words
 from archord.report.errors import InputError
 from archord.report.files import read_json, toml_beside
 from archord.report.version import VERSION
@@ -215,7 +215,7 @@ def _calculix(scene: AnyScene, folder: Path) -> Process:
     return replace(process, read=read)
 
 
-def _calculix_version() -> dict[str, str]:
+def _calculix_version() -> Words:
     """CalculiX and its version, if it is installed."""
     if shutil.which("ccx") is None:
         return {}

@@ -20,17 +20,16 @@ from archord.postprocess.judgement.convergence import group
 from archord.postprocess.laws.calibration import fit_curve
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
+from archord.report.by_name import Amounts, Words
 from archord.report.files import toml_beside
 from archord.report.table import Table
 
-TEXTS: dict[str, dict[str, str]] = toml_beside(__file__, "claims.toml")
+TEXTS: dict[str, Words] = toml_beside(__file__, "claims.toml")
 GOOD = 0.05
 FAIR = 0.15
 _CORNER = 85  # degrees from the contact axis beyond which the block is held
 Tables = dict[str, list[Part]]  # of the figures, by name
-Found = tuple[
-    str, dict[str, float]
-]  # in a plane: what we find, and how far off is what the claim is about
+Found = tuple[str, Amounts]  # in a plane: what we find, and how far off is what the claim is about
 
 
 def grade(deviation: float) -> str:
@@ -40,7 +39,7 @@ def grade(deviation: float) -> str:
     return "holds with a limit" if deviation <= FAIR else "does not hold"
 
 
-def verdict(strain: dict[str, float], stress: dict[str, float]) -> str:
+def verdict(strain: Amounts, stress: Amounts) -> str:
     """On all that a claim is about, one for both planes where they agree, else each."""
     said = []
     for what in strain:

@@ -49,10 +49,10 @@ def solved(changes: ByName) -> Sequence[Record]:
 
 def table_of(thicknesses: Sequence[float]) -> Table:
     """Forces and peak pressures in space over those of plane stress and of plane strain."""
-    planes = []
     fine = JOINT | {"relative_element_size": 0.05, "growth": 0.2}
-    for plane in ("stress", "strain"):
-        planes.append(solved({"joint": fine, "analysis": {"plane": plane}}))
+    planes = [
+        solved({"joint": fine, "analysis": {"plane": plane}}) for plane in ("stress", "strain")
+    ]
     over = [f"{what}/{plane}" for what in ("P", "p0") for plane in ("stress", "strain")]
     table = Table("t/R", "delta/dR", *over, "rim/p0")
     for ratio in thicknesses:

@@ -23,12 +23,12 @@ from archord.benchmarks.case import Case, Expected, paper_joint, varied
 from archord.benchmarks.persson import persson_joint, theory
 from archord.benchmarks.stability.eye import drawn_eye
 from archord.presets.views import view_of
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.files import read_json, toml_beside
 from archord.scene.file import AnyScene, parse_any
 from archord.scene.presets.joint import Scene
 
-Values = dict[str, dict[str, float]]  # by case and quantity
+Values = dict[str, Amounts]  # by case and quantity
 FILE = Path(__file__).with_name("fine.json")
 FINE = "fine"  # an expected value that is the same case's on a fine mesh (see `fine_scene`)
 _COARSE = 0.1

@@ -22,6 +22,7 @@ from archord.benchmarks.stability.picture import draw
 from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
 from archord.presets.views import view_of
+from archord.report.by_name import Amounts, Words
 from archord.report.errors import InputError
 from archord.report.files import read_json, write_report
 from archord.report.table import Table
@@ -43,7 +44,7 @@ class Check:
     error: float
     allowed: float
     fault: str
-    entries: dict[str, str] = field(default_factory=dict)
+    entries: Words = field(default_factory=dict)
 
     @property
     def share(self) -> float:
@@ -69,7 +70,7 @@ class Result:
     cutbacks: int = 0
     forces: Check | None = None
     energy: Check | None = None
-    quantities: dict[str, float] = field(default_factory=dict)
+    quantities: Amounts = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     not_finite: list[str] = field(default_factory=list)
 

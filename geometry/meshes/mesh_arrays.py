@@ -25,6 +25,7 @@ from archord.geometry.meshes.cells import (
     with_middle_nodes,
 )
 from archord.geometry.meshes.tagged_mesh import tags_of
+from archord.report.by_name import Names
 from archord.report.errors import shown
 
 _FAR = 1e30  # coordinates beyond overflow
@@ -64,7 +65,7 @@ class MeshArrays:
     cell_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     point_sets: dict[str, np.ndarray] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
 
     @property
     def order(self) -> int:

@@ -15,6 +15,7 @@ from archord.geometry.meshes.cells import corners_of, distinct, entities_of, sid
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.kernels.compat import cell_nodes
+from archord.report.by_name import Amounts
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 # Smallest over largest jacobian below which a cell is told of. Cells below -0.02 are refused: the
@@ -180,7 +181,7 @@ def quality(mesh: MeshArrays) -> Quality:
     return Quality(smallest / largest, _widths(mesh) / _REGULAR[mesh.kind])
 
 
-def worst_cells(mesh: Mesh) -> dict[str, float]:
+def worst_cells(mesh: Mesh) -> Amounts:
     """The smallest values of `Quality`, by their names, of a distributed ``mesh``. Collective."""
     dimension = mesh.topology.dim
     own = cell_nodes(mesh)[: mesh.topology.index_map(dimension).size_local]

@@ -13,6 +13,7 @@ from dolfinx.mesh import Mesh, MeshTags, compute_incident_entities
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.report.by_name import Names
 
 SAME_PLACE = 1e-8  # of the mesh's size
 
@@ -37,7 +38,7 @@ class TaggedMesh:
     cell_sets: Sets
     facet_sets: Sets
     point_sets: Mapping[str, Array] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
     point_tags: Mapping[str, Sequence[frozenset[int]]] = field(default_factory=dict)
 
     @property

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.files.disk import naming
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Words
 from archord.report.errors import InputError
 from archord.report.readable import json_of, require_file
 
@@ -75,7 +75,7 @@ def require_intact(folder: Path, names: Iterable[str]) -> None:
             raise InputError(folder / name, f"{fault}; {cure}.")
 
 
-def faults_of(folder: Path, seals: Seals) -> dict[str, str]:
+def faults_of(folder: Path, seals: Seals) -> Words:
     """`fault_of` by name of all sealed files that have one; large files are known by their size."""
     found = {name: fault_of(folder, name, seals, by_size=name not in TABLES) for name in seals}
     return {name: fault for name, fault in found.items() if fault}

@@ -22,6 +22,8 @@ Arrays = dict[str, np.ndarray]
 
 _GROUPS = h5py.h5p.create(h5py.h5p.LINK_CREATE)
 _GROUPS.set_create_intermediate_group(True)
+# what reading a damaged file may raise
+UNREADABLE = (MemoryError, OSError, LookupError, RuntimeError, TypeError, ValueError)
 _NUMBERS = count()  # HDF5 tells open files apart by name
 
 
@@ -113,7 +115,7 @@ class StepFile:
                     if path.endswith(ending)
                 }
                 return load, found
-        except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError):
+        except UNREADABLE:
             return None
 
     def _read(self, fixed: Arrays, after: int) -> list[tuple[float, Arrays]]:
@@ -134,7 +136,7 @@ class StepFile:
                     name, _, step = path.rpartition("/")
                     steps.setdefault(step, {})[name] = array
                 return [(load, steps[step_name(k)]) for k, load in enumerate(loads, start=1)]
-        except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
+        except UNREADABLE as error:
             said = f"is missing or damaged, so that the run cannot be continued ({error})"
             raise InputError(self.path, f"{said}.") from None
 

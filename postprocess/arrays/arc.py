@@ -13,7 +13,7 @@ import numpy as np
 from archord.materials.material import Array, Arrays
 from archord.measures.edge import AnyProfile, PatchProfile, SurfaceProfile
 from archord.output.files.seal import require_intact
-from archord.output.files.step_file import step_name
+from archord.output.files.step_file import UNREADABLE, step_name
 from archord.presets.arc import ArcProfile
 from archord.report.by_name import ByName
 from archord.report.errors import InputError
@@ -36,7 +36,7 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
             yield file
-    except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
+    except UNREADABLE:
         raise InputError(path, f"cannot be read as the {name} of a run at step {step}.") from None
 
 

@@ -16,6 +16,7 @@ from archord.materials.kinematics import PLANE_STRAIN, kinematics
 from archord.materials.material import Array, Arrays
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arrays.arc import opened
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 from archord.scene.sections.errors import toml_value
 
@@ -96,7 +97,7 @@ class Fields:
     displacement: Array  # (n, 2)
     cell: Arrays  # means of cells by name: scalars (m,), tensors (m, 4)
     nodal: Arrays  # recovered at the nodes: scalars (n,), tensors (n, 4)
-    components: tuple[str, ...] = PLANE_STRAIN.names  # of tensors (., 4)
+    components: Names = PLANE_STRAIN.names  # of tensors (., 4)
     bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
     edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along named sets
 

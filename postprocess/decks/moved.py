@@ -10,6 +10,7 @@ from archord.materials.material import Arrays
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
 from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import number
+from archord.report.by_name import Amounts
 from archord.solver.path.system import System
 from archord.solver.problem import Rigid
 
@@ -25,7 +26,7 @@ class Moved:
     rates: Arrays
     whole: bool
 
-    def boundary(self, values: dict[str, float]) -> list[str]:
+    def boundary(self, values: Amounts) -> list[str]:
         """Rows of ``*BOUNDARY`` at these values of the drives."""
         moved = np.zeros(len(self.nodes))
         for drive, rate in self.rates.items():

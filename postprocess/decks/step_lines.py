@@ -8,6 +8,7 @@ from archord.postprocess.decks.mesh import label
 from archord.postprocess.decks.mesh_lines import DRIVES
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.rows import block, number, pair
+from archord.report.by_name import Amounts
 
 _LARGE = (
     "NLGEOM is elastic by St. Venant and Kirchhoff in CalculiX; archord has Hencky's elasticity"
@@ -50,7 +51,7 @@ def step_lines(model: DeckModel, target: float, *, first: bool, last: bool) -> l
     return [*lines, "*END STEP"]
 
 
-def _nodal_forces(model: DeckModel, values: dict[str, float]) -> list[str]:
+def _nodal_forces(model: DeckModel, values: Amounts) -> list[str]:
     """Rows of ``*CLOAD`` at these values of the drives, at all nodes that are ever loaded."""
     total = np.zeros_like(model.mesh.x)
     ever = np.zeros_like(total)

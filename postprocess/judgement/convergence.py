@@ -123,7 +123,7 @@ class Refined:
             apart = delta - run.delta[chosen]
             if apart.any():
                 slope = _slope(run.delta, curve)[chosen]
-                value = value + slope * apart
+                value += slope * apart
             values.append(value)
         return common, values
 

@@ -21,6 +21,7 @@ import numpy as np
 from archord.materials.material import Array
 from archord.postprocess.judgement.parts import Part, no_sections, parts_of
 from archord.postprocess.judgement.sections import proof_strength, tensile_strength
+from archord.report.by_name import Amounts
 from archord.report.errors import InputError
 from archord.report.table import Table
 from archord.scene.sections.bodies import Solid
@@ -156,7 +157,7 @@ def _chosen(parts: dict[str, Part], asked: str) -> Part:
 
 
 def _by_elements(
-    part: Part, peeq: Array, applied: dict[str, float], yields: float, breaks: float | None
+    part: Part, peeq: Array, applied: Amounts, yields: float, breaks: float | None
 ) -> tuple[list[StrengthCheck], list[str]]:
     """The checks of the steps' forces on a ``part`` and its largest PEEQ ``(n,)`` against the PEEQ
     at which it ``yields`` and ``breaks``, and notes on them."""

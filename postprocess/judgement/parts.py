@@ -16,6 +16,7 @@ from archord.postprocess.judgement.sections import (
     lug_forces,
     tensile_strength,
 )
+from archord.report.by_name import Amounts, Names
 from archord.report.errors import InputError
 from archord.scene.parts import BodySection
 from archord.scene.presets.lug import LugShape
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 PLATES = {"inner": 1, "outer": 2}  # of a clevis, and how many it has of each
 
 
-def no_sections(kind: str, strength: float) -> dict[str, float]:
+def no_sections(kind: str, strength: float) -> Amounts:
     """By hand of a body whose sections are not known."""
     return {}
 
@@ -44,8 +45,8 @@ class Part:
     force: Array
     unit: str
     noun: str
-    by_hand: Callable[[str, float], dict[str, float]] = no_sections
-    notes: tuple[str, ...] = ()
+    by_hand: Callable[[str, float], Amounts] = no_sections
+    notes: Names = ()
 
 
 def parts_of(run: Run) -> dict[str, Part]:
@@ -129,7 +130,7 @@ def _sectioned(
     if bears < thickness:
         note += f", over the length {bears:g} of the pin"
 
-    def by_hand(_: str, strength: float) -> dict[str, float]:
+    def by_hand(_: str, strength: float) -> Amounts:
         return lug_forces(lug, strength, thickness, bears)
 
     noun = f"{name} plate" if name else "lug"
@@ -155,7 +156,7 @@ def _pin(run: Run, inner: Part) -> Part:
     else:
         notes.append("where the ends of plates bear is not known of plates without a yield stress")
 
-    def by_hand(kind: str, strength: float) -> dict[str, float]:
+    def by_hand(kind: str, strength: float) -> Amounts:
         return pin.forces(kind, strength, weakest)
 
     return Part("pin", _body_of(run, "pin"), inner.force, inner.unit, "pin", by_hand, tuple(notes))

@@ -30,6 +30,7 @@ from itertools import product
 
 import numpy as np
 
+from archord.report.by_name import Amounts
 from archord.scene.presets.lug import LugShape
 from archord.scene.sections.bodies import Solid
 
@@ -40,7 +41,7 @@ _SPREAD = math.radians(40)  # where the shear-out planes leave the hole, from th
 
 def lug_forces(
     lug: LugShape, strength: float, thickness: float, bears: float = math.inf
-) -> dict[str, float]:
+) -> Amounts:
     """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin
     or the bushing, over a length ``bears`` that may be shorter than its ``thickness``."""
     edge = lug.arguments()["edge_distance"]
@@ -67,7 +68,7 @@ class ClevisPin:
 
     def forces(
         self, kind: str, strength: float, plates: tuple[float, float] | None = None
-    ) -> dict[str, float]:
+    ) -> Amounts:
         """Forces on the clevis at which the pin reaches a ``strength``, proof strength for the
         ``kind`` "yield". ``plates`` are the ultimate forces on the inner plate and on both outer
         plates together, where they are known."""

@@ -13,6 +13,7 @@ from archord.materials.material import Array
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import ROUND_OFF, LawRangeWarning, LawState, rising_root
+from archord.report.by_name import Names, Words
 from archord.report.readable import json_of
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -42,7 +43,7 @@ class FittedLaw(BaseModel):
     plane: str = "strain"
     length_unit: str = "mm"
     force_unit: str = "N/mm"
-    fitted_to: tuple[str, ...] = ()
+    fitted_to: Names = ()
     rms: float | None = None
     largest: float | None = None
 
@@ -91,7 +92,7 @@ class FittedLaw(BaseModel):
         return cls.model_validate(data.get("law", data) if isinstance(data, dict) else data)
 
     @property
-    def about(self) -> dict[str, str]:
+    def about(self) -> Words:
         """What the law is of, how it was found, and how good it is, in words."""
         low, high = self.fitted_range
         law = "Winkler law" if self.c is None else "plastic-Winkler law"

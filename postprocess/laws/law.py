@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
+from archord.report.by_name import Names
 
 ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
 _FAR = 1e150  # no displacement, and its square is still a number
@@ -101,9 +102,9 @@ class Law:
     unfit: Callable[[LawJoint], str] = (
         lambda joint: ""
     )  # why the law does not hold for the whole joint
-    needs: tuple[str, ...] = ()
-    gives: tuple[str, ...] = ("displacement", "pressure", "contact angle")
-    coefficients: tuple[str, ...] = ()  # fitted ones among k and c
+    needs: Names = ()
+    gives: Names = ("displacement", "pressure", "contact angle")
+    coefficients: Names = ()  # fitted ones among k and c
     plastic: bool = False  # whether it knows yielding, without hardening
     solved: bool = False  # whether it is of joints that archord has solved
 

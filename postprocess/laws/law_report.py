@@ -11,6 +11,7 @@ from archord.output.user_file import save_figure
 from archord.postprocess.laws.general.general_law import law_of_joint
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import NOTHING, Law, LawState
+from archord.report.by_name import Words
 from archord.report.figure import new_figure
 from archord.report.table import Table
 
@@ -59,9 +60,7 @@ def too_elastic(law: Law, joint: LawJoint, state: LawState) -> list[str]:
     return [f"{law.name}: knows no yielding, and its p0 reaches {over:.3g} times the yield stress"]
 
 
-def law_table(
-    law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float
-) -> str:
+def law_table(law: Law, joint: LawJoint, state: LawState, units: Words, thickness: float) -> str:
     """The law's title and its `sample`, a row for each point, in ``units`` of length, force,
     stiffness and stress where they are known, forces of a joint of this ``thickness``; without
     columns that the law says nothing of."""

@@ -148,7 +148,7 @@ def _balance_panel(run: Run, axes: Any) -> None:
     residuals = [_last_residual(step) for step in run.summary["steps"]]
     curves = {"force balance": balance, "last residual": residuals[: run.steps]}
     for name, values in curves.items():
-        shown = [value if value else np.nan for value in values]
+        shown = [value or np.nan for value in values]
         if np.isfinite(shown).any():
             axes.semilogy(steps[: len(shown)], shown, ".-", label=name)
     estimates = run.summary.get("error_estimates", {})

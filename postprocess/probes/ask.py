@@ -11,6 +11,7 @@ from archord.postprocess.probes.line import along_line
 from archord.postprocess.probes.probe import Probe
 from archord.postprocess.probes.probed import Probed
 from archord.postprocess.probes.surface import CONTACT, along_surface
+from archord.report.by_name import Amounts
 from archord.report.errors import InputError
 
 _OF_LENGTH = ("ux", "uy", "uz", "gap")
@@ -72,7 +73,7 @@ def _unit_of(quantity: str, units: Any) -> str:
     return ""
 
 
-def _pulls(run: Probed, step: int) -> dict[str, float]:
+def _pulls(run: Probed, step: int) -> Amounts:
     """The forces of the loads at ``step``, per unit thickness, 0 where they are round-off."""
     columns = {by: run.columns[column] for by, column in run.view.pulls.items()}
     found = {}

@@ -11,6 +11,7 @@ import numpy as np
 
 from archord.materials.kinematics import PLANE_STRAIN, SPACE
 from archord.materials.material import Array
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ class Probe:
     length: str = ""  # the unit of x and s
     # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
     angle: Array | None = None
-    axes: tuple[str, ...] = ("x", "y")
+    axes: Names = ("x", "y")
     per: str = "per unit thickness"  # what the force is of
     pulls: Mapping[str, float] = field(default_factory=dict)  # by loads, as the force
 

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, BoredShape, PinPart, Preset
 from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import NotNegative, Solid
@@ -43,7 +43,7 @@ class Lug(PlateOutline, BoredShape):
         """Radius of the hole in the plate."""
         return self.radius + self.clearance
 
-    def check(self, hole: float | None = None, place: tuple[str, ...] = ()) -> None:
+    def check(self, hole: float | None = None, place: Names = ()) -> None:
         """Raise `Fault` below ``place`` for a plate in which a ``hole`` of this radius, by default
         its own, leaves no ligament."""
         a = self.arguments()
@@ -83,7 +83,7 @@ class LugBushing(Solid):
         "the pin touches it on the load axis at first, as under a force", default=False
     )
 
-    def check(self, lug: Lug, place: tuple[str, ...] = ()) -> float:
+    def check(self, lug: Lug, place: Names = ()) -> float:
         """The radius of the hole that it needs in the plate of ``lug``. Raises `Fault` below
         ``place``."""
         R = lug.radius

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from archord.report.by_name import Amounts
 from archord.scene.sections.keys import Positive, Section, key, require
 
 _STUCK = 1000.0  # coefficient of friction from which points are meant to stick
@@ -14,7 +15,7 @@ Accuracy = Annotated[float, Field(ge=1e-5, le=0.1)]
 Side = Literal["both", "pin", "block"]
 
 
-def friction_doubts(frictions: dict[str, float]) -> list[str]:
+def friction_doubts(frictions: Amounts) -> list[str]:
     """A question for each coefficient, by its key, that may be one in per cent."""
     doubted = {name: friction for name, friction in frictions.items() if 2 < friction < _STUCK}
     return [

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
+from archord.report.by_name import Names
 from archord.scene.sections.errors import Fault
 from archord.scene.sections.keys import Positive, Section, key, require
 from archord.scene.sections.plasticity import IN_WORDS, HardeningKey, filled, hardening_law
@@ -165,7 +166,7 @@ class Pin(Solid):
         return self
 
 
-def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
+def require_solids(solids: Mapping[Names, Solid]) -> None:
     """Raise `Fault` for moduli and strengths, by their places, that leave the tolerances or the
     range of numbers."""
     stiffest = max(solid.E for solid in solids.values())

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import ValidationError
 
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names
 from archord.report.errors import InputError
 from archord.scene.sections.bodies import strength_doubts
 from archord.scene.sections.faults import in_sentences
@@ -22,7 +22,7 @@ class Checked(Section):
     """
 
     # keys that an accuracy chooses
-    chosen: ClassVar[tuple[str, ...]] = ()
+    chosen: ClassVar[Names] = ()
     # whether the closed-form laws of P(delta) are for scenes of this kind
     has_laws: ClassVar[bool] = False
 

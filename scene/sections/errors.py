@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from archord.report.by_name import Names
+
 
 class Fault(ValueError):
     """What is ``said`` of the key at ``place``: of its section, or below sections or the names of
     tables."""
 
-    def __init__(self, place: tuple[str, ...], said: str) -> None:
+    def __init__(self, place: Names, said: str) -> None:
         super().__init__(said)
         self.place = place
 

@@ -12,7 +12,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Words
 from archord.scene.sections.errors import Fault, toml_value
 
 _MOST_SENTENCES = 20
@@ -55,7 +55,7 @@ def in_sentences(
     data: ByName,
     model: type[BaseModel],
     source: str,
-    origin: dict[str, str],
+    origin: Words,
 ) -> str:
     """The first ``errors`` of checking ``data`` against ``model``, a line each; ``origin`` says
     which keys are not from ``source``, and where they are from. Of a misspelled key it is not said
@@ -92,9 +92,7 @@ def shortened(text: str) -> str:
     return f"{text[: _LONGEST - 20]} ... {text[-15:]}"
 
 
-def _sentence(
-    error: Any, data: ByName, model: type[BaseModel], source: str, origin: dict[str, str]
-) -> str:
+def _sentence(error: Any, data: ByName, model: type[BaseModel], source: str, origin: Words) -> str:
     place = error["loc"]
     context = dict(error.get("ctx", {}))
     fault = context.get("error")
@@ -144,7 +142,7 @@ def _kind_of(value: Any) -> Any:
     return value.get("kind") if isinstance(value, dict) else None
 
 
-def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
+def _known_keys(model: Any, loc: tuple[str | int, ...]) -> Words:
     """What may stand in the place ``loc`` of an unknown key or section, and which of it may be
     meant."""
     of_kind = {}

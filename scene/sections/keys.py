@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic._internal._model_construction import ModelMetaclass
 
+from archord.report.by_name import Names
 from archord.report.errors import InputError
 from archord.scene.sections.errors import Fault
 from archord.scene.sections.faults import of_section
@@ -42,14 +43,14 @@ def key(
     return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
-def require(holds: bool, place: str | tuple[str, ...], said: str) -> None:
+def require(holds: bool, place: str | Names, said: str) -> None:
     """Raise `Fault` unless it ``holds`` what is ``said`` of the key at ``place``, a tuple or
     "section.key"."""
     if not holds:
         raise Fault(tuple(place.split(".")) if isinstance(place, str) else place, said)
 
 
-def given(section: BaseModel, names: tuple[str, ...]) -> str:
+def given(section: BaseModel, names: Names) -> str:
     """The one key among ``names`` that ``section`` has. Raises `Fault` unless it has exactly
     one."""
     found = [name for name in names if getattr(section, name) is not None]

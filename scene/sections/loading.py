@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from archord.report.by_name import Names
 from archord.scene.sections.keys import Name, Section, given, key, require
 
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
@@ -26,7 +27,7 @@ class Loading(Section):
     """A load of one of several ``kinds`` (keys): one value, or a list of values at the ends of
     stages."""
 
-    kinds: ClassVar[tuple[str, ...]] = ("displacement", "force")
+    kinds: ClassVar[Names] = ("displacement", "force")
 
     @model_validator(mode="after")
     def _one_kind(self):

@@ -30,6 +30,7 @@ from archord.geometry.meshes.formats.abaqus_blocks import (
     scoped_blocks,
 )
 from archord.geometry.meshes.mesh_arrays import MeshArrays, one_kind, require_known
+from archord.report.by_name import Words
 
 # trusses; plane stress, plane strain, axisymmetric; solids: each with the number of nodes
 _KINDS = {
@@ -88,7 +89,7 @@ class _Model:
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[tuple[list[int], str]]] = defaultdict(list)
         self.internal: set[str] = set()
-        self._names: dict[str, str] = {}
+        self._names: Words = {}
         self._owners: dict[tuple[str, str], int] = {}
         readers = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
         blocks = list(scoped_blocks(path))

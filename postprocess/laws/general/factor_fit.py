@@ -34,7 +34,7 @@ from archord.postprocess.laws.general.general_law import NODES, joint_numbers, w
 from archord.postprocess.laws.general.hardening_model import block_leads, flows
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.files import read_json
 from archord.report.table import Table
 
@@ -192,7 +192,7 @@ def _expected(off: Array, leading: Array) -> list[float]:
     return [float(f"{value:.3g}") for value in (usual, more)]
 
 
-def back_factors(joints: list[Changed]) -> dict[str, float]:
+def back_factors(joints: list[Changed]) -> Amounts:
     """The factors of the expected error on the way back by plane: the law lets P fall there as
     without friction or large strain."""
     factors = {}

@@ -56,6 +56,7 @@ from archord.postprocess.laws.general.yield_model import (
     mesh_excess,
     sides_of,
 )
+from archord.report.by_name import Amounts
 from archord.report.files import read_json
 from archord.report.table import Table
 
@@ -182,7 +183,7 @@ def fit_strain(joints: list[Hardened], start: Model | None = None) -> Arrays:
     return model
 
 
-def fit_peak(joints: list[Hardened], model: Model) -> dict[str, float]:
+def fit_peak(joints: list[Hardened], model: Model) -> Amounts:
     """The factor on `peak_rise` by plane, by least squares of ln p0."""
     factors = {}
     for plane in sorted({joint.numbers.plane for joint in joints}):
@@ -211,7 +212,7 @@ def predicted(joints: list[Hardened], model: Model) -> list[Model]:
     return [parts[part] for part in part_of]
 
 
-def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[dict[str, float], Table]:
+def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[Amounts, Table]:
     """The factors of the expected error by kind; and rms and largest errors of P from 0.1 to 2 dR,
     in per cent, of joints that the others predict, with the share within the expected error."""
     by_kind: dict[str, list[Array]] = {}

@@ -62,7 +62,7 @@ from archord.postprocess.laws.general.yield_model import (
     total_loss,
 )
 from archord.postprocess.run import Run
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName
 from archord.report.files import read_json
 from archord.report.table import Table
 
@@ -209,11 +209,11 @@ def solved_joints(
 
 def by_joint(folder: Path, names: Container[str] | None = None) -> dict[LawJoint, list[NodeRun]]:
     """The joints that are solved as far as the law needs them, of `solved_joints`."""
-    found = {}
-    for joint, nodes in solved_joints(folder, names).items():
-        if complete(joint_numbers(joint), nodes):
-            found[joint] = nodes
-    return found
+    return {
+        joint: nodes
+        for joint, nodes in solved_joints(folder, names).items()
+        if complete(joint_numbers(joint), nodes)
+    }
 
 
 def solved_in(folder: Path, names: Container[str] | None = None) -> dict[Numbers, list[NodeRun]]:
@@ -387,7 +387,7 @@ def _spread(errors: Array, name: str) -> float:
     return float(f"{np.nanquantile(errors, WITHIN[name]):.3g}")
 
 
-def _spread_by_kind(side: str, inputs: Array, errors: Array) -> dict[str, float]:
+def _spread_by_kind(side: str, inputs: Array, errors: Array) -> Amounts:
     """What `scatter` takes, from ``errors`` ``(n, multiples)`` of the force over their standard
     deviations; a kind without joints has the factor of all."""
     places = kind_of_scatter(side, inputs)

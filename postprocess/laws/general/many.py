@@ -17,7 +17,7 @@ from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import law_of_joint
 from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Words
 from archord.report.doubts import kind
 
 KNOWN = tuple(field.name for field in fields(LawJoint))
@@ -141,7 +141,7 @@ def _of_joints(n: int, delta: npt.ArrayLike, deepest: npt.ArrayLike) -> tuple[Ar
 def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:
     """Warn of each kind of joints, at the first of the ``rows``, whose forces are others than the
     law's."""
-    first: dict[str, str] = {}
+    first: Words = {}
     for row, given in enumerate(rows):
         is_thin = ("plane", "stress") in given
         if not (is_thin or any(name in _OTHERS and value for name, value in given)):

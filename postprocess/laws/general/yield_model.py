@@ -30,6 +30,7 @@ from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
 from archord.postprocess.laws.general.joint_curve import Piece, interval
 from archord.postprocess.laws.general.spline import smooth_step, spline_slopes
+from archord.report.by_name import Names
 from archord.report.files import read_json
 
 DATA = Path(__file__).parent / "yield_model.npz"
@@ -347,7 +348,7 @@ def share_of_pin(pin: Array, block: Array) -> Array:
     return smooth_step(excess)
 
 
-def needed(side: str) -> tuple[str, ...]:
+def needed(side: str) -> Names:
     """The sides whose processes tell what yielding does to joints of ``side``."""
     return (PIN_ALONE, PIN_WEAKER) if side == PIN_WEAKER else (side,)
 
@@ -474,7 +475,7 @@ class SolvedJoints:
         return {"inputs": inputs, **curves, "back_inputs": deep, "back": back}
 
 
-def sides_of(numbers: Numbers) -> tuple[str, ...]:
+def sides_of(numbers: Numbers) -> Names:
     """The `SIDES` that a joint with these ``numbers`` belongs to; the first tells its law."""
     first = str(telling_side(bool(numbers.strain), *numbers.yielding))
     alike = np.isfinite(numbers.block) and _alike(*numbers.yielding)

@@ -34,6 +34,7 @@ from archord.postprocess.laws.identification.unknowns import (
     of_machine,
     of_scene,
 )
+from archord.report.by_name import Amounts
 from archord.report.errors import InputError
 from archord.scene.presets.joint import Scene
 
@@ -77,7 +78,7 @@ class Model:
     unknowns: Sequence[Unknown]
     fixed: Mapping[str, float]
 
-    def values(self, z: Array) -> dict[str, float]:
+    def values(self, z: Array) -> Amounts:
         """The value of each unknown."""
         pairs = zip(self.unknowns, z, strict=True)
         return {unknown.name: float(unknown.value(at)) for unknown, at in pairs}

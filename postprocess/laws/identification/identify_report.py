@@ -18,7 +18,7 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.identification.identification import Estimate, Identification
 from archord.postprocess.laws.identification.unknowns import COMPLIANCE, OFFSET
 from archord.postprocess.laws.laws import LAWS
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Words
 from archord.report.figure import new_figure
 from archord.report.table import Table
 
@@ -51,7 +51,7 @@ def as_read(found: Identification) -> Identification:
     return replace(found, estimates=estimates, correlation=correlation)
 
 
-def units_of(found: Identification) -> dict[str, str]:
+def units_of(found: Identification) -> Words:
     """The units of displacement and force, and of each unknown."""
     scene = found.scene
     thickness = scene.analysis.thickness

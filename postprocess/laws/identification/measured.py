@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from archord.materials.material import Array
+from archord.report.by_name import Names
 from archord.report.errors import InputError, shown
 from archord.scene.file import read_text
 
@@ -29,7 +30,7 @@ class MeasuredCurve:
 
     displacement: Array
     load: Array
-    said: tuple[str, ...] = ()
+    said: Names = ()
     turned: bool = False
 
     @property

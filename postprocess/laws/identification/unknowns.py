@@ -11,7 +11,7 @@ import numpy as np
 
 from archord.postprocess.laws.general.general_law import CLEARANCES, NU
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.report.by_name import ByName
+from archord.report.by_name import Amounts, ByName, Names
 from archord.report.errors import InputError
 from archord.scene.file import ALTERNATIVES
 from archord.scene.presets.joint import Scene
@@ -40,7 +40,7 @@ class Unknown:
     """
 
     name: str
-    keys: tuple[str, ...]
+    keys: Names
     start: float
     low: float
     high: float
@@ -80,7 +80,7 @@ def of_scene(scene: Scene, frees: Iterable[str]) -> list[Unknown]:
     return found
 
 
-def _of_keys(scene: Scene, free: str, keys: tuple[str, ...]) -> Unknown:
+def _of_keys(scene: Scene, free: str, keys: Names) -> Unknown:
     starts = [_start(scene, free, key) for key in keys]
     start = starts[0]
     for key in keys:
@@ -140,7 +140,7 @@ def _bounded(unknown: Unknown, free: str, bounds: str) -> Unknown:
 
 def of_machine(
     scene: Scene, begins: float, travel: float, offset: float | None, stiffness: float | None
-) -> tuple[list[Unknown], dict[str, float]]:
+) -> tuple[list[Unknown], Amounts]:
     """The unknowns of the machine, and what is fixed: an ``offset`` or a ``stiffness`` that is
     given. The curve ``begins`` at about this reading, and has this ``travel``."""
     free = []
@@ -174,5 +174,5 @@ def changed(scene: Scene, values: Mapping[str, float]) -> Scene:
     return scene.model_copy(update=parts)
 
 
-def _alternatives(section: str, name: str) -> Sequence[tuple[str, ...]]:
+def _alternatives(section: str, name: str) -> Sequence[Names]:
     return [names for names in ALTERNATIVES.get(section, ()) if name in names]

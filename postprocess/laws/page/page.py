@@ -33,7 +33,7 @@ from archord.postprocess.laws.general import (
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.page.skeleton import skeleton
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Words
 from archord.report.files import read_json
 from archord.report.version import VERSION
 
@@ -60,7 +60,7 @@ def law_page() -> str:
     )
 
 
-def _body(body: str, other: dict[str, str]) -> str:
+def _body(body: str, other: Words) -> str:
     """The fields of a ``body``, which can be an ``other`` thing than a metal."""
     named = dict.fromkeys(metals()) | {"own": "own E, nu, yield stress"} | other
     return Template(_source("body.html")).substitute(
