@@ -337,11 +337,16 @@ def require_facing(system: System) -> list[str]:
     return warnings
 
 
+def drawn_gaps(pair: Pair) -> Array:
+    """The gaps ``(k,)`` of the points of a ``pair`` that face the other surface, as drawn."""
+    along_normal = (pair.separation * pair.projection.normal).sum(axis=1)
+    return along_normal[pair.projection.found]
+
+
 def _drawn_gap(pair: Pair, comm: MPI.Comm) -> tuple[float, float, float]:
     """The lowest gap of the points of a ``pair`` as drawn, and the smallest and the largest size of
     a gap. Collective."""
-    along_normal = (pair.separation * pair.projection.normal).sum(axis=1)
-    gap = along_normal[pair.projection.found]
+    gap = drawn_gaps(pair)
     size = np.abs(gap)
     lowest = gap.min(initial=np.inf)
     nearest = size.min(initial=np.inf)

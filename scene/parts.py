@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import Words
 from archord.scene.presets.known import AnyShape
@@ -18,6 +18,7 @@ from archord.scene.sections.keys import (
     Place,
     Positive,
     Section,
+    after,
     given,
     key,
     require,
@@ -49,7 +50,7 @@ class DiscSection(Section):
         other=[0.0, 0.0, 1.0],
     )
 
-    @model_validator(mode="after")
+    @after
     def _axis(self) -> DiscSection:
         require(self.axis is None or any(self.axis), "axis", "must not be zero")
         return self
@@ -101,7 +102,7 @@ class MeshSection(Section):
         None, description="the shape of a preset, as `archord scene --expand` prints it"
     )
 
-    @model_validator(mode="after")
+    @after
     def _one_source(self) -> MeshSection:
         given(self, ("file", "shape"))
         of_file = ("scale", "order", "refine", "circle", "size", "sizes", "sets")
@@ -206,7 +207,7 @@ class InteractionSection(Section):
         """Whether the surfaces have shear to tell of."""
         return self.friction > 0 or (self.own is not None and self.own.friction)
 
-    @model_validator(mode="after")
+    @after
     def _surfaces(self) -> InteractionSection:
         wanted, said = (
             (1, "one facet set beside a rigid disc") if self.rigid else (2, "two facet sets")
@@ -293,7 +294,7 @@ class LoadSection(Loading):
         "pressure on a facet set, on its undeformed area", "stress", other=10.0
     )
 
-    @model_validator(mode="after")
+    @after
     def _directed(self) -> LoadSection:
         require(self.core is None or self.force is not None, "core", "is for a force on cells")
         directed = (self.direction is None) == (self.pressure is not None)

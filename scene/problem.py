@@ -6,7 +6,7 @@ from itertools import product
 from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import Words
 from archord.report.units import scale_lacks
@@ -28,7 +28,7 @@ from archord.scene.presets.way_back import doubts_of_way_back
 from archord.scene.sections.analysis import ProblemAnalysis, ProblemOutput, Stepping
 from archord.scene.sections.bodies import require_solids
 from archord.scene.sections.checked import Checked
-from archord.scene.sections.keys import key, require, unused
+from archord.scene.sections.keys import after, key, require, unused
 from archord.scene.sections.loading import steps_of
 from archord.scene.sections.units import Units
 
@@ -139,7 +139,7 @@ class ProblemScene(Checked):
         is_large = self.in_space and self.analysis.strain == "large"
         return is_large and coupling in rigid and prescribed.issuperset(filter(turns, IN_SPACE))
 
-    @model_validator(mode="after")
+    @after
     def _consistent(self) -> ProblemScene:
         for section, others in _APART.items():
             for part, other in product(getattr(self, section), (section, *others)):

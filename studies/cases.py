@@ -44,7 +44,7 @@ from archord.scene.file import (
 )
 from archord.scene.sections.errors import toml_value
 from archord.scene.sections.faults import PHRASES, shortened
-from archord.scene.sections.keys import Section
+from archord.scene.sections.keys import Section, after
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
@@ -105,7 +105,7 @@ class Range(Section):
             else value
         )
 
-    @model_validator(mode="after")
+    @after
     def _ordered(self) -> Range:
         if not self.low < self.high:
             raise ValueError("must have a from that is less than its to")

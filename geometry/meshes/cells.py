@@ -84,6 +84,12 @@ def along(sides: np.ndarray) -> np.ndarray:
     return sides[:, [0, *range(2, sides.shape[1]), 1]]
 
 
+def lengths(x: Array, edges: np.ndarray) -> Array:
+    """How far the ends of ``edges`` ``(k, b)`` are from each other ``(k,)``."""
+    ends = x[edges[:, :2]]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
 def distinct(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where each edge or face comes first among ``corners`` ``(k, c)``, and the number ``(k,)`` of
     each.

@@ -11,7 +11,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, bulk_quadrature, lagrange_element, tabulate
-from archord.geometry.meshes.cells import corners_of, distinct, entities_of, sides_of
+from archord.geometry.meshes.cells import corners_of, distinct, entities_of, lengths, sides_of
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.kernels.compat import cell_nodes
@@ -198,10 +198,8 @@ def _widths(mesh: MeshArrays) -> Array:
     """The area over the square of the longest edge, or the root of the volume over its cube
     ``(n,)``: about the width of cells over their length."""
     d = mesh.dimension
-    edges = entities_of(mesh.kind, mesh.cells, 1)
-    ends = mesh.x[edges[:, :2]]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    longest = lengths.reshape(len(mesh.cells), -1).max(axis=1)
+    of_edges = lengths(mesh.x, entities_of(mesh.kind, mesh.cells, 1))
+    longest = of_edges.reshape(len(mesh.cells), -1).max(axis=1)
     return (measures(mesh) / longest**d) ** (1 / (d - 1))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from archord.geometry.basis import Array, dimension_of
 from archord.geometry.curve import RigidCircle
-from archord.geometry.meshes.cells import are_mirrored
+from archord.geometry.meshes.cells import are_mirrored, lengths
 from archord.postprocess.decks.numbering import Ints, numbering
 from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Rigid
@@ -91,7 +91,7 @@ def deck_mesh(system: System) -> DeckMesh:
         if isinstance(disc, Rigid):
             if not isinstance(disc.circle, RigidCircle):
                 raise ValueError("a rigid ball or cylinder cannot be exported; a body can")
-            length = _mean_length(x, surfaces[opposite].nodes)
+            length = lengths(x, surfaces[opposite].nodes).mean()
             rim, ring = _ring(disc.circle, length)
             ring += len(x)
             x = np.concatenate([x, rim])
@@ -166,12 +166,6 @@ class _Cells:
         straight, mirrored = (numbering(self._kind, mirrored=m).side_of for m in (False, True))
         sides = np.where(self._mirrored[cell], mirrored[facet], straight[facet])
         return DeckSurface(self._number[cell], sides, self._numbered("on_sides", cell, sides))
-
-
-def _mean_length(x: Array, edges: Ints) -> float:
-    """The mean length of ``edges`` ``(n, 3)`` between their ends."""
-    ends = x[edges[:, :2]]
-    return np.linalg.norm(np.diff(ends, axis=1), axis=2).mean()
 
 
 def _ring(circle: RigidCircle, length: float) -> tuple[Array, Ints]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import basix
 import numpy as np
 import numpy.typing as npt
 
 from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE
+from archord.geometry.meshes.formats.abaqus import SIDES
 
 Ints = npt.NDArray[np.int64]
 
@@ -33,14 +36,6 @@ _EDGES = {
     QUADRILATERAL: ["01", "12", "23", "30"],
     TETRAHEDRON: ["01", "12", "20", "03", "13", "23"],
     HEXAHEDRON: ["01", "12", "23", "30", "45", "56", "67", "74", "04", "15", "26", "37"],
-}
-# corners of the sides S1, S2, ...: in a plane from end to end with the element on the left, in
-# space so that they turn about the normal into the element
-_SIDES = {
-    TRIANGLE: ["01", "12", "20"],
-    QUADRILATERAL: ["01", "12", "23", "30"],
-    TETRAHEDRON: ["012", "031", "132", "230"],
-    HEXAHEDRON: ["0123", "4765", "0451", "1562", "2673", "3740"],
 }
 
 
@@ -67,21 +62,19 @@ def numbering(kind: basix.CellType, *, mirrored: bool) -> Numbering:
     topology = basix.topology(kind)
     edges = [set(edge) for edge in topology[1]]
 
-    def middle(ends: str) -> int:
+    def middle(ends: Iterable[Any]) -> int:
         return len(corners) + edges.index({int(corners[int(end)]) for end in ends})
 
-    sides = [[int(corners[int(corner)]) for corner in side] for side in _SIDES[kind]]
+    sides = [corners[side].tolist() for side in SIDES[kind]]
     on_sides = []
-    for side, words in zip(sides, _SIDES[kind], strict=True):
-        on_sides.append([*side, *map(middle, _around(words))])
+    for side, own in zip(sides, SIDES[kind], strict=True):
+        on_sides.append([*side, *map(middle, _around(own))])
     facets = topology[len(topology) - 2]
     side_of = [[set(side) for side in sides].index(set(facet)) for facet in facets]
     nodes = [*corners, *map(middle, _EDGES[kind])]
     return Numbering(np.array(nodes), np.array(side_of), np.array(on_sides))
 
 
-def _around(side: str) -> list[str]:
+def _around(side: list[int]) -> list[tuple[int, ...]]:
     """The edges of a ``side`` by their ends; a side of a plane element is one."""
-    if len(side) == 2:
-        return [side]
-    return [start + end for start, end in zip(side, side[1:] + side[0], strict=True)]
+    return list(pairwise([*side, *side[: len(side) > 2]]))

@@ -11,10 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.decks.mesh import DeckMesh, DeckSurface, label, surface_name
+from archord.geometry.meshes.cells import lengths
+from archord.postprocess.decks.mesh import DeckSurface, label, surface_name
 from archord.postprocess.decks.model import DeckModel
 from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import number
+from archord.presets.held import drawn_gaps
 from archord.solver.problem import Interaction
 
 _ITERATIONS = 30
@@ -47,7 +49,7 @@ class Ties:
 
         def order(name: str) -> tuple[int, float]:
             surface = mesh.surfaces[name]
-            length = _mean_length(mesh, surface) if in_plane else 0.0
+            length = lengths(mesh.x, surface.nodes).mean() if in_plane else 0.0
             return self._n_taken(surface), length
 
         both = [surface_name(interaction, side) for side in (0, 1)]
@@ -90,11 +92,8 @@ class Ties:
 def reach(model: DeckModel, interaction: Interaction) -> str:
     """The parameter of ``*TIE`` in space that lets it tie surfaces over the gap that they are drawn
     with; empty where they touch. Without it nodes are left loose, and warnings alone say so."""
-    gaps = []
-    for pair in model.system.contact.interface(interaction.name).pairs:
-        along_normal = (pair.separation * pair.projection.normal).sum(axis=1)
-        gaps.append(np.abs(along_normal[pair.projection.found]))
-    gap = float(np.concatenate(gaps).max(initial=0.0))
+    pairs = model.system.contact.interface(interaction.name).pairs
+    gap = float(np.abs(np.concatenate([*map(drawn_gaps, pairs)])).max(initial=0.0))
     shortest = np.inf
     for side in (0, 1):
         nodes = model.mesh.surfaces[surface_name(interaction, side)].nodes
@@ -139,11 +138,6 @@ def closest_on_edges(x: Array, edges: Array) -> tuple[Ints, Array]:
 
 def _dot(a: Array, b: Array) -> Array:
     return (a * b).sum(axis=-1)
-
-
-def _mean_length(mesh: DeckMesh, surface: DeckSurface) -> float:
-    ends = mesh.x[surface.nodes[:, :2]]
-    return float(np.linalg.norm(np.diff(ends, axis=1), axis=2).mean())
 
 
 def _equation(node: int, axis: int, others: Ints, weights: Array) -> list[str]:

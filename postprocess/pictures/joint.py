@@ -71,14 +71,7 @@ def _load(scene: Scene, delta: float) -> str:
 
 def _over(divisor: float) -> ByName:
     """Of a second axis with the numbers of the first over the ``divisor``."""
-
-    def divided(value: Any) -> Array:
-        return np.asarray(value) / divisor
-
-    def multiplied(value: Any) -> Array:
-        return np.asarray(value) * divisor
-
-    return {"functions": (divided, multiplied)}
+    return {"functions": [lambda x, by=by: np.asarray(x) * by for by in (1 / divisor, divisor)]}
 
 
 def force_panel(axes: Any, run: Run) -> None:
@@ -94,8 +87,13 @@ def force_panel(axes: Any, run: Run) -> None:
         ring = {"ms": 8, "mfc": "none", "color": "tab:red"}
         axes.plot(delta[first], P[first], "o", label="first plastic strain", **ring)
         axes.legend(frameon=False, loc="upper left")
-    axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.units['P']}]")
-    axes.set(title="force of the joint", xlim=(min(delta), None), ylim=(min(P), None))
+    axes.set(
+        xlabel=f"δ [{scene.units.length}]",
+        ylabel=f"P [{run.units['P']}]",
+        title="force of the joint",
+        xlim=(min(delta), None),
+        ylim=(min(P), None),
+    )
     axes.grid(alpha=0.3)
     dR = scene.joint.dR
     in_clearances = axes.secondary_xaxis("top", **_over(abs(dR)))
@@ -122,8 +120,13 @@ def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
             axes.plot(np.degrees(angle), pressure, color=f"C{i}", lw=1.4, **style)
     reach = round(np.degrees(scene.joint.arc_end))
     sides = " (hole solid, pin dashed)" if both else ""
-    axes.set(xlabel="angle from the contact axis [°]", ylabel=f"p [{scene.units.stress}]")
-    axes.set(xlim=(0, reach), ylim=(0, None), title=f"contact pressure on the arc{sides}")
+    axes.set(
+        xlabel="angle from the contact axis [°]",
+        ylabel=f"p [{scene.units.stress}]",
+        xlim=(0, reach),
+        ylim=(0, None),
+        title=f"contact pressure on the arc{sides}",
+    )
     axes.set_xticks(np.arange(0, reach + 1, reach / 6))
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)

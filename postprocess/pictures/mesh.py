@@ -13,6 +13,7 @@ from archord.geometry.meshes.cells import (
     along,
     corners_of,
     entities_of,
+    lengths,
     n_sides,
     outer_sides,
     side_kind,
@@ -90,9 +91,7 @@ def _face_row(
         mean = mesh.x[corners].mean(axis=(0, 1))
         middle = place(mean.round(9) + 0.0)
     said = f"R {cylinder.radius:.8g}" if cylinder else ""
-    edges = entities_of(kind, facets, 1)
-    ends = mesh.x[edges[:, :2]]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = lengths(mesh.x, entities_of(kind, facets, 1))
     area = Patches(mesh.x, facets, kind, mesh.order).areas().sum()
     owners = _owners(mesh, facets, cells)
     return [owners, middle, said, len(facets), *_sizes(area, length)]

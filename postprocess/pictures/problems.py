@@ -290,8 +290,7 @@ def draw_probes(axes: Any, probes: Sequence[Probe], styles: Sequence[ByName]) ->
         order = np.argsort(along, kind="stable")
         axes.plot(along[order], probe.values[order], lw=1.3, **style)
     first = probes[0]
-    axes.set(xlabel=label)
-    axes.set(ylabel=f"{first.quantity.replace('_', ' ')} [{first.unit or '-'}]")
+    axes.set(xlabel=label, ylabel=f"{first.quantity.replace('_', ' ')} [{first.unit or '-'}]")
     axes.legend(frameon=False, fontsize="small")
     axes.grid(alpha=0.3)
 
@@ -310,8 +309,11 @@ def load_panel(axes: Any, run: Run) -> None:
         force = [0, *run.columns[column]]
         axes.plot(displacement, force, ".-", ms=5, label=f"{name}{own}")
     along, up = next(iter(units.values())) if one else ("", "")
-    axes.set(xlabel=f"displacement [{along}]" if one else "displacement", title="loads")
-    axes.set(ylabel=f"force [{up}]" if one else "force")
+    axes.set(
+        xlabel=f"displacement [{along}]" if one else "displacement",
+        ylabel=f"force [{up}]" if one else "force",
+        title="loads",
+    )
     axes.legend(frameon=False)
     axes.locator_params("x", nbins=6)
     axes.grid(alpha=0.3)

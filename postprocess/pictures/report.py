@@ -137,8 +137,8 @@ def _iterations_panel(run: Run, axes: Any) -> None:
         axes.plot(steps, run.columns["cutbacks"], "o", color="tab:red", label="cutbacks")
     totals = run.summary["totals"]
     iterations = f"{totals.get('newton_iterations', 0):g} iterations"
-    axes.set(xlabel="step", ylabel="number")
-    axes.set(title=f"{iterations}, {totals.get('cutbacks', 0):g} cutbacks")
+    title = f"{iterations}, {totals.get('cutbacks', 0):g} cutbacks"
+    axes.set(xlabel="step", ylabel="number", title=title)
     _finish(axes)
 
 

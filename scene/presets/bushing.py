@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import ByName
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, PinPart, Preset, Shape
 from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import Solid
-from archord.scene.sections.keys import Pair, Positive, key, require
+from archord.scene.sections.keys import Pair, Positive, after, key, require
 
 
 class Bushing(Shape):
@@ -48,7 +48,7 @@ class BushingShape(Bushing):
     kind: Literal["bushing"] = "bushing"
     drawing: ClassVar[str] = "archord.geometry.shapes.bushing:bushing"
 
-    @model_validator(mode="after")
+    @after
     def _bushing(self) -> BushingShape:
         self.check(self.rings, ["rings"] * len(self.rings))
         return self
@@ -71,7 +71,7 @@ class BushingScene(Preset):
     sleeve: list[Ring] = Field(default_factory=list, description="sleeves from the pin outward")
     housing: Ring = Field(description="geometry and material of the housing")
 
-    @model_validator(mode="after")
+    @after
     def _consistent(self) -> BushingScene:
         names = ["sleeve"] * len(self.sleeve) + ["housing"]
         self.bushing.check(self._rings, names)

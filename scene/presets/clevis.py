@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import ByName
 from archord.scene.presets.lug import Lug, PlateOutline
 from archord.scene.presets.preset import BoredShape, PinPart, Preset, general_scene
-from archord.scene.presets.space import ClevisSpace
+from archord.scene.presets.space import ClevisSpace, held
 from archord.scene.sections.bodies import NotNegative, Solid
-from archord.scene.sections.keys import Positive, key, require
+from archord.scene.sections.keys import Positive, after, key, require
 
 
 class PlateOfClevis(PlateOutline):
@@ -63,7 +63,7 @@ class ClevisShape(Clevis):
     kind: Literal["clevis"] = "clevis"
     drawing: ClassVar[str] = "archord.geometry.shapes.clevis:clevis"
 
-    @model_validator(mode="after")
+    @after
     def _plates(self) -> ClevisShape:
         for name in ("inner", "outer"):
             plate = getattr(self, name)
@@ -101,7 +101,7 @@ class ClevisScene(Preset):
         None, description="the clevis in space instead of a plane"
     )
 
-    @model_validator(mode="after")
+    @after
     def _consistent(self) -> ClevisScene:
         self.require_whole("clevis.clearance", self.clevis.clearance)
         hole = self.clevis.radius + self.clevis.clearance + self._wall
@@ -150,12 +150,10 @@ class ClevisScene(Preset):
             parts["load"].append(
                 {"name": f"{name} pull", "on": place, "direction": "x", "force": forces}
             )
-            parts["support"].append(
-                {"name": f"{name} clamp", "on": f"{name} clamp", "fixed": ["x", "y"]}
-            )
+            parts["support"].append(held(f"{name} clamp", "x", "y"))
             parts["interaction"].append(contact)
             bodies |= {f"{name} pin": self.pin, name: plate}
-        parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
+        parts["support"].append(held("axis", "y"))
         return general_scene(self, shape, 2, bodies, **parts, path={"steps": self.load.steps})
 
     def _solid(self) -> ByName:
@@ -185,9 +183,9 @@ class ClevisScene(Preset):
             ["flat", "inner clamp"],
             interaction=contacts,
             support=[
-                {"name": "inner clamp", "on": "inner clamp", "fixed": ["x", "y"]},
-                {"name": "outer clamp", "on": "outer clamp", "fixed": ["y", "z"]},
-                {"name": "axis", "on": "axis", "fixed": ["y"]},
+                held("inner clamp", "x", "y"),
+                held("outer clamp", "y", "z"),
+                held("axis", "y"),
             ],
             load=[pull | {self.load.kind: getattr(self.load, self.load.kind)}],
             path={"steps": self.load.steps},

@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.materials.elasticity import contact_modulus
 from archord.materials.thickening import block_thickens, error_of_small_strain
@@ -14,11 +14,11 @@ from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene.presets.joint_geometry import JointGeometry
 from archord.scene.presets.preset import general_scene, require_solid
-from archord.scene.presets.space import COARSE, Space
+from archord.scene.presets.space import COARSE, Space, held
 from archord.scene.sections.analysis import Analysis, Output, Stepping
 from archord.scene.sections.bodies import Pin, Solid, require_solids
 from archord.scene.sections.checked import Checked
-from archord.scene.sections.keys import key, require, unused
+from archord.scene.sections.keys import after, key, require, unused
 from archord.scene.sections.loading import JointLoad
 from archord.scene.sections.units import Units
 
@@ -102,7 +102,7 @@ class Scene(Checked):
     )
     output: Output = Field(default_factory=Output, description="what is written")
 
-    @model_validator(mode="after")
+    @after
     def _consistent(self) -> Scene:
         joint = self.joint
         pin = self.pin
@@ -166,11 +166,9 @@ class Scene(Checked):
         shape = g.model_dump(exclude_none=True) | {"kind": "joint", "core_radius": load.core_radius}
         if self.space is not None and not {"element_size", "relative_element_size"} & shape.keys():
             shape["relative_element_size"] = COARSE
-        axis = {"name": "axis", "on": "symmetry", "fixed": ["x"]}
-        block = {"name": "block", "on": "block held", "fixed": ["x", "y"]}
         parts = {
             "interaction": [contact],
-            "support": [axis, block],
+            "support": [held("axis", "x", on="symmetry"), held("block", "x", "y", on="block held")],
             "load": [press],
             "path": {"steps": load.stage_steps},
         }

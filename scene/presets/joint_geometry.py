@@ -6,12 +6,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import ByName
 from archord.scene.presets.preset import PinPart
 from archord.scene.presets.space import Space
-from archord.scene.sections.keys import Positive, Section, given, key, require
+from archord.scene.sections.keys import Positive, Section, after, given, key, require
 
 _WIDEST = 1e6  # block_size over R
 _THINNEST = 0.02  # wall of a ring over R
@@ -56,7 +56,7 @@ class JointGeometry(Section):
         "growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2
     )
 
-    @model_validator(mode="after")
+    @after
     def _geometry(self) -> JointGeometry:
         name = given(self, ("clearance", "relative_clearance"))
         require(

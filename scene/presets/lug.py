@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import ByName, Names
 from archord.scene.presets.preset import DEEPEST, FARTHEST, THINNEST, BoredShape, PinPart, Preset
 from archord.scene.presets.space import Space
 from archord.scene.sections.bodies import NotNegative, Solid
-from archord.scene.sections.keys import Positive, Section, key, require
+from archord.scene.sections.keys import Positive, Section, after, key, require
 
 
 class PlateOutline(Section):
@@ -33,7 +33,7 @@ class Lug(PlateOutline, BoredShape):
 
     half: bool = key("model the half y >= 0 alone", default=True)
 
-    @model_validator(mode="after")
+    @after
     def _lug(self) -> Lug:
         self.check()
         return self
@@ -131,7 +131,7 @@ class LugScene(Preset):
     plate: Solid = Field(description="material of the lug")
     bushing: LugBushing | None = Field(None, description="a bushing pressed into the hole of a lug")
 
-    @model_validator(mode="after")
+    @after
     def _consistent(self) -> LugScene:
         self.require_whole("lug.clearance", self.lug.clearance)
         if self.bushing is not None:

@@ -6,14 +6,14 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from archord.report.by_name import ByName
-from archord.scene.presets.space import COARSE, Space, solid
+from archord.scene.presets.space import COARSE, Space, held, solid
 from archord.scene.sections.analysis import PresetAnalysis, ProblemOutput, Stepping
 from archord.scene.sections.bodies import Pin, Solid
 from archord.scene.sections.checked import Checked
-from archord.scene.sections.keys import Positive, Section, key, plain, require
+from archord.scene.sections.keys import Positive, Section, after, key, plain, require
 from archord.scene.sections.loading import Loading, StepCounts, Targets
 from archord.scene.sections.units import Units
 
@@ -38,7 +38,7 @@ class Shape(Section):
         "growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2
     )
 
-    @model_validator(mode="after")
+    @after
     def _mesh(self):
         require(
             1e-3 <= self.h / self.radius <= 0.5,
@@ -66,7 +66,7 @@ class BoredShape(Shape):
         "hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1
     )
 
-    @model_validator(mode="after")
+    @after
     def _clearance(self):
         between = f"must be between {-DEEPEST:g} and 0.5 times the radius"
         require(-DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
@@ -85,7 +85,7 @@ class PinLoad(Loading):
     )
     steps: StepCounts = key("output steps up to each target", default=20)
 
-    @model_validator(mode="after")
+    @after
     def _at(self) -> PinLoad:
         require(
             self.at == "diameter" or self.force is not None,
@@ -112,7 +112,7 @@ class Preset(Checked):
     )
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
-    @model_validator(mode="after")
+    @after
     def _in_space(self):
         if self.space is not None:
             require_solid(self, self.load.at == "diameter", self.drawn.radius)
@@ -143,14 +143,14 @@ class Preset(Checked):
         self,
         shape: ByName,
         solids: Mapping[str, Solid],
-        held: str,
+        clamp: str,
         surfaces: list[str],
         gaps: list[float],
         laws: Sequence[str] = (),
     ) -> ByName:
-        """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their
-        ``surfaces`` the first faces the second at the first of the ``gaps`` by the first of the
-        ``laws``, the third the fourth, ..."""
+        """The general scene of ``solids``, from the pin outward, with the edge ``clamp`` held; of
+        their ``surfaces`` the first faces the second at the first of the ``gaps`` by the first of
+        the ``laws``, the third the fourth, ..."""
         half, touching = (shape.get(name, True) for name in ("half", "touching"))
         rigid = self.pin.rigid
         names = ["pin", *solids]
@@ -168,9 +168,9 @@ class Preset(Checked):
                 "radius": shape["radius"],
             }
             contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
-        supports = [{"name": held, "on": held, "fixed": ["x", "y"]}]
+        supports = [held(clamp, "x", "y")]
         if half or not rigid:
-            supports.append({"name": "axis", "on": "axis" if half else "centre", "fixed": ["y"]})
+            supports.append(held("axis", "y", on="axis" if half else "centre"))
         place = contacts[0]["name"] if rigid else {"diameter": "flat"}.get(self.load.at, "centre")
         pull = {
             "name": "pull",
@@ -186,7 +186,7 @@ class Preset(Checked):
         }
         outward = laws[1:] or [""] * (len(gaps) - 1)
         sleeves = zip(surfaces[1:-1:2], outward, strict=True)
-        middles = [held, *(name for name, law in sleeves if law != "tied")]
+        middles = [clamp, *(name for name, law in sleeves if law != "tied")]
         if not rigid:
             middles.insert(0, place)
         return general_scene(self, shape, 2 if half else 1, solids, middles, **parts)

@@ -85,12 +85,18 @@ class ClevisSpace(Depth):
         return self.model_dump()
 
 
+def held(name: str, *fixed: str, on: str = "") -> ByName:
+    """The section of a support that holds the set ``on``, by default of its ``name``, in the
+    directions ``fixed``."""
+    return {"name": name, "on": on or name, "fixed": list(fixed)}
+
+
 def solid(general: ByName, space: Depth, middles: Sequence[str]) -> ByName:
     """The ``general`` scene of a plane joint in ``space``, with the mid-plane as a mirror; of the
     whole, the ``middles`` of these facet sets are held along z, where the mirror leaves them."""
     shape = general["mesh"]["shape"] | {"space": space.model_dump(exclude_none=True)}
-    held = ["mid-plane"] if space.half else [f"{name} middle" for name in middles]
-    supports = [{"name": name, "on": name, "fixed": ["z"]} for name in held]
+    mirrors = ["mid-plane"] if space.half else [f"{name} middle" for name in middles]
+    supports = [held(name, "z") for name in mirrors]
     analysis = general["analysis"]
     copies = 2 if space.half else 1
     in_space = {"plane": "space", "symmetry": copies * analysis["symmetry"]}

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from archord.report.by_name import Amounts
-from archord.scene.sections.keys import Positive, Section, key, require
+from archord.scene.sections.keys import Positive, Section, after, key, require
 
 _STUCK = 1000.0  # coefficient of friction from which points are meant to stick
 _COERCIVE = 0.25  # gamma over the trace constant, from which on Nitsche's form is coercive
@@ -52,7 +52,7 @@ class Modelling(Section):
     )
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
-    @model_validator(mode="after")
+    @after
     def _large(self):
         require(
             self.strain == "small" or self.kinematics == "current",
@@ -107,7 +107,7 @@ class ProblemAnalysis(Modelling):
         le=100,
     )
 
-    @model_validator(mode="after")
+    @after
     def _whole_rings(self):
         is_ring = self.plane == "axisymmetric"
         said = "is for planes: axisymmetric forces are of the whole ring"
@@ -138,7 +138,7 @@ class Stepping(Section):
         "Newton iterations up to which a step was easy", default=15, ge=1, le=1000
     )
 
-    @model_validator(mode="after")
+    @after
     def _ordered(self) -> Stepping:
         require(
             self.minimum <= self.initial <= self.maximum,

@@ -14,7 +14,7 @@ from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
 from archord.report.by_name import Names
 from archord.scene.sections.errors import Fault
-from archord.scene.sections.keys import Positive, Section, key, require
+from archord.scene.sections.keys import Positive, Section, after, key, require
 from archord.scene.sections.plasticity import IN_WORDS, HardeningKey, filled, hardening_law
 
 NotNegative = Annotated[float, Field(ge=0)]
@@ -55,7 +55,7 @@ class Solid(Section):
     def _filled(cls, data: Any, info: ValidationInfo) -> Any:
         return filled(data, (info.context or {}).get("stress", "MPa"))
 
-    @model_validator(mode="after")
+    @after
     def _plasticity(self):
         require(
             self.yield_stress is not None or self.hardening == 0,
@@ -151,7 +151,7 @@ class Pin(Solid):
         "model the unloaded half behind the pressed diameter, too", default=False, other=True
     )
 
-    @model_validator(mode="after")
+    @after
     def _rigid_or_solid(self) -> Pin:
         # a table brings the yield stress
         for name in ("material", "hardening", "yield_stress", "back_stresses", "E", "nu", "whole"):

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic._internal._model_construction import ModelMetaclass
 
 from archord.report.by_name import Names
@@ -19,6 +19,8 @@ Positive = Annotated[float, Field(gt=0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Axis = Annotated[list[float], Field(min_length=3, max_length=3)]
 Place = Annotated[list[float], Field(min_length=2, max_length=3)]  # in a plane or in space
+
+after = model_validator(mode="after")  # a check of a whole section
 
 
 def key(

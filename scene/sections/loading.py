@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from archord.report.by_name import Names
-from archord.scene.sections.keys import Name, Section, given, key, require
+from archord.scene.sections.keys import Name, Section, after, given, key, require
 
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 MOST_STEPS = 10_000  # output steps
@@ -29,7 +29,7 @@ class Loading(Section):
 
     kinds: ClassVar[Names] = ("displacement", "force")
 
-    @model_validator(mode="after")
+    @after
     def _one_kind(self):
         given(self, self.kinds)
         return self
@@ -79,7 +79,7 @@ class JointLoad(Loading):
         "output steps up to each target: one number for all, or a list", default=20
     )
 
-    @model_validator(mode="after")
+    @after
     def _steps(self) -> JointLoad:
         require(
             self.path is None,

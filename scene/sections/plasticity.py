@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, create_model, model_validator
+from pydantic import Discriminator, Field, Tag, create_model
 
 from archord.materials.hardening import (
     Hardening,
@@ -20,7 +20,7 @@ from archord.materials.hardening import (
 from archord.materials.named import metal, metals
 from archord.report.by_name import ByName
 from archord.scene.sections.errors import Fault, toml_value
-from archord.scene.sections.keys import Pair, Positive, Section, key, require
+from archord.scene.sections.keys import Pair, Positive, Section, after, key, require
 
 ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
 Exponent = Annotated[float, Field(gt=0, le=1)]
@@ -116,7 +116,7 @@ def parameters_of(law: Hardening) -> ByName | None:
 class _HardeningTable(Section):
     """The parameters of one of the `LAWS`."""
 
-    @model_validator(mode="after")
+    @after
     def _one_law(self) -> _HardeningTable:
         laws = (f"{' and '.join(sorted(law.parameters))} ({law.name})" for law in LAWS)
         fitting = _laws_of(self.model_dump(exclude_none=True))

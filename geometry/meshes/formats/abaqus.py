@@ -43,8 +43,9 @@ _SHAPES = {
     2: {3: TRIANGLE, 6: TRIANGLE, 4: QUADRILATERAL, 8: QUADRILATERAL},
     3: {4: TETRAHEDRON, 10: TETRAHEDRON, 8: HEXAHEDRON, 20: HEXAHEDRON},
 }
-# corners of the sides S1, S2, ... of an element
-_SIDES = {
+# corners of the sides S1, S2, ... of an element: in a plane from end to end with the element on the
+# left, in space so that they turn about the normal into the element
+SIDES = {
     TRIANGLE: [[0, 1], [1, 2], [2, 0]],
     QUADRILATERAL: [[0, 1], [1, 2], [2, 3], [3, 0]],
     TETRAHEDRON: [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]],
@@ -251,7 +252,7 @@ def read_abaqus(path: Path) -> MeshArrays:
             facet_sets[name].append(places.reshape(-1, corners))
         if of_lines:
             point_sets[name] = np.unique(_places(node, chain(*of_lines), "node"))
-    faces = {f"S{k}": side for k, side in enumerate(_SIDES[kind], 1)}
+    faces = {f"S{k}": side for k, side in enumerate(SIDES[kind], 1)}
     for name, parts in model.surfaces.items():
         for of_surface, face in parts:
             if face not in faces:
