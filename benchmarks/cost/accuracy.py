@@ -69,16 +69,19 @@ def run(
             elif error > wanted:
                 faults.append(f"{case.name}: the error is {error:.1e}, {wanted:g} was asked")
             level = found.levels[-1]
-            row: dict[str, object] = {"joint": case.name, "asked": f"{wanted:g}"}
-            row["estimated"] = f"{found.estimated or nan:.1e}"
-            row["true"] = f"{error:.1e}"
-            row["of the mesh"] = f"{found.mesh_error or nan:.1e}"
-            row["of the steps"] = f"{found.step_error:.1e}" if found.step_error else ""
-            row["meshes"] = level.mesh
-            row["element size / R"] = f"{level.element_size:.3g}"
-            row["substeps"] = found.substeps
-            row["dofs"] = level.dofs
-            row["seconds"] = f"{found.seconds:.1f}"
+            row = {
+                "joint": case.name,
+                "asked": f"{wanted:g}",
+                "estimated": f"{found.estimated or nan:.1e}",
+                "true": f"{error:.1e}",
+                "of the mesh": f"{found.mesh_error or nan:.1e}",
+                "of the steps": f"{found.step_error:.1e}" if found.step_error else "",
+                "meshes": level.mesh,
+                "element size / R": f"{level.element_size:.3g}",
+                "substeps": found.substeps,
+                "dofs": level.dofs,
+                "seconds": f"{found.seconds:.1f}",
+            }
             rows.append(row)
     return rows, faults
 

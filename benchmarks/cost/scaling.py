@@ -8,7 +8,6 @@ which sum up to it), "memory" (peak bytes of each rank).
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from archord.benchmarks.case import paper_joint, write_table
 from archord.benchmarks.cost.scaling_picture import draw
 from archord.benchmarks.timing import Process, Said, Timing, solving, time_all
 from archord.report.errors import InputError
+from archord.report.files import read_json
 from archord.scene.file import resolved
 from archord.scene.presets.joint import Scene
 
@@ -76,10 +76,8 @@ class Setting:
         file = folder / f"{self.name}.toml"
         file.write_text(resolved(scene), encoding="utf-8")
         command = (*launcher(self.ranks), *solving(file.name, self.name))
-        read = (folder / self.name / "run.json").read_text
-        return Process(
-            self.name, command, folder, lambda: json.loads(read()), _A_DAY, kind=self.material
-        )
+        read = partial(read_json, folder / self.name / "run.json")
+        return Process(self.name, command, folder, read, _A_DAY, kind=self.material)
 
 
 def refined(size: float, steps: int, yield_stress: float | None = None) -> Scene:

@@ -163,14 +163,17 @@ def run(
         loaded = timing.middle.result
         files = [file for file in variant.folder(folder).rglob("*") if file.is_file()]
         written = sum(file.stat().st_size for file in files)
-        row: dict[str, object] = {"case": variant.case, "variant": variant.name}
-        row["seconds"] = f"{timing.median:.2f}"
-        row["times as long"] = f"{ratio(timing, first, 'seconds'):.2f}"
-        row["CPU [s]"] = f"{median(run.cpu for run in timing.runs):.2f}"
-        row["times the CPU"] = f"{ratio(timing, first, 'cpu'):.2f}"
-        row["peak memory [MB]"] = f"{timing.middle.memory / 1e6:.0f}"
-        row["written [kB]"] = f"{written / 1e3:.0f}"
-        row["loads"] = ", ".join(name for name in WATCHED if name in loaded)
+        row = {
+            "case": variant.case,
+            "variant": variant.name,
+            "seconds": f"{timing.median:.2f}",
+            "times as long": f"{ratio(timing, first, 'seconds'):.2f}",
+            "CPU [s]": f"{median(run.cpu for run in timing.runs):.2f}",
+            "times the CPU": f"{ratio(timing, first, 'cpu'):.2f}",
+            "peak memory [MB]": f"{timing.middle.memory / 1e6:.0f}",
+            "written [kB]": f"{written / 1e3:.0f}",
+            "loads": ", ".join(name for name in WATCHED if name in loaded),
+        }
         rows.append(row)
         faults += variant.faults(loaded)
     return rows, faults

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from archord.geometry.meshes.fenicsx import set_mesh_options
+from archord.geometry.meshes.fenicsx import own_gmsh, set_mesh_options
 
 _AT = {"A": 25.0, "B": -28.0}  # x of the centre of each bore
 _EYE = (60.0, 32.0)  # half axes of the ellipse
@@ -31,21 +31,10 @@ def drawn_eye(edges: int) -> Path:
     Bodies are "eye", "bush", "pin" (in the bushing) and "pinB" (in the other bore). The bushing is
     drawn 0.03 larger than its bore; the pins have clearances of 0.05.
     """
-    import gmsh
-
     file = Path(tempfile.mkdtemp()) / "eye.msh"
-    started = not gmsh.isInitialized()
-    if started:
-        gmsh.initialize()
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.add("eye")
+    with own_gmsh() as gmsh:
         _draw(gmsh, edges)
         gmsh.write(str(file))
-        gmsh.model.remove()
-    finally:
-        if started:
-            gmsh.finalize()
     return file
 
 
@@ -78,10 +67,8 @@ def _draw(gmsh: Any, edges: int) -> None:
         ]
         gmsh.model.addPhysicalGroup(1, curves, name=name)
     options = {"MeshSizeFromCurvature": edges, "MeshSizeMax": _COARSEST, "ElementOrder": 2}
-    before = {key: gmsh.option.getNumber(f"Mesh.{key}") for key in options}
     set_mesh_options(gmsh, options)
     gmsh.model.mesh.generate(2)
-    set_mesh_options(gmsh, before)
 
 
 def _on_circle(gmsh: Any, curve: int, centre: float, radius: float) -> bool:
