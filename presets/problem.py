@@ -66,8 +66,7 @@ def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
     data = plain(scene)
     analysis = data.get("analysis", {})
     data["analysis"] = analysis | {"plane": "space" if in_space else "strain"}
-    make = ProblemScene
-    return make(mesh_name(scene), None, **data)
+    return ProblemScene(mesh_name(scene), None, **data)
 
 
 @contextmanager

@@ -35,8 +35,7 @@ def words_of(problem: Problem, mesh_file: str, fields: str | bool = "nodes") -> 
     Materials and laws of one's own classes are told by class, representation and attributes. Raises
     `InputError` for what a scene refuses, and for conditions that it has no words for.
     """
-    make = ProblemScene
-    return make("archord.Problem", None, **_sections(problem, mesh_file, fields))
+    return ProblemScene("archord.Problem", None, **_sections(problem, mesh_file, fields))
 
 
 def _sections(problem: Problem, mesh_file: str, fields: str | bool) -> ByName:

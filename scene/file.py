@@ -35,19 +35,16 @@ _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPES
 AnyScene = Scene | ProblemScene
 
 
-def parse_scene(
-    data: ByName, source: str = "scene", origin: Mapping[str, str] | None = None
-) -> Scene:
-    """The joint of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere.
-    Raises `InputError`."""
-    scene = Scene
-    return scene(source, origin, **data)
+def parse_scene(data: ByName) -> Scene:
+    """The joint of ``data``. Raises `InputError`."""
+    return Scene(**data)
 
 
 def parse_any(
     data: ByName, source: str = "scene", origin: Mapping[str, str] | None = None
 ) -> AnyScene:
-    """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
+    """The scene of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere: a
+    joint, a general scene or a preset that stands for one. Raises `InputError`."""
     preset: Any = next((scene for name, scene in PRESETS.items() if name in data), None)
     if preset is None and {"joint", "space"} <= data.keys():
         preset = Scene
