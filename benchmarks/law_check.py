@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
@@ -103,7 +102,7 @@ def _per_cent(told: Array, solved: Array) -> Array:
     return 100 * (told / solved - 1)
 
 
-def _within(x: Array, ends: tuple[float, float]) -> npt.NDArray[np.bool_]:
+def _within(x: Array, ends: tuple[float, float]) -> np.ndarray:
     low, high = ends
     return (x > low) & (x <= high)
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -237,7 +236,7 @@ def _joint(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
     return LawJoint(run.R, run.dR, run.E_star, block_yield=run.sigY if c else None, k=k, c=c or 1.0)
 
 
-def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.bool_]:
+def _selected(run: RunCurve, load_range: tuple[float, float]) -> np.ndarray:
     """Which steps ``(n,)`` of ``run`` lie in the range of ``delta/dR``, ends included. Raises
     `InputError` if none."""
     load = run.x

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import elastic_model
@@ -75,7 +74,7 @@ class Changed:
         )
 
     @property
-    def usual(self) -> npt.NDArray[np.bool_]:
+    def usual(self) -> np.ndarray:
         """Which nodes are in the range that is judged."""
         x = self.without[:, 0]
         return (x >= _USUAL[0]) & (x <= _USUAL[1])
@@ -177,7 +176,7 @@ def errors_of(joints: list[Changed]) -> tuple[dict[str, list[float]], Table]:
     return factors, table
 
 
-def _joined(values: list[Array], chosen: list[npt.NDArray[np.bool_]]) -> Array:
+def _joined(values: list[Array], chosen: list[np.ndarray]) -> Array:
     """The ``chosen`` values of all joints."""
     return np.concatenate([own[at] for own, at in zip(values, chosen, strict=True)])
 

@@ -407,7 +407,7 @@ class Piece(NamedTuple):
     third: Array
 
     @classmethod
-    def of(cls, nodes: Array, f: Array, df: Array, i: npt.NDArray[np.intp]) -> Piece:
+    def of(cls, nodes: Array, f: Array, df: Array, i: np.ndarray) -> Piece:
         """The pieces from the nodes ``i`` on."""
         return cls.between(nodes[i + 1] - nodes[i], f[i], f[i + 1], df[i], df[i + 1])
 
@@ -439,7 +439,7 @@ def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
     return value + slope * (x - inside), slope
 
 
-def interval(nodes: Array, x: Array) -> npt.NDArray[np.intp]:
+def interval(nodes: Array, x: Array) -> np.ndarray:
     """The last i below the last node with ``nodes[i] <= x``, or 0."""
     below = np.searchsorted(nodes, x, "right") - 1
     return np.clip(below, 0, len(nodes) - 2)

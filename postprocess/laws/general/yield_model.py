@@ -76,7 +76,7 @@ _UNKNOWN = -32768
 _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
 
 
-Asked = npt.NDArray[np.bool_] | bool
+Asked = np.ndarray | bool
 
 
 class Yielding(NamedTuple):
@@ -452,7 +452,7 @@ class SolvedJoints:
             found[name] = np.where(np.isnan(steps), _UNKNOWN, steps).astype(np.int16)
         return found
 
-    def rows(self, side: str) -> npt.NDArray[np.intp]:
+    def rows(self, side: str) -> np.ndarray:
         """Those of one of `SIDES`, from the joint known to most `MULTIPLES` down."""
         chosen = np.flatnonzero(self.side == SIDES.index(side))
         order = np.lexsort((self.x0[chosen], -self.count[chosen]))
@@ -495,7 +495,7 @@ def telling_side(strain: bool, pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.
     return np.where(np.isinf(block), PIN_ALONE, told)
 
 
-def _alike(pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+def _alike(pin: npt.ArrayLike, block: npt.ArrayLike) -> np.ndarray:
     return np.isclose(pin, block, rtol=1e-4)
 
 
