@@ -31,12 +31,14 @@ from archord.postprocess.laws.general.hardening_model import flows
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.law_fit import (
+    JUDGED,
     SOFT,
     NodeRun,
     by_joint,
     first_loading,
     rms_largest,
     solved_in,
+    within,
 )
 from archord.postprocess.laws.general.yield_model import Numbers
 from archord.report.table import Table
@@ -44,10 +46,9 @@ from archord.report.table import Table
 # x of the ranges of P that are told apart
 _RANGES = {
     "P to 0.1 dR": (0.0, 0.099),
-    "P 0.1 to 2 dR": (0.099, 2.001),
+    "P 0.1 to 2 dR": JUDGED,
     "P 2 to 3 dR": (2.001, 3.001),
 }
-_USUAL = _RANGES["P 0.1 to 2 dR"]
 _END = 3.001
 _LEFT = {"3 % left": 0.03, "1 % left": 0.01}  # parts of the largest force on the way back
 _LOADING = [*_RANGES, "stiffness", "own stiffness", "p0", "eps"]
@@ -78,8 +79,8 @@ def off(joint: LawJoint, runs: list[NodeRun]) -> Off:
     x, y, peak, angle = nodes[nodes[:, 0] <= _END].T
     told = law.at(x)
     relative = _per_cent(told.load, y)
-    errors = {name: relative[_within(x, ends)] for name, ends in _RANGES.items()}
-    usual = _within(x, _USUAL)
+    errors = {name: relative[within(x, ends)] for name, ends in _RANGES.items()}
+    usual = within(x, JUDGED)
     before = usual & (x < x[-1])
     ln_x = np.log(x)
     ln_y = CubicSpline(ln_x, np.log(y))
@@ -100,11 +101,6 @@ def off(joint: LawJoint, runs: list[NodeRun]) -> Off:
 def _per_cent(told: Array, solved: Array) -> Array:
     """The relative error of what is ``told``."""
     return 100 * (told / solved - 1)
-
-
-def _within(x: Array, ends: tuple[float, float]) -> np.ndarray:
-    low, high = ends
-    return (x > low) & (x <= high)
 
 
 def kind_of(numbers: Numbers) -> str:
@@ -214,7 +210,7 @@ def other_laws(solved: dict[Numbers, list[NodeRun]]) -> Table:
     data = []
     for numbers, runs in solved.items():
         x, y, *_ = first_loading(runs).T
-        usual = _within(x, _USUAL)
+        usual = within(x, JUDGED)
         if usual.sum() > 3:
             data.append((numbers, x[usual], y[usual]))
 

@@ -17,11 +17,9 @@ from archord.benchmarks.law_check import kind_of
 from archord.materials.material import Array
 from archord.postprocess.laws.general.general_law import joint_numbers
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest
+from archord.postprocess.laws.general.law_fit import JUDGED, NodeRun, rms_largest, within
 from archord.postprocess.run import Run
 from archord.report.table import Table
-
-_USUAL = (0.099, 2.001)  # x of the errors
 
 
 def by_size(folder: Path) -> dict[LawJoint, dict[float, Array]]:
@@ -42,7 +40,7 @@ def mesh_table(folder: Path) -> Table:
     errors = defaultdict(list)
     for joint, solved in by_size(folder).items():
         finest = solved[min(solved)]
-        usual = (finest[:, 0] >= _USUAL[0]) & (finest[:, 0] <= _USUAL[1])
+        usual = within(finest[:, 0], JUDGED)
         for size, nodes in solved.items():
             if size > min(solved):
                 off = 100 * (nodes[usual, 1] / finest[usual, 1] - 1)

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from archord.measures.record import Record
 from archord.report.by_name import ByName
+from archord.report.table import in_digits
 from archord.scene.file import AnyScene
 from archord.scene.presets.joint import Scene
 from archord.scene.presets.joint_geometry import JointGeometry
@@ -37,6 +38,7 @@ _MOST_DOFS = 1_500_000
 _LEAST_RATIO = 1.02  # of two meshes that are told apart
 _FEWEST_IN_SPACE = 3  # meshes of shapes in space: two of them may agree by chance
 _REFINED = 8.0  # times as many dofs: of three meshes that hardly refine, all may agree by chance
+_DIGITS = 4  # of sizes: a scene can be read, and round-off of its units does not matter
 _COARSER = 3.0  # element size of a mesh for guesses over the size of the mesh itself
 _COARSEST_GUESS = 0.3  # element size over R
 
@@ -68,8 +70,8 @@ class MeshFamily:
         size = self.first / RATIO**level
         keys = self.scene.joint.model_dump(exclude_none=True)
         keys |= {
-            "relative_element_size": rounded(size * self.scale),
-            "growth": rounded(min(2.0, _GROWTH * size)),
+            "relative_element_size": in_digits(size * self.scale, _DIGITS),
+            "growth": in_digits(min(2.0, _GROWTH * size), _DIGITS),
         }
         try:
             joint = JointGeometry.model_validate(keys)
@@ -183,8 +185,8 @@ def coarser(scene: ProblemScene) -> ProblemScene | None:
 def resized(shape: Any, size: float, steeper: float) -> Any:
     """The ``shape`` with elements of another ``size``, which grow by a factor ``steeper``."""
     sizes: ByName = {
-        "element_size": rounded(size),
-        "growth": rounded(steeper * shape.growth),
+        "element_size": in_digits(size, _DIGITS),
+        "growth": in_digits(steeper * shape.growth, _DIGITS),
     }
     if hasattr(shape, "relative_element_size"):
         sizes["relative_element_size"] = None  # the other way to give the size
@@ -217,8 +219,3 @@ def chosen(scene: AnyScene, substeps: int) -> ByName:
         "stepping": scene.stepping.model_copy(update=stepping),
         "analysis": scene.analysis.model_copy(update={"accuracy": None}),
     }
-
-
-def rounded(value: float) -> float:
-    """Four digits, so that a scene can be read, and that round-off of its units does not matter."""
-    return float(f"{value:.4g}")

@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+
+def in_digits(value: Any, digits: int) -> float:
+    """The ``value`` as it is written in so many digits."""
+    return float(f"{value:.{digits}g}")
 
 
 class Table:

@@ -27,6 +27,7 @@ from pydantic import (
 
 from archord.report.by_name import ByName
 from archord.report.errors import InputError
+from archord.report.table import in_digits
 from archord.scene.file import (
     ABSENT,
     ALTERNATIVES,
@@ -334,7 +335,7 @@ def samples(hypercube: LatinHypercube) -> list[Overrides]:
         values = low + columns[k] * (high - low)
         columns[k] = np.exp(values) if r.scale == "log" else values
     return [
-        {key: float(f"{v:.{_DIGITS}g}") for key, v in zip(ranges, row, strict=True)}
+        {key: in_digits(v, _DIGITS) for key, v in zip(ranges, row, strict=True)}
         for row in columns.T
     ]
 

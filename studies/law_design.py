@@ -40,6 +40,7 @@ from archord.postprocess.laws.general.general_law import (
 )
 from archord.postprocess.laws.general.law_fit import steps_count
 from archord.postprocess.laws.general.yield_model import MULTIPLES, Numbers, first_yield
+from archord.report.table import in_digits
 from archord.scene.sections.errors import toml_value
 
 Row = dict[str, Any]
@@ -315,7 +316,7 @@ def sweep_file(
     def short(value: Any, digits: int = 5) -> Any:
         if isinstance(value, list):
             return [short(each, 4) for each in value]
-        return float(f"{value:.{digits}g}") if isinstance(value, float) else value
+        return in_digits(value, digits) if isinstance(value, float) else value
 
     lines = []
     for row in rows:

@@ -37,7 +37,7 @@ from archord.postprocess.curve import rms
 from archord.postprocess.run import Run
 from archord.report.by_name import ByName
 from archord.report.files import read_json
-from archord.report.table import Table
+from archord.report.table import Table, in_digits
 from archord.scene.presets.joint import Scene
 
 KINEMATICS = ("current", "reference")
@@ -186,7 +186,7 @@ def references(case: str, folder: Path, said: Said, table: Table) -> ByName:
         entry[kinematics] = {}
         for name in given["quantities"]:
             found = reference(solved, name, others.get(name))
-            entry[kinematics][name] = [float(f"{found.value:.9g}"), float(f"{found.error:.2g}")]
+            entry[kinematics][name] = [in_digits(found.value, 9), in_digits(found.error, 2)]
             limits = [f"{limit.value:.9g} (order {limit.order:.1f})" for limit in found.limits]
             table.add(case, kinematics, name, f"{found.value:.9g}", f"{found.error:.1e}", *limits)
         fine = solve(case, kinematics, folder, said, edge=True)
@@ -194,8 +194,8 @@ def references(case: str, folder: Path, said: Said, table: Table) -> ByName:
         profile, error = mean_profile(samples)
         sizes = [", ".join(f"{mesh.size:g}" for mesh in family) for family in fine]
         table.add(case, kinematics, "profile", "", f"{error:.1e}", *sizes)
-        entry["profile_error"][kinematics] = float(f"{error:.2g}")
-        entry["profile"][kinematics] = [float(f"{p:.7g}") for p in profile]
+        entry["profile_error"][kinematics] = in_digits(error, 2)
+        entry["profile"][kinematics] = [in_digits(p, 7) for p in profile]
     return entry
 
 

@@ -25,6 +25,7 @@ from numpy.polynomial import chebyshev
 
 from archord.materials.material import Array
 from archord.postprocess.laws.general.joint_curve import line_contact
+from archord.report.table import in_digits
 
 TABLE = Path(__file__).parent / "elastic_model.json"
 FARTHEST = 3.8  # delta/dR at the end of the polynomials; what is fitted ends at 3
@@ -127,7 +128,7 @@ class ElasticModel:
         for name, of in vars(self).items():
             rows = []
             for exponents, coefficients in zip(of.exponents, of.coefficients, strict=True):
-                digits = [float(f"{c:.6g}") for c in coefficients]
+                digits = [in_digits(c, 6) for c in coefficients]
                 rows.append(json.dumps([*map(int, exponents), *digits]))
             tables.append(f' "{name}": [\n  ' + ",\n  ".join(rows) + "\n ]")
         return "{\n" + ",\n".join(tables) + "\n}\n"

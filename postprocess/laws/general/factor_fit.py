@@ -32,13 +32,18 @@ from archord.postprocess.laws.general.factor_model import (
 from archord.postprocess.laws.general.general_law import NODES, joint_numbers, within_range
 from archord.postprocess.laws.general.hardening_model import block_leads, flows
 from archord.postprocess.laws.general.joint import LawJoint
-from archord.postprocess.laws.general.law_fit import NodeRun, rms_largest, solved_joints
+from archord.postprocess.laws.general.law_fit import (
+    FITTED,
+    JUDGED,
+    NodeRun,
+    rms_largest,
+    solved_joints,
+    within,
+)
 from archord.report.by_name import Amounts, ByName
 from archord.report.files import read_json
-from archord.report.table import Table
+from archord.report.table import Table, in_digits
 
-_RANGE = (0.05, 3.05)  # x of the data
-_USUAL = (0.099, 2.001)
 _PARTS = 5  # of the joints, each of which the other parts predict
 _WITHIN = 0.93  # share of errors that the expected error is to contain
 _LITTLE = 0.1  # lost to a block that leads
@@ -62,9 +67,7 @@ class Changed:
     def of(cls, joint: LawJoint, without: NodeRun, with_: NodeRun) -> Changed:
         """The joint of two runs to the same displacements."""
         loading = slice(without.loading)
-        begin, end = _RANGE
-        at = without.nodes[loading, 0]
-        inside = (at >= begin) & (at <= end)
+        inside = within(without.nodes[loading, 0], FITTED)
         return cls(
             joint,
             without.nodes[loading][inside],
@@ -77,7 +80,7 @@ class Changed:
     def usual(self) -> np.ndarray:
         """Which nodes are in the range that is judged."""
         x = self.without[:, 0]
-        return (x >= _USUAL[0]) & (x <= _USUAL[1])
+        return within(x, JUDGED)
 
     @property
     def added(self) -> Array:
@@ -188,7 +191,7 @@ def _expected(off: Array, leading: Array) -> list[float]:
     usual = np.quantile(off[~leads], _WITHIN)
     left = np.sqrt(np.maximum(off[leads] ** 2 - usual**2, 0.0)) / leading[leads]
     more = np.quantile(left, _WITHIN) if leads.any() else 0.0
-    return [float(f"{value:.3g}") for value in (usual, more)]
+    return [in_digits(value, 3) for value in (usual, more)]
 
 
 def back_factors(joints: list[Changed]) -> Amounts:
@@ -201,7 +204,7 @@ def back_factors(joints: list[Changed]) -> Amounts:
             plain = joint.plain
             if plain.plane == plane and len(joint.back) > 1:
                 shares.append(np.abs(joint.way_changed) / plain.scale(joint.kind)[-1])
-        factors[plane] = float(f"{np.quantile(np.concatenate(shares), _WITHIN):.3g}")
+        factors[plane] = in_digits(np.quantile(np.concatenate(shares), _WITHIN), 3)
     return factors
 
 
@@ -220,7 +223,7 @@ def main(folder: Path) -> None:
     joints = changed_in(folder)
     factors, errors = errors_of(joints)
     gains = {
-        plane: [[float(f"{value:.5g}") for value in row] for row in values]
+        plane: [[in_digits(value, 5) for value in row] for row in values]
         for plane, values in fit_gain(joints).items()
     }
     store(joints[0].kind, {"gain": gains, "error": factors, "back error": back_factors(joints)})

@@ -43,10 +43,13 @@ from archord.postprocess.laws.general.hardening_model import (
 )
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.law_fit import (
+    FITTED,
+    JUDGED,
     NodeRun,
     by_joint,
     first_loading,
     rms_largest,
+    within,
 )
 from archord.postprocess.laws.general.yield_model import (
     Loss,
@@ -58,12 +61,10 @@ from archord.postprocess.laws.general.yield_model import (
 )
 from archord.report.by_name import Amounts
 from archord.report.files import read_json
-from archord.report.table import Table
+from archord.report.table import Table, in_digits
 
 Model = Mapping[str, Array]  # the coefficients of `TERMS` by plane and body
-_RANGE = (0.05, 3.05)  # x of the data
 _WITHIN = 0.93  # share of errors that expected errors are to contain
-_USUAL = (0.099, 2.001)
 _GUESS = np.array([-2.5, 2.0, -1.0, *np.zeros(len(TERMS) - 3)])
 # how far from it coefficients are likely
 _FREE = np.array([2.0, 1.0, 1.0, *np.full(8, 0.7), *np.ones(len(TERMS) - 11)])
@@ -92,10 +93,7 @@ class Hardened:
         """The joint that was solved in ``runs``."""
         numbers = joint_numbers(joint)
         nodes = first_loading(runs)
-        begin, end = _RANGE
-        at = nodes[:, 0]
-        inside = (at >= begin) & (at <= end)
-        x, y, peak, _ = nodes[inside].T
+        x, y, peak, _ = nodes[within(nodes[:, 0], FITTED)].T
         elastic = elastic_model()
         side, *_ = sides_of(numbers)
         yielding = numbers.yielding
@@ -197,7 +195,7 @@ def fit_peak(joints: list[Hardened], model: Model) -> Amounts:
         rise = np.concatenate(rises)
         miss = np.concatenate(misses)
         factor = rise @ miss / (rise @ rise)
-        factors[plane] = float(f"{factor:.4g}")
+        factors[plane] = in_digits(factor, 4)
     return factors
 
 
@@ -218,7 +216,7 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[Amounts, Tab
     by_kind: dict[str, list[Array]] = {}
     for joint, model in zip(joints, models, strict=True):
         found, lost = joint.state(model)
-        usual = (joint.x >= _USUAL[0]) & (joint.x <= _USUAL[1])
+        usual = within(joint.x, JUDGED)
         told = [
             lost.force - joint.force,
             np.hypot(lost.deviation, ELASTIC_ERROR),
@@ -231,7 +229,7 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[Amounts, Tab
         off, deviation, rise = np.concatenate(parts, axis=1)
         left = np.sqrt(np.maximum(off**2 - deviation**2, 0.0)) / np.maximum(rise, _LITTLE)
         factor = np.quantile(left, _WITHIN)
-        factors[name] = float(f"{factor:.3g}")
+        factors[name] = in_digits(factor, 3)
         inside = np.abs(off) <= np.hypot(deviation, factors[name] * rise)
         table.add(name, len(parts), rms_largest(100 * off), f"{inside.mean():.0%}")
     return factors, table
@@ -244,7 +242,7 @@ def main(folder: Path) -> None:
     joints = [Hardened.of(joint, runs) for joint, runs in solved.items()]
     model = fit_strain(joints)
     factors, table = errors_of(joints, predicted(joints, model))
-    found = {name: [float(f"{value:.5g}") for value in values] for name, values in model.items()}
+    found = {name: [in_digits(value, 5) for value in values] for name, values in model.items()}
     stored = read_json(TABLE)
     new = {
         "strain": stored["strain"] | found,

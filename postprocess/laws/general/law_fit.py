@@ -64,7 +64,7 @@ from archord.postprocess.laws.general.yield_model import (
 from archord.postprocess.run import Run
 from archord.report.by_name import Amounts, ByName
 from archord.report.files import read_json
-from archord.report.table import Table
+from archord.report.table import Table, in_digits
 
 # degrees in the joint's numbers and in x/(1 + x), and how many of these terms are taken
 _TERMS = {"F": (6, 8, 260), "peak": (6, 8, 120), "angle": (6, 8, 120)}
@@ -74,6 +74,8 @@ SOFT = 0.5  # p m of soft pins in plane strain
 # shares of errors that expected errors are to contain
 WITHIN = {"force": 0.91, "shape": 0.9, "back": 0.9}
 _USUAL = (0.1, 2.0)  # x of the errors that tell what to expect
+FITTED = (0.05, 3.05)  # x of the data of other models
+JUDGED = (0.099, 2.001)  # x of their errors
 _LAST = 3.0  # x that the law reaches
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
@@ -223,7 +225,7 @@ def solved_in(folder: Path, names: Container[str] | None = None) -> dict[Numbers
     for joint, runs in by_joint(folder, names).items():
         if joint.hardens or joint.friction or joint.large_strain:
             continue
-        rounded = (float(f"{value:.6g}") for value in joint_numbers(joint))
+        rounded = (in_digits(value, 6) for value in joint_numbers(joint))
         found[Numbers(*rounded)] += runs
     return dict(found)
 
@@ -374,8 +376,7 @@ def fit_side(joints: SolvedJoints, side: str) -> ByName:
             errors = errors[:, :1]
         if name == "force":
             x = MULTIPLES * joints.x0[joints.rows(side), None]
-            low, high = _USUAL
-            errors[(x < low) | (x > high)] = np.nan
+            errors[~within(x, _USUAL)] = np.nan
             found["spread"][name] = _spread_by_kind(side, points, errors)
         else:
             found["spread"][name] = _spread(errors, name)
@@ -384,7 +385,7 @@ def fit_side(joints: SolvedJoints, side: str) -> ByName:
 
 def _spread(errors: Array, name: str) -> float:
     """What the share `WITHIN` of the known ``errors`` of a process keep."""
-    return float(f"{np.nanquantile(errors, WITHIN[name]):.3g}")
+    return in_digits(np.nanquantile(errors, WITHIN[name]), 3)
 
 
 def _spread_by_kind(side: str, inputs: Array, errors: Array) -> Amounts:
@@ -416,8 +417,14 @@ def fit_kernel(points: Array, values: Array, noise: float) -> Kernel:
     bounds = np.log([*lengths_within, (1e-7, 0.1)])
     most = {"maxiter": 60}
     found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=most).x
-    *lengths, noise = (float(f"{value:.4g}") for value in np.exp(found))
+    *lengths, noise = (in_digits(value, 4) for value in np.exp(found))
     return Kernel(np.array(lengths), noise)
+
+
+def within(x: Array, ends: tuple[float, float]) -> np.ndarray:
+    """Which ``x`` (any shape) are between the ``ends``."""
+    low, high = ends
+    return (x >= low) & (x <= high)
 
 
 def rms_largest(errors: Array) -> str:
@@ -441,11 +448,10 @@ def error_table(joints: SolvedJoints, kernels: ByName) -> Table:
         strain, p, m, *_ = joints.numbers[chosen].T[..., None]
         known = ~np.isnan(off)
         soft = strain * p * m > SOFT
-        low, high = _USUAL
-        usual = (x >= low) & (x <= high)
+        usual = within(x, _USUAL)
         parts = [
             ~soft & usual,
-            ~soft & (x > high) & (x <= _LAST),
+            ~soft & (x > _USUAL[1]) & (x <= _LAST),
             soft & (x <= _LAST),
         ]
         cells = [rms_largest(100 * off[part & known]) for part in parts]
