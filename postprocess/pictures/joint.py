@@ -71,7 +71,7 @@ def _load(scene: Scene, delta: float) -> str:
 
 def _over(divisor: float) -> ByName:
     """Of a second axis with the numbers of the first over the ``divisor``."""
-    return {"functions": [lambda x, by=by: np.asarray(x) * by for by in (1 / divisor, divisor)]}
+    return {"functions": (lambda x: np.asarray(x) / divisor, lambda x: np.asarray(x) * divisor)}
 
 
 def force_panel(axes: Any, run: Run) -> None:
