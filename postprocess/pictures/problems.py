@@ -113,7 +113,7 @@ def draw_field(
     x: Array,
     shown: np.ndarray,
     ranged: np.ndarray,
-    field: str,
+    field: str = "",
 ) -> None:
     """A ``field`` in the ``shown`` cells ``(m,)`` with the nodes at ``x``: by default PEEQ, grey
     where there is none, or von Mises stress where nothing has yielded; the colours end at the
