@@ -30,6 +30,8 @@ from archord.output.folder import claim_folder
 from archord.output.user_file import check_target, writing
 from archord.postprocess.run import Run
 
+Shown = tuple[Grid, Callable[[int], Arrays]]  # and its data at a step
+
 _OF_CONTACT = ("pressure", "raw_pressure", "gap", "angle", "s", "slip", "shear", "sticks")
 
 
@@ -79,7 +81,7 @@ def export_vtk(
     return list(files)
 
 
-def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
+def _bodies(run: Run, step: int) -> Shown:
     """All bodies, and their data at a step."""
     mesh = run.fields(step)
     kind = SECOND_ORDER[mesh.cells.shape[1]]
@@ -97,7 +99,7 @@ def _bodies(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     return grid, values
 
 
-def _contact(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
+def _contact(run: Run, step: int) -> Shown:
     """The integration points of the surfaces, in a plane joined by lines within each facet, and
     their data at a step; ``side`` counts the surfaces from 1, of a joint pin and hole."""
     table = run.pressure(step)
@@ -124,7 +126,7 @@ def _contact(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
     return grid, values
 
 
-def _points(run: Run, step: int) -> tuple[Grid, Callable[[int], Arrays]]:
+def _points(run: Run, step: int) -> Shown:
     """A vertex for each integration point, and their data at a step; they move as the second-order
     cells around them."""
     from archord.geometry.basis import (

@@ -46,7 +46,7 @@ from archord.solver.problem import Problem
 
 
 def general_account(
-    scene: ProblemScene, comm: MPI.Comm, timer: Timer, given: Problem | None
+    scene: ProblemScene, comm: MPI.Comm, timer: Timer, given: Problem | None = None
 ) -> Account:
     """The problem of ``scene``, ready to be solved, and its account; or the problem that was
     ``given`` from Python, which the scene tells about. Its parts tell the measures.

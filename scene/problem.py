@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from archord.report.by_name import Words
+from archord.report.by_name import Names, Words
 from archord.report.units import scale_lacks
 from archord.scene.columns import require_different
 from archord.scene.parts import (
@@ -107,7 +107,7 @@ class ProblemScene(Checked):
     2
     """
 
-    chosen: ClassVar[tuple[str, ...]] = STEPS
+    chosen: ClassVar[Names] = STEPS
     format: Literal[2] = key("version of the scene format", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
     mesh: MeshSection = Field(description="the mesh")
@@ -192,9 +192,9 @@ class ProblemScene(Checked):
         return found
 
     @property
-    def _points(self) -> list[tuple[tuple[str, ...], list[float]]]:
+    def _points(self) -> list[tuple[Names, list[float]]]:
         """Keys and values of points."""
-        points: list[tuple[tuple[str, ...], list[float]]] = []
+        points: list[tuple[Names, list[float]]] = []
         points += [(("coupling", c.name, "point"), c.point) for c in self.coupling]
         for part in self.interaction:
             if part.rigid is not None:

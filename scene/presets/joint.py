@@ -10,7 +10,7 @@ from pydantic import Field
 
 from archord.materials.elasticity import contact_modulus
 from archord.materials.thickening import block_thickens, error_of_small_strain
-from archord.report.by_name import ByName
+from archord.report.by_name import ByName, Names
 from archord.report.errors import InputError
 from archord.scene.presets.joint_geometry import JointGeometry
 from archord.scene.presets.preset import general_scene, require_solid
@@ -85,7 +85,7 @@ class Scene(Checked):
     scene: block.E = -1.0 must be greater than 0.
     """
 
-    chosen: ClassVar[tuple[str, ...]] = CHOSEN
+    chosen: ClassVar[Names] = CHOSEN
     has_laws: ClassVar[bool] = True
     format: Literal[1] = key(
         "version of the scene format; a scene of a newer version is refused", default=FORMAT

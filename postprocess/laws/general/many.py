@@ -20,6 +20,8 @@ from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.by_name import ByName, Words
 from archord.report.doubts import kind
 
+Given = tuple[tuple[str, Any], ...]  # names and values
+
 KNOWN = tuple(field.name for field in fields(LawJoint))
 _IDLE = ("k", "c", "length")  # parameters of other laws
 # parameters by which forces are others than the law's, and which the law does not know
@@ -138,7 +140,7 @@ def _of_joints(n: int, delta: npt.ArrayLike, deepest: npt.ArrayLike) -> tuple[Ar
     return deltas, deepests
 
 
-def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:
+def _warn_of(rows: list[Given]) -> None:
     """Warn of each kind of joints, at the first of the ``rows``, whose forces are others than the
     law's."""
     first: Words = {}
@@ -153,7 +155,7 @@ def _warn_of(rows: list[tuple[tuple[str, Any], ...]]) -> None:
         warnings.warn(LawRangeWarning(text), stacklevel=3)
 
 
-def _rows(joints: Mapping[str, Any]) -> list[tuple[tuple[str, Any], ...]]:
+def _rows(joints: Mapping[str, Any]) -> list[Given]:
     """The parameters of each joint that are given."""
     columns = {str(name): np.asarray(joints[name]) for name in joints}
     unknown = [name for name in columns if name not in KNOWN]
@@ -181,6 +183,6 @@ def _is_given(value: Any) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def _law(given: tuple[tuple[str, Any], ...]) -> JointCurve:
+def _law(given: Given) -> JointCurve:
     """The law of the joint with the parameters ``given``. Raises ValueError, TypeError."""
     return law_of_joint(LawJoint(**dict(given)))

@@ -46,9 +46,9 @@ class MeasuredCurve:
 
 def read_curve(
     path: Path,
-    delta: str | None,
-    load: str | None,
-    units: tuple[str, str] | None,
+    delta: str | None = None,
+    load: str | None = None,
+    units: tuple[str, str] | None = None,
 ) -> MeasuredCurve:
     """The curve in the file ``path``: its first two columns, or those of these headings.
 
