@@ -225,7 +225,7 @@ class _Output:
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
             m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
-        self._on_root(self._report.unseal)
+        self._on_root(lambda: self._report.unseal())
         profiles = self.account.profiles()
         self._write_arrays(m, profiles)
         self._write_tables(m, step, profiles)
