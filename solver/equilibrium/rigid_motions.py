@@ -25,6 +25,7 @@ _STOPPED = 0.1  # the same where contact carries bodies, whose place hardly chan
 _FAST = 0.1  # ratio of what is left by which iterations go on from there
 _ROUND_OFF = 1e-9  # the same, of the largest forces on the way
 _DAMPING = 10.0  # ratio of one damping to the next
+_LEAST_DAMPING = 1e-12  # the last damping over the first, as nothing else may resist
 _BALANCED = 1e-6  # part of forces below which their resultant on free motions is none
 _LOOSE = 1e-6  # part of a free motion that a body has at least which takes part in it
 
@@ -147,6 +148,7 @@ class RigidMotions:
         is_pushed = bool(np.linalg.norm(applied))
         step: Array = np.zeros(len(self.free))
         damping = self.drives.stiffness
+        least_damping = _LEAST_DAMPING * damping
         least = np.inf
         most = 0.0
         is_near = False
@@ -162,7 +164,7 @@ class RigidMotions:
                 damping *= _DAMPING**2
             else:
                 least = size
-                damping /= _DAMPING
+                damping = max(damping / _DAMPING, least_damping)
                 best = push
                 best_left = left
             if size <= _ROUND_OFF * most or (is_near and size > _FAST * before):

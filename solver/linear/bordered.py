@@ -4,6 +4,9 @@ given forces act.
 ``[A B; C D] (u, s) = (r, rho)`` with ``m`` of them is solved by one factorisation of A, the matrix
 at given levels, and ``m + 1`` solves with it, through the Schur complement ``D - C A^-1 B``:
 displacement control is regular wherever force control is, and beyond.
+
+Where multigrid solves with A, FGMRES solves the whole system. One cycle stands for A^-1 in its
+preconditioner, but for A^-1 B, which is solved.
 """
 
 from __future__ import annotations
@@ -14,12 +17,17 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.solver.linear.multigrid import Multigrid, iterate
 from archord.solver.linear.strategy import Facts, Strategy, krylov_iterations
 
 # stiffness against a motion over ``stiffness`` below which nothing resists the force
 _SINGULAR = 1e-9
 # part of a right-hand side along such a motion above which the system has no solution
 _FORCED = 1e-3
+# the same below which A^-1 B is solved accurately, to tell whether anything resists
+_DOUBTFUL = 1e-3
+_ACCURATE = 1e-10  # residual over right-hand side there
+_ROUGH = 1e-4  # and elsewhere, where A^-1 B preconditions
 
 
 def why_not(facts: Facts) -> str | None:
@@ -79,7 +87,7 @@ class Bordered(Strategy):
     The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance;
     ``give_strategy`` gives the strategy for ``A``. ``last`` is the border as it was updated last.
     ``singular`` numbers the level that a force moves most which nothing resists, or None.
-    ``krylov_iterations`` are of all solves with ``A``, 0 of factorisations.
+    ``krylov_iterations`` are of all solves with ``A`` alone, 0 of factorisations.
     """
 
     def __init__(
@@ -97,8 +105,10 @@ class Bordered(Strategy):
         zero: Array = np.zeros((A.getLocalSize()[0], m))
         self.last = Border(A, zero, zero, np.zeros((m, m)))
         self.matrix = self.last.matrix()
-        self._factorised = self.last.C, self.last.D  # with the matrix that the preconditioner is of
+        # of the matrix that the preconditioner is of
+        self._C = zero
         self._along_B = zero  # A^-1 B
+        self._complement = self.last.D  # D - C A^-1 B
         self._x, self._y = A.createVecs()
         self._ksp = PETSc.KSP()
         self.replace(A)
@@ -109,7 +119,15 @@ class Bordered(Strategy):
         self._stale = True
         self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
-        self._give_strategy().attach(self._ksp)
+        strategy = self._give_strategy()
+        strategy.attach(self._ksp)
+        self._iterates = isinstance(strategy, Multigrid)
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` solve so."""
+        super().attach(ksp)
+        if self._iterates:
+            iterate(ksp, lambda: self.singular is not None)
 
     def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
         """New border for a matrix with new values (see `Border`). Without ``factorise`` the
@@ -120,10 +138,18 @@ class Bordered(Strategy):
         self._stale |= factorise
         self._ksp.getPC().setReusePreconditioner(not self._stale)
 
-    def _solve(self, r: Array) -> Array:
+    def _solve(self, r: Array, guess: Array | None = None) -> Array:
         self._x.array[:] = r
+        self._ksp.setInitialGuessNonzero(guess is not None)
+        if guess is not None:
+            self._y.array[:] = guess
         self._ksp.solve(self._x, self._y)
         self.krylov_iterations += krylov_iterations(self._ksp)
+        return self._y.array_r.copy()
+
+    def _cycle(self, r: Array) -> Array:
+        self._x.array[:] = r
+        self._ksp.getPC().apply(self._x, self._y)
         return self._y.array_r.copy()
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
@@ -131,26 +157,40 @@ class Bordered(Strategy):
         resists."""
         last = self.last
         if self._stale:
-            self._along_B = np.stack([self._solve(b) for b in last.B.T], axis=1)
-            self._factorised = last.C, last.D
-            self._stale = False
+            self._renew()
         rho = last.levels(r)
-        u = self._solve(r.array_r[: last.n])
-        C, D = self._factorised
-        complement = D - self.comm.allreduce(C.T @ self._along_B)
-        lacking = rho - self.comm.allreduce(u @ C)
-        if not np.isfinite(complement).all():
+        of_displacements = r.array_r[: last.n]
+        u = self._cycle(of_displacements) if self._iterates else self._solve(of_displacements)
+        lacking = rho - self.comm.allreduce(u @ self._C)
+        if not np.isfinite(self._complement).all():
             # the matrix could not be factorised: Newton's method sees the step fail
             self.replace(last.A)
             last.join(x, np.full_like(u, np.nan), np.full_like(rho, np.nan))
             return
-        s = self._levels(complement, lacking, r.norm())
+        s = self._levels(lacking, r.norm())
         last.join(x, u - self._along_B @ s, s)
 
-    def _levels(self, complement: Array, lacking: Array, size: float) -> Array:
-        """The levels ``(m,)`` of the Schur ``complement``, for a right-hand side of this ``size``;
-        notes what is singular."""
-        left, resistance, right = np.linalg.svd(complement)
+    def _renew(self) -> None:
+        """Solve for A^-1 B."""
+        self._stale = False
+        self._C = self.last.C
+        for tolerance in (_ROUGH, _ACCURATE):
+            self._ksp.setTolerances(rtol=tolerance)
+            found = []
+            for b, before in zip(self.last.B.T, self._along_B.T, strict=True):
+                found.append(self._solve(b, before if self._iterates else None))
+            self._along_B = np.stack(found, axis=1)
+            self._complement = self.last.D - self.comm.allreduce(self._C.T @ self._along_B)
+            if not self._iterates or not np.isfinite(self._complement).all():
+                return
+            resistance = np.linalg.svd(self._complement, compute_uv=False)
+            if resistance.min() >= _DOUBTFUL * self._stiffness:
+                return
+
+    def _levels(self, lacking: Array, size: float) -> Array:
+        """The levels ``(m,)`` that give what is ``lacking`` ``(m,)``, for a right-hand side of this
+        ``size``; notes what is singular."""
+        left, resistance, right = np.linalg.svd(self._complement)
         forced = left.T @ lacking
         is_resisted = resistance >= _SINGULAR * self._stiffness
         moved = np.divide(forced, resistance, where=is_resisted, out=np.zeros_like(forced))

@@ -44,8 +44,7 @@ class Choice:
         one of, of the displacements ``V``, of which some are ``fixed`` ``(n_local, d)``.
         Collective."""
         if self.uses("multigrid"):
-            accuracy = {"tolerance": multigrid.ACCURATE} if self.uses("bordered") else {}
-            return multigrid.Multigrid(terms, V, fixed, **accuracy)
+            return multigrid.Multigrid(terms, V, fixed)
         [A] = terms
         if self.uses("substructured"):
             parts = substructured.substructures(A, V)
@@ -72,6 +71,4 @@ def choose(facts: Facts) -> Choice:
     given_way = fitting[1:]
     if fitting and fitting[0] in _WITHOUT:
         given_way += _WITHOUT[fitting[0]]
-        if facts.by_force:  # its preconditioner solves by iterations
-            given_way.append("look_ahead")
     return Choice(reasons | {name: f"the system is {INSTEAD[fitting[0]]}" for name in given_way})

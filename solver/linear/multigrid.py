@@ -13,7 +13,7 @@ but for the linear displacement at the same node. So the product has unit rows t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from locale import localeconv
 from typing import Any
 
@@ -35,7 +35,6 @@ FEWEST_DOFS = 5_000  # below, a factorisation is quicker
 LEAST_DIMENSION = 3  # factors of plane problems hardly fill up
 _RESTART = 50  # vectors that GMRES keeps
 _MOST_ITERATIONS = 200  # after which Newton's method tries what has been found
-ACCURATE = 1e-10  # residual over right-hand side where a solve stands for a factorisation
 _SMOOTHING = 3  # degree of the polynomials
 _SWEEPS = 6  # there and back, of the linear displacements
 _GROWN = 2.0  # entry of the diagonal over what it was, above which levels below may mislead
@@ -62,10 +61,39 @@ def takes_a_sum(V: fem.FunctionSpace) -> bool:
     return V.dofmap.bs == COMPONENTS and V.element.basix_element.degree > 1
 
 
+class _Test:
+    """PETSc's test of iterations: they are done when the residual is small, where ``ends`` says so,
+    or after many, as a line search can use what they have found."""
+
+    def __init__(self, ends: Callable[[], bool]) -> None:
+        self._ends = ends
+        self._right_side = 0.0
+
+    def __call__(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
+        if iteration == 0:
+            self._right_side = ksp.getRhs().norm()
+        if not np.isfinite(norm):
+            return _Reason.DIVERGED_NANORINF
+        if norm <= ksp.getTolerances()[0] * self._right_side:
+            return _Reason.CONVERGED_RTOL
+        if iteration >= _MOST_ITERATIONS or (iteration > 0 and self._ends()):
+            return _Reason.CONVERGED_ITS
+        return _Reason.ITERATING
+
+
+def iterate(ksp: PETSc.KSP, ends: Callable[[], bool] = lambda: False) -> None:
+    """Let ``ksp`` iterate with its preconditioner, loosely until it is told otherwise, and after
+    the first iteration only until ``ends`` says so."""
+    ksp.setType("fgmres")  # as the smoother rounds to single precision
+    ksp.setGMRESRestart(_RESTART)
+    ksp.setTolerances(rtol=LOOSEST)
+    ksp.setConvergenceTest(_Test(ends))
+
+
 class Multigrid(Strategy):
     """Python context of the preconditioner of a sum of ``terms``, matrices of the displacements
-    ``V``, of which those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix; it
-    solves to the ``tolerance``. Collective.
+    ``V``, of which those that are ``fixed`` ``(n_local, d)`` have rows of the unit matrix.
+    Collective.
 
     interpolation : matrix that takes linear displacements to the own ones; None where those are
         linear
@@ -73,17 +101,10 @@ class Multigrid(Strategy):
     entries : those of it that were not zero when the levels below were made
     """
 
-    def __init__(
-        self,
-        terms: Sequence[PETSc.Mat],
-        V: fem.FunctionSpace,
-        fixed: np.ndarray,
-        tolerance: float = LOOSEST,
-    ) -> None:
+    def __init__(self, terms: Sequence[PETSc.Mat], V: fem.FunctionSpace, fixed: np.ndarray) -> None:
         A = terms[0]
         self.matrix = A
         self._terms = terms
-        self._tolerance = tolerance
         self.interpolation: PETSc.Mat | None = None
         self.linear = A
         self.entries = A
@@ -97,7 +118,6 @@ class Multigrid(Strategy):
         self._diagonal: Array = np.zeros(1)  # of `linear` when the levels below were made
         self._below = PETSc.PC().create(A.comm)
         self._smoother = BlockSmoother(*terms)
-        self._right_side = 0.0
         self._is_ready = False
 
     def renew(self, terms: Sequence[PETSc.Mat]) -> None:
@@ -109,21 +129,7 @@ class Multigrid(Strategy):
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` iterate."""
         super().attach(ksp)
-        ksp.setType("fgmres")  # as the smoother rounds to single precision
-        ksp.setGMRESRestart(_RESTART)
-        ksp.setTolerances(rtol=self._tolerance)
-        ksp.setConvergenceTest(self._test)
-
-    def _test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
-        """Done when the residual is small, or after many iterations: a line search can use what
-        they have found."""
-        if iteration == 0:
-            self._right_side = norm
-        if not np.isfinite(norm):
-            return _Reason.DIVERGED_NANORINF
-        if norm <= ksp.getTolerances()[0] * self._right_side:
-            return _Reason.CONVERGED_RTOL
-        return _Reason.CONVERGED_ITS if iteration >= _MOST_ITERATIONS else _Reason.ITERATING
+        iterate(ksp)
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Make the levels of the matrix as it is now, called by PETSc."""

@@ -112,7 +112,7 @@ class NewtonSolver:
     def _take_choice(self) -> None:
         """Make what the chosen strategies need."""
         self._choice = choice = self._system.choice
-        self._iterates = choice.uses("multigrid") and self._system.border is None
+        self._iterates = choice.uses("multigrid")
         self._lagged: Lagged | None = None
         if choice.uses("lagged"):
             self._lagged = Lagged(yields=self.equilibrium.bulk.plastic)
@@ -312,7 +312,9 @@ class NewtonSolver:
         """Whether multigrid solves with the levels of an earlier matrix: after two iterations in
         which Newton's method converges the matrix hardly changes."""
         residuals = self._result.residuals
-        if not self._iterates or self._renewed or len(residuals) <= _ITERATIONS_WITH_LEVELS:
+        if not self._iterates or self._system.border or self._renewed:
+            return False
+        if len(residuals) <= _ITERATIONS_WITH_LEVELS:
             return False
         return residuals[-1] < _CONVERGES * residuals[-2]
 

@@ -36,7 +36,7 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, 2, False, False, False, False, 0.5, lambda:
         ({"dimension": 3}, "multigrid + look_ahead"),
         ({"dimension": 3, "dofs": 50_000}, "multigrid + look_ahead"),
         ({"dimension": 3, "yields": True}, "multigrid + look_ahead"),
-        ({"dimension": 3, "by_force": True}, "bordered + multigrid"),
+        ({"dimension": 3, "by_force": True}, "bordered + multigrid + look_ahead"),
     ],
 )
 def test_what_is_used(change, strategy):
