@@ -40,11 +40,16 @@ def turns(freedom: str | None) -> bool:
     return freedom is not None and freedom.startswith("rotation")
 
 
-class DiscSection(Section):
-    """A rigid disc; in space a cylinder, infinitely long, or without an axis a ball."""
+class _RoundSection(Section):
+    """A circle; in space around an axis."""
 
     centre: Place = key("centre, in space also a point of the axis", "length", example=[0.0, 0.0])
     radius: Positive = key("radius", "length", example=10.0)
+
+
+class DiscSection(_RoundSection):
+    """A rigid disc; in space a cylinder, infinitely long, or without an axis a ball."""
+
     axis: Axis | None = key(
         "in space: direction of the axis of a cylinder, which is infinitely long; a ball if absent",
         other=[0.0, 0.0, 1.0],
@@ -63,11 +68,9 @@ class CoreSection(Section):
     radius: Positive = key("radius", "length", example=10.0)
 
 
-class CircleSection(Section):
+class CircleSection(_RoundSection):
     """A circle on which a set of facets lies; in space a cylinder, or without an axis a sphere."""
 
-    centre: Place = key("centre, in space also a point of the axis", "length", example=[0.0, 0.0])
-    radius: Positive = key("radius", "length", example=10.0)
     axis: Axis | None = key("in space: direction of a cylinder's axis", other=[0.0, 0.0, 1.0])
     facets: Name = key("facet set whose nodes are put on the circle", example="hole")
 
