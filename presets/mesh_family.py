@@ -169,13 +169,13 @@ class ProblemFamily:
         return any(m.contact_area for m in steps) or not self.scene.interaction
 
 
-def coarser(scene: ProblemScene) -> ProblemScene | None:
-    """The ``scene`` on larger elements, for guesses; None where they would be hardly larger, and
-    for a mesh from a file."""
+def coarser(scene: ProblemScene, share: float = 1.0) -> ProblemScene | None:
+    """The ``scene`` on larger elements, for guesses, or on a ``share`` of their size; None where
+    they would be hardly larger, and for a mesh from a file."""
     shape = scene.mesh.shape
     if shape is None:
         return None
-    size = min(_COARSER * shape.h, _COARSEST_GUESS * shape.radius)
+    size = share * min(_COARSER * shape.h, _COARSEST_GUESS * shape.radius)
     if size < RATIO * shape.h:
         return None
     mesh = scene.mesh.model_copy(update={"shape": resized(shape, size, size / shape.h)})

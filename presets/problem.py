@@ -30,6 +30,7 @@ from archord.solver.parts import Body, Coupling, Load, Support, freedoms
 from archord.solver.path.system import System, displacement_space
 from archord.solver.problem import Interaction, Problem
 
+_SHARES = (1.0, 0.8, 0.65)  # of the size of elements for guesses, one after the other
 _LEVER = 1e-6  # of a mean motion: round-off of its point
 
 
@@ -40,10 +41,24 @@ def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
         mesh = scene_mesh(scene, comm)
         in_place = placed(scene, mesh)
         problem = problem_of(in_place, mesh)
-    larger = coarser(in_place) if in_place.in_space else None
-    if larger is None:
+    if not in_place.in_space or coarser(in_place) is None:
         return problem
-    return replace(problem, coarser=partial(general_problem, larger, comm))
+    return replace(problem, coarser=partial(_coarser_problem, in_place, comm))
+
+
+def _coarser_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
+    """The problem of a ``scene`` on larger elements, for guesses, and on less large ones where some
+    of them are folded. Collective; raises `InputError` where no size will do."""
+    failure = InputError("no larger elements can be drawn.")
+    for share in _SHARES:
+        larger = coarser(scene, share)
+        if larger is None:
+            break
+        try:
+            return general_problem(larger, comm)
+        except InputError as error:
+            failure = error
+    raise failure
 
 
 def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:
