@@ -122,6 +122,7 @@ class Bordered(Strategy):
         strategy = self._give_strategy()
         strategy.attach(self._ksp)
         self._iterates = isinstance(strategy, Multigrid)
+        self._along_B = np.zeros_like(self._along_B)  # a guess, and the last one may be no number
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` solve so."""
@@ -177,8 +178,9 @@ class Bordered(Strategy):
         for tolerance in (_ROUGH, _ACCURATE):
             self._ksp.setTolerances(rtol=tolerance)
             found = []
-            for b, before in zip(self.last.B.T, self._along_B.T, strict=True):
-                found.append(self._solve(b, before if self._iterates else None))
+            for k in range(len(self.last.D)):
+                before = self._along_B[:, k] if self._iterates else None
+                found.append(self._solve(self.last.B[:, k], before))
             self._along_B = np.stack(found, axis=1)
             self._complement = self.last.D - self.comm.allreduce(self._C.T @ self._along_B)
             if not self._iterates or not np.isfinite(self._complement).all():
