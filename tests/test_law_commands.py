@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from archord.cli import run
+from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
+from archord.scene.file import load_scene
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
@@ -399,6 +401,18 @@ def test_fixed_pairs_of_points_are_told(capsys):
     assert told[0].startswith(
         "archord: warning: archord: is a law of closest points on the deformed curves; with"
     )
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_p0_with_friction_is_told_to_be_rough(friction, capsys):
+    """The expected error is of P. p0 was printed to six digits beside it, and is off by up to
+    19 %."""
+    change = f"analysis.friction={friction}"
+    assert run(["law", "archord", "--scene", SCENE, "--points", "1", "--set", change]) == 0
+    said = "p0 of a joint with friction is off by some 3 %, and by 19 % at worst"
+    assert (said in capsys.readouterr().err) == bool(friction)
+    joint = LawJoint.from_scene(load_scene(SCENE, [change]))
+    assert (said in general_law(joint).about["expected error"]) == bool(friction)
 
 
 def test_a_rigid_pin_keeps_its_nu(capsys):

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.materials.material import Array
-from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
+from archord.postprocess.laws.general.joint import ROUGH_PRESSURE, LawJoint, LawRangeWarning
 from archord.report.by_name import Names
 
 ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
@@ -213,7 +213,10 @@ class Law:
                     "of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, "
                     "1.6 % at 2 %"
                 )
-        return [f"{self.name}: is a law {kind}" for kind in said]
+        told = [f"{self.name}: is a law {kind}" for kind in said]
+        if self.solved and joint.friction:
+            told.append(f"{self.name}: {ROUGH_PRESSURE}")
+        return told
 
 
 def rising_root(f: Callable[[Array], Array], target: Array, start: float) -> Array:

@@ -27,7 +27,7 @@ from archord.postprocess.laws.general.hardening_model import (
     hardened_loss,
     largest_gain,
 )
-from archord.postprocess.laws.general.joint import LawJoint, LawRangeWarning
+from archord.postprocess.laws.general.joint import ROUGH_PRESSURE, LawJoint, LawRangeWarning
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent, line_contact_level
 from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
@@ -112,7 +112,7 @@ def law_of_joint(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
         "archord": VERSION,
         "joint": _in_numbers(joint),
         "outside": reason or unlike or "nothing: inside the range of solved joints",
-        "expected error": "unknown" if reason else _error_in_words(law),
+        "expected error": "unknown" if reason else _error_in_words(law, joint.friction),
     }
     if reason:
         unknown = np.full(len(NODES), np.nan)
@@ -139,13 +139,14 @@ def _in_numbers(joint: LawJoint) -> ByName:
     return told
 
 
-def _error_in_words(law: JointCurve) -> str:
-    """The errors that 9 in 10 joints like the joint of ``law`` keep, at most."""
+def _error_in_words(law: JointCurve, friction: float) -> str:
+    """The errors that 9 in 10 joints like the joint of ``law`` with this ``friction`` keep, at
+    most."""
     usual, most = (law.error[(NODES >= 0.1) & (end >= NODES)].max() for end in (2.0, 3.0))
     said = f"9 in 10 such joints are within {usual:.2%} of P from 0.1 to 2 dR, {most:.2%} to 3 dR"
     if law.yields:
         said += f", and on the way back within {law.back_error.max():.1%} of the largest P"
-    return said
+    return f"{said}; {ROUGH_PRESSURE}" if friction else said
 
 
 def law_of_numbers(

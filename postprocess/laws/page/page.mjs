@@ -137,6 +137,8 @@ function compute() {
     remember();
 }
 
+const ROUGH_PRESSURE = "p0 of a joint with friction is off by some 3 %, and by 19 % at worst";
+
 function warn() {
     const plastic = ["pin", "block"].filter((body) => {
         return $(`${body}-metal`).value in data.metals && $(`${body}-flow`).value === "perfect";
@@ -150,6 +152,9 @@ function warn() {
     if (missed) {
         said.push("Small strain leaves out that the block thickens where it yields.");
         said.push(`At 2 dR the force is about ${inDigits(100 * missed, 2)} % higher: choose large strain.`);
+    }
+    if (shown?.joint.friction) {
+        said.push(`The expected error is of the force: ${ROUGH_PRESSURE}.`);
     }
     $("warned").hidden = !shown || said.length === 0;
     $("warned").textContent = said.join(" ");
@@ -316,6 +321,7 @@ function about() {
     const percent = (value) => `${(100 * value).toFixed(2)}%`;
     let error = `9 in 10 such joints are within ${percent(most(2))} of P from 0.1 to 2 dR, ${percent(most(3))} to 3 dR`;
     if (law.yields) error += `, and on the way back within ${percent(Math.max(...law.back_error))} of the largest P`;
+    if (joint.friction) error += `; ${ROUGH_PRESSURE}`;
     return {
         title: `a pin joint in plane ${joint.plane}, by archord's law of solved joints`,
         archord: data.version,
