@@ -11,6 +11,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from archord.report.errors import InputError, in_sentences, require_between, require_of
 
 if TYPE_CHECKING:
@@ -25,6 +27,18 @@ _LONGEST = 40  # characters of a value in a message
 CHANGES = ("scale", "order", "refine", "size", "sizes", "sets")  # but for the circles
 # centre and radius, and the axis of a cylinder
 Disc = tuple[tuple[float, ...], float] | tuple[tuple[float, ...], float, tuple[float, ...]]
+
+
+def _is_circle(given: Any) -> bool:
+    """Whether it is a centre and a positive radius, or the same with a direction."""
+    try:
+        centre, radius, *axis = given
+        vectors = [np.asarray(vector, dtype=float) for vector in (centre, *axis)]
+        sizes = [vector.shape for vector in vectors]
+        known = np.isfinite(np.concatenate(vectors)).all() and 0 < radius < math.inf
+    except (TypeError, ValueError):
+        return False
+    return known and sizes in ([(2,)], [(3,)], [(3,), (3,)])
 
 
 @in_sentences
@@ -91,6 +105,11 @@ class Mesh:
         for key in ("circles", "sizes", "sets"):
             by_name = getattr(self, key) is None or isinstance(getattr(self, key), Mapping)
             require_of(self, by_name, key, "must be a dictionary by names of sets")
+        are_circles = all(map(_is_circle, (self.circles or {}).values()))
+        said = (
+            "must have ((x, y), radius), in space ((x, y, z), radius) with the axis of a cylinder"
+        )
+        require_of(self, are_circles, "circles", said)
 
     @classmethod
     def of(cls, given: Any) -> Mesh:
