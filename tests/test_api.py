@@ -188,7 +188,11 @@ FAULTS = [
         "archord.Mesh: the source must be a mesh or CAD file, gmsh with a ",
     ),
     (archord.Mesh, {"scale": -1.0}, 'archord.Mesh: mesh "a.msh".scale = -1.0 must be positive and'),
-    (archord.Mesh, {"circles": {"hole": (1, 2, 3, 4)}}, "must have ((x, y), radius), in space"),
+    (
+        archord.Mesh,
+        {"circles": {"hole": (1, 2)}},
+        'archord.Mesh: mesh "a.msh".circles = {"hole": [1, 2]} must have ((x, y), radius), in',
+    ),
     (
         archord.Mesh,
         {"scale": np.nan},
