@@ -328,7 +328,9 @@ PARTS = {
     "core": lambda value: archord.Load("pull", direction="x", force=1.0, core=(value[1], 1.0)),
     "support": lambda value: archord.Support("left", fixed=value[2]),
     "interaction": lambda value: archord.Interaction("contact", value[3]),
-    "mesh": lambda value: archord.Mesh("lug.msh", circles=value[4], sets=value[4]),
+    "mesh": lambda value: archord.Mesh(
+        "lug.msh", circles={"hole": [value[4]["hole"], 10.0]}, sets=value[4]
+    ),
     "drive": lambda value: Drive("pull", path=value[1]),
     "dead load": lambda value: DeadLoad(cells="lug", force=value[1]),
     "mean": lambda value: Mean("mean", "flat", 0, point=value[1], mirrors=value[3]),
