@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -46,19 +46,21 @@ def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
     return replace(problem, coarser=partial(_coarser_problem, in_place, comm))
 
 
-def _coarser_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
+def _coarser_problem(
+    scene: ProblemScene, comm: MPI.Comm, shares: Sequence[float] = _SHARES
+) -> Problem:
     """The problem of a ``scene`` on larger elements, for guesses, and on less large ones where some
     of them are folded. Collective; raises `InputError` where no size will do."""
-    failure = InputError("no larger elements can be drawn.")
-    for share in _SHARES:
-        larger = coarser(scene, share)
-        if larger is None:
-            break
-        try:
-            return general_problem(larger, comm)
-        except InputError as error:
-            failure = error
-    raise failure
+    share, *smaller = shares
+    larger = coarser(scene, share)
+    if larger is None:
+        raise InputError(mesh_name(scene), "no larger elements can be drawn.")
+    try:
+        return general_problem(larger, comm)
+    except InputError:
+        if not smaller:
+            raise
+    return _coarser_problem(scene, comm, smaller)
 
 
 def placed(scene: ProblemScene, mesh: TaggedMesh) -> ProblemScene:

@@ -195,6 +195,11 @@ FAULTS = [
     ),
     (
         archord.Mesh,
+        {"circles": {"hole": ((0, 0, 0), 1, (0, 0, 0))}},
+        'archord.Mesh: mesh "a.msh".circles = {"hole": [[0, 0, 0], 1, [0, 0, 0]]} must have ((x, ',
+    ),
+    (
+        archord.Mesh,
         {"scale": np.nan},
         'archord.Mesh: mesh "a.msh".scale = NaN must be positive and',
     ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from archord.postprocess.run import Run
 from archord.presets.views import JointView, ProblemView
 from archord.report.errors import InputError
 from archord.report.figure import new_figure
-
-if TYPE_CHECKING:
-    pass
 
 _WIDER = 1.5  # panel of bodies in space over the others
 _FEW = 10  # runs that get a name in the legend

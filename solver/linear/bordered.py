@@ -22,12 +22,13 @@ from archord.solver.linear.strategy import Facts, Strategy, krylov_iterations
 
 # stiffness against a motion over ``stiffness`` below which nothing resists the force
 _SINGULAR = 1e-9
-# part of a right-hand side along such a motion above which the system has no solution
-_FORCED = 1e-3
-# the same below which A^-1 B is solved accurately, to tell whether anything resists
+# the same ratio, below which A^-1 B is solved accurately, to tell whether anything resists
 _DOUBTFUL = 1e-3
-_ACCURATE = 1e-10  # residual over right-hand side there
-_ROUGH = 1e-4  # and elsewhere, where A^-1 B preconditions
+# part of a right-hand side along a motion that nothing resists, above which there is no solution
+_FORCED = 1e-3
+# residuals over right-hand sides of A^-1 B by multigrid: where it is doubtful, and elsewhere
+_ACCURATE = 1e-10
+_ROUGH = 1e-4
 
 
 def why_not(facts: Facts) -> str | None:

@@ -38,7 +38,8 @@ def _is_circle(given: Any) -> bool:
         known = np.isfinite(np.concatenate(vectors)).all() and 0 < radius < math.inf
     except (TypeError, ValueError):
         return False
-    return known and sizes in ([(2,)], [(3,)], [(3,), (3,)])
+    has_direction = all(np.any(vector) for vector in vectors[1:])
+    return known and has_direction and sizes in ([(2,)], [(3,)], [(3,), (3,)])
 
 
 @in_sentences
