@@ -3,6 +3,7 @@
     python3 -m archord.studies.law_design > law.sweep.toml
     python3 -m archord.studies.law_design --fresh 200 --seed 1 > fresh.sweep.toml
     python3 -m archord.studies.law_design --fresh 8 --kind "strain elastic soft" > soft.sweep.toml
+    python3 -m archord.studies.law_design --fresh 60 --ends > ends.sweep.toml
     python3 -m archord.studies.law_design --meshes > meshes.sweep.toml
 
 A joint is drawn from Sobol's sequence over Poisson's ratios, the ratio of the moduli, dR/R, the
@@ -46,7 +47,7 @@ from archord.scene.sections.errors import toml_value
 Row = dict[str, Any]
 # How many joints of each kind. A kind is the plane, what yields, whether the other body is stronger
 # ("weaker"), and whether by little ("alike"), or the pin is soft, or yields early, or has at most
-# 0.8 of the block's modulus ("compliant").
+# 0.8 of the block's modulus ("compliant"), or numbers lie at the ends of their ranges ("ends").
 JOINTS = {
     "strain both": 220,
     "strain block": 170,
@@ -73,9 +74,11 @@ JOINTS = {
     "strain block weaker early compliant": 32,
     "strain pin early compliant": 40,
     "strain pin weaker early compliant": 40,
+    "strain elastic ends": 128,
 }
+_ENDS = " ends"
 # kinds that are not drawn to check the law
-_SPECIAL = ("soft", "alike", "early", "compliant")
+_SPECIAL = ("soft", "alike", "early", "compliant", "ends")
 FRESH = {kind: n for kind, n in JOINTS.items() if not kind.endswith(_SPECIAL)}
 FRESH |= {"strain both": 280, "strain elastic": 90, "stress elastic": 60}
 # Joints that are solved on several meshes, and the sizes of their elements over R: the error of the
@@ -148,10 +151,11 @@ class Drawn:
 
 def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[Drawn]:
     """``number`` joints of a ``kind``, one of `JOINTS`; their range exceeds the range of the law by
-    ``beyond``."""
+    ``beyond``. Half of the numbers of a kind of `_ENDS` lie at an end of their range."""
     sequence = qmc.Sobol(8, seed=seed).random_base2(number.bit_length())
     for u in sequence[:number]:
-        yield _drawn(kind, u, beyond)
+        shares = np.clip(2 * u - 0.5, 0.0, 1.0) if kind.endswith(_ENDS) else u
+        yield _drawn(kind.removesuffix(_ENDS), shares, beyond)
 
 
 def _drawn(kind: str, u: Array, beyond: float) -> Drawn:
@@ -332,11 +336,14 @@ def main() -> None:
     parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=JOINTS, help="of the fresh joints; others are of many")
+    parser.add_argument("--ends", action="store_true", help="numbers at the ends of their ranges")
     parser.add_argument("--element-size", type=float, default=CHECK_SIZE, help="of fresh ones")
     parser.add_argument("--meshes", action="store_true", help="joints to solve on several meshes")
     given = parser.parse_args()
     if given.fresh:
         of = {given.kind: 1} if given.kind else FRESH
+        if given.ends:
+            of = {kind + _ENDS: share for kind, share in of.items()}
         rows = fresh(given.fresh, given.seed, of)
         print(sweep_file(rows, given.element_size), end="")
         return

@@ -50,7 +50,8 @@ _LAST_DIGITS = 1e-3  # of the bounds, and of moduli that a scene has rounded
 # of P, relative, which 9 in 10 joints keep: of small x, and else of what is elastic
 _EARLY_ERROR = 1e-3
 _SMALL = 0.1
-ELASTIC_ERROR = 1.5e-4
+_ELASTIC_ERRORS = (1.6e-4, 3.2e-4)
+_SOFT = (0.5, 0.6)  # p m of pins, between which the elastic error goes from one to the other
 LARGEST_GAIN = 3.2  # of s_eff/s at 3 dR; solved joints reach 2.6
 # secant of the way back over the elastic joint's steepest slope: then it is a straight line
 _STEEPEST = 0.999
@@ -311,7 +312,7 @@ def reduce_joint(
     ratio = np.ones_like(y)
     toe = np.zeros_like(y)
     back_error: Array = np.zeros(len(NODES))
-    error[x >= _SMALL] = ELASTIC_ERROR
+    error[x >= _SMALL] = elastic_error(joint)
     if lost is not None:
         y = base.y * np.exp(lost.force)
         dy = (base.slope / base.y + lost.slope) * y
@@ -354,6 +355,11 @@ def reduce_joint(
         error=_from(error[0], error),
         back_error=back_error,
     )
+
+
+def elastic_error(joint: Elastic) -> float:
+    """The expected error of P of an elastic ``joint``, relative: larger where a pin is soft."""
+    return float(np.interp(joint.p * joint.m, _SOFT, _ELASTIC_ERRORS))
 
 
 def _raised(x: Array, y: Array, dy: Array, added: Gain) -> tuple[Array, Array]:

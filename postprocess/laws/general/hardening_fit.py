@@ -20,7 +20,7 @@ import numpy as np
 
 from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import elastic_model
-from archord.postprocess.laws.general.general_law import ELASTIC_ERROR, joint_numbers
+from archord.postprocess.laws.general.general_law import elastic_error, joint_numbers
 from archord.postprocess.laws.general.hardening_model import (
     BODIES,
     TABLE,
@@ -219,7 +219,7 @@ def errors_of(joints: list[Hardened], models: list[Model]) -> tuple[Amounts, Tab
         usual = within(joint.x, JUDGED)
         told = [
             lost.force - joint.force,
-            np.hypot(lost.deviation, ELASTIC_ERROR),
+            np.hypot(lost.deviation, elastic_error(joint.numbers.elastic)),
             unsure(rises_of(joint.given, found), lost),
         ]
         by_kind.setdefault(kind(joint.numbers), []).append(np.array(told)[:, usual])

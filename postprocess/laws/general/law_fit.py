@@ -67,7 +67,7 @@ from archord.report.files import read_json
 from archord.report.table import Table, in_digits
 
 # degrees in the joint's numbers and in x/(1 + x), and how many of these terms are taken
-_TERMS = {"F": (6, 8, 260), "peak": (6, 8, 120), "angle": (6, 8, 120)}
+_TERMS = {"F": (6, 8, 290), "peak": (6, 8, 120), "angle": (6, 8, 90)}
 _STEPS_COUNT_BELOW = {"strain": 0.6, "stress": np.inf}  # s of joints that yield
 _DEPENDENT = 1e-6  # what is left of a column that other columns tell
 SOFT = 0.5  # p m of soft pins in plane strain

@@ -77,7 +77,7 @@ def loads(joints: Mapping[str, Any], delta: npt.ArrayLike, deepest: npt.ArrayLik
     >>> joints = {"radius": 10.0, "E_star": 115e3, "plane": "strain", "nu": 0.3}
     >>> found = loads(joints | {"clearance": [0.05, 0.1, 1.0]}, delta=0.05)
     >>> found.load.round()
-    array([6342., 5244.,   nan])
+    array([6342., 5245.,   nan])
     >>> found.reason[2]
     'archord: dR/R = 0.1 is outside 0.001 to 0.02'
     """

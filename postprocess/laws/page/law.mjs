@@ -620,7 +620,8 @@ const NODES = [0, ...geomspace(0.02, 3, 60)]; // x = delta/dR
 // Of P, relative: of small x, and else of what is elastic.
 const EARLY_ERROR = 1e-3;
 const SMALL_X = 0.1;
-const ELASTIC_ERROR = 1.5e-4;
+const ELASTIC_ERRORS = [1.6e-4, 3.2e-4];
+const SOFT = [0.5, 0.6]; // p m of pins, between which the elastic error goes from one to the other
 const STEEPEST = 0.999; // secant of the way back over the elastic joint's steepest slope: then it is a straight line
 
 /** A number as Python's `g` prints it, in this many digits. */
@@ -764,7 +765,9 @@ function reduced(elastic, lost, added, ofElastic) {
     let dy = steep;
     let peak = base.map((state) => state.peak);
     let angle = base.map((state) => state.angle);
-    let error = x.map((place) => (place < SMALL_X ? EARLY_ERROR : ELASTIC_ERROR));
+    const soft = clip((elastic.p * elastic.m - SOFT[0]) / (SOFT[1] - SOFT[0]), 0, 1);
+    const usual = ELASTIC_ERRORS[0] + soft * (ELASTIC_ERRORS[1] - ELASTIC_ERRORS[0]);
+    let error = x.map((place) => (place < SMALL_X ? EARLY_ERROR : usual));
     let ratio = x.map(() => 1);
     let toe = x.map(() => 0);
     let backError = x.map(() => 0);

@@ -369,8 +369,9 @@ def test_no_contact_is_wider_than_the_hole(tmp_path: Path) -> None:
     curve = general_law(joint)
     delta = np.linspace(0, curve.limit, 3000)
     law = load(write(curve, tmp_path / "law.py"))
-    assert curve.at(delta).angle.max() == np.pi / 2
-    assert max(map(law.contact_angle, delta.tolist())) == np.pi / 2
+    quarter = pytest.approx(np.pi / 2, rel=1e-15)
+    assert curve.at(delta).angle.max() == quarter
+    assert max(map(law.contact_angle, delta.tolist())) == quarter
     wide = replace(curve, angle=2 * curve.angle, dangle=2 * curve.dangle)
     assert wide.at(delta).angle.max() == pytest.approx(np.pi, rel=1e-6)
 
