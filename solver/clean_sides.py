@@ -86,7 +86,7 @@ class CleanSides:
 
     def _held_along(self, surface: Surface) -> np.ndarray:
         """The axes ``(d,)`` along which any facet of a ``surface`` is held. Collective."""
-        found = np.atleast_1d(self._held_facets(surface).any(axis=0))
+        found: np.ndarray = self._held_facets(surface).any(axis=0)
         self.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.LOR)
         return found
 
