@@ -86,8 +86,7 @@ class CleanSides:
 
     def _held_along(self, surface: Surface) -> np.ndarray:
         """The axes ``(d,)`` along which any facet of a ``surface`` is held. Collective."""
-        found: np.ndarray = self._held_facets(surface).any(axis=0)
-        self.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.LOR)
+        found: np.ndarray = self.comm.allreduce(self._held_facets(surface).any(axis=0), op=MPI.LOR)
         return found
 
     def _held_facets(self, surface: Surface) -> np.ndarray:

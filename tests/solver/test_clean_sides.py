@@ -1,7 +1,5 @@
 """Contact of surfaces that supports, couplings and loads act on, too, against closed forms."""
 
-from dataclasses import replace
-
 import pytest
 
 from archord import (
@@ -19,7 +17,6 @@ from archord import (
     rectangles,
     solve,
 )
-from archord.solver.clean_sides import CleanSides
 
 E = 1000.0
 PRESSURE = 30.0
@@ -60,7 +57,6 @@ def solved(mesh, **parts):
     return system
 
 
-@pytest.mark.mpi
 @in_plane_and_space
 @pytest.mark.parametrize("on", ["upper", "upper bottom"])
 @pytest.mark.parametrize("law", ["frictionless", "tied"])
@@ -95,7 +91,6 @@ def test_a_surface_may_have_a_distributing_coupling(mesh):
     assert system.drive_displacement("push") == pytest.approx(-DOWN)
 
 
-@pytest.mark.mpi
 @in_plane_and_space
 def test_a_pressure_between_bodies_lightens_the_contact(mesh):
     """The gap was as wide as that pressure is over gamma: the displacement 2.5 % too small."""
@@ -138,17 +133,3 @@ def test_the_other_side_is_the_cure(tmp_path):
     problem = stated(MESHES["plane"], loads=[PRESS, between], integrated="lower top")
     with pytest.raises(InputError, match="give integrated = 'upper bottom'"):
         solve(problem, tmp_path / "run")
-
-
-def test_a_run_with_both_sides_is_not_continued(tmp_path, monkeypatch):
-    """Earlier versions integrated both: its history would have two forces of one path."""
-
-    def push(to):
-        loads = [Load("push", on="upper", direction="y", displacement=to)]
-        return replace(stated(MESHES["plane"], loads=loads), steps=[1] * len(to))
-
-    with monkeypatch.context() as earlier:
-        earlier.setattr(CleanSides, "integrated", lambda self, interaction, surfaces: interaction)
-        solve(push([-DOWN]), tmp_path / "run")
-    with pytest.raises(InputError, match="'contact' integrated on 2 sides, which is 1"):
-        solve(push([-DOWN, -2 * DOWN]), tmp_path / "run", restart=True)
