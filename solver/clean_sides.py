@@ -65,12 +65,7 @@ class CleanSides:
         # what both sides are held along has no slip
         alike = np.logical_and.reduce(held) if len(held) > 1 else np.ones_like(held[0])
         along = np.zeros_like(alike) if slips else ~alike
-        pairs = zip(interaction.surfaces, surfaces, reversed(surfaces), strict=True)
-        laden = [
-            name
-            for name, surface, opposite in pairs
-            if isinstance(surface, Surface) and self._acts(surface, opposite, along)
-        ]
+        laden = [name for name, surface in of_bodies.items() if self._acts(surface, along)]
         if not laden or interaction.integrated in {*of_bodies} - {*laden}:
             return interaction
         clean = [name for name in of_bodies if name not in laden]
@@ -93,32 +88,16 @@ class CleanSides:
         """Whether all nodes of a facet are held along an axis ``(n, d)``."""
         return self.held[_nodes(surface)].all(axis=1)
 
-    def _acts(self, surface: Surface, opposite: Surface | RigidSurface, along: np.ndarray) -> bool:
-        """Whether anything acts across facets of a ``surface`` that may meet the ``opposite`` one,
-        or holds them ``along`` an axis ``(d,)``. Collective."""
-        nodes = _nodes(surface)
+    def _acts(self, surface: Surface, along: np.ndarray) -> bool:
+        """Whether anything acts across a ``surface``, or holds it ``along`` an axis ``(d,)``.
+        Collective."""
         across = np.abs(surface.outward).max(axis=1) > _ALONG
-        acts = (self._held_facets(surface) & (across | along)).any(axis=1)
-        for spread in self.spread:
-            acts |= np.isin(nodes, spread).all(axis=1)
-        if isinstance(opposite, Surface):
-            acts &= _beside(surface, opposite)
-        return self.comm.allreduce(bool(acts.any()), op=MPI.LOR)
+        nodes = _nodes(surface)
+        acts = bool((self._held_facets(surface) & (across | along)).any())
+        acts |= any(np.isin(nodes, spread).all(axis=1).any() for spread in self.spread)
+        return self.comm.allreduce(acts, op=MPI.LOR)
 
 
 def _nodes(surface: Surface) -> np.ndarray:
     """The nodes ``(n, k)`` of this rank's facets of a ``surface``."""
     return np.take_along_axis(surface.cell_dofs, surface.trace, axis=1)
-
-
-def _beside(surface: Surface, opposite: Surface) -> np.ndarray:
-    """Which of this rank's facets ``(n,)`` of a ``surface`` are in the box around the ``opposite``
-    one, grown by a facet and by how far the boxes of both are apart."""
-    own = surface.curve.X
-    other = opposite.curve.X
-    low = other.min(axis=0)
-    high = other.max(axis=0)
-    apart = np.maximum(low - own.max(axis=0), own.min(axis=0) - high)
-    margin = np.maximum(apart, 0.0) + surface.facet_lengths().max()
-    is_in = (surface.point >= low - margin) & (surface.point <= high + margin)
-    return is_in.all(axis=2).any(axis=1)

@@ -9,7 +9,6 @@ from archord import (
     InputError,
     Interaction,
     Load,
-    Mesh,
     Problem,
     Support,
     System,
@@ -32,9 +31,7 @@ PRESS = Load("press", on="upper top", pressure=PRESSURE)
 SIDES = ["upper left", "upper back"]
 
 
-def stated(
-    mesh, *, loads, fixed=(), couplings=(), surfaces=("upper bottom", "lower top"), **contact
-):
+def stated(mesh, *, loads, fixed=(), couplings=(), **contact):
     """Two cubes without Poisson's ratio on each other; the upper one slides nowhere."""
     mesh = mesh()
     across = zip(SIDES[: mesh.dimension - 1], "xz", strict=False)
@@ -43,7 +40,7 @@ def stated(
     return Problem(
         mesh,
         bodies=[Body(name, Elastic(E, 0.0)) for name in ("lower", "upper")],
-        interactions=[Interaction("contact", surfaces, **contact)],
+        interactions=[Interaction("contact", ("upper bottom", "lower top"), **contact)],
         supports=supports,
         couplings=couplings,
         loads=loads,
@@ -105,19 +102,6 @@ def test_what_acts_along_smooth_surfaces_changes_nothing(mesh):
     """Both sides are integrated, as they are without."""
     system = solved(mesh, loads=[PRESS], fixed=[Support("guide", on="upper", fixed="x")])
     assert len(system.contact.pairs) == 2
-
-
-def test_what_acts_far_from_the_other_body_changes_nothing():
-    """The surfaces go on around a corner to the held and the pressed sides of their bodies."""
-    tagged = MESHES["plane"]()
-    sets = {
-        f"{body} around": [f"{body} {side}" for side in ("bottom", "right", "top")]
-        for body in ("lower", "upper")
-    }
-    made = Mesh(tagged, sets=sets).on(tagged.mesh.comm)
-    system = solved(lambda: made, loads=[PRESS], surfaces=tuple(sets))
-    assert not system.clean_sides.fault
-    assert system.drive_displacement("press") == pytest.approx(2 * PRESSURE / E)
 
 
 def test_no_side_left_is_refused(tmp_path):
