@@ -2,8 +2,7 @@
 
 Nitsche's method takes the stress of a body at its surface for the contact traction. Where supports,
 couplings or loads act on the same facets, that stress is theirs, too, and gaps are wrong by their
-traction over gamma. The other side, on which nothing else acts, carries the contact exactly, with
-the gamma of both.
+traction over gamma. The other side, on which nothing else acts, carries the contact exactly.
 """
 
 from __future__ import annotations
@@ -20,8 +19,6 @@ from archord.solver.contact.laws.named import contact_law
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Problem
 
-# whose gammas resist a gap together: with less, loose bodies that friction holds converge badly
-_SIDES = 2
 _ALONG = 1e-6  # component of a normal from which on a held axis is not along the surface
 
 
@@ -70,8 +67,7 @@ class CleanSides:
             return interaction
         clean = [name for name in of_bodies if name not in laden]
         if clean and not interaction.integrated:
-            gamma_factor = _SIDES * interaction.gamma_factor
-            return replace(interaction, integrated=clean[0], gamma_factor=gamma_factor)
+            return replace(interaction, integrated=clean[0])
         cure = f"give integrated = {clean[0]!r}" if clean else "leave them out of one of the sets"
         self.fault = (
             f"supports, couplings or loads act on facets of {' and '.join(map(repr, laden))}, too, "
