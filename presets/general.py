@@ -76,8 +76,6 @@ def general_account(
             from archord.presets.held import require_facing
 
             warnings += require_facing(system)
-        if system.clean_sides.fault:
-            raise ValueError(system.clean_sides.fault)
     frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
     warnings += friction_doubts(frictions)
     warnings += contrast_doubts(problem.bodies)
