@@ -19,6 +19,7 @@ from archord.measures.doubts import (
 )
 from archord.measures.edge import fixed, per_step, surface_profiles
 from archord.measures.energies import ENERGIES
+from archord.measures.laden_surfaces import laden_surfaces
 from archord.measures.measure import Accepted, Column, column
 from archord.measures.parts import part_measures
 from archord.presets.general_doubts import ending, refusal, step_checks
@@ -82,6 +83,7 @@ def general_account(
     warnings += point_doubts(problem)
     warnings += volume_doubts(system)
     warnings += stiff_quadrilaterals(system)
+    warnings += laden_surfaces(system)
     return _account(scene, system, warnings, file)
 
 
