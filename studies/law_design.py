@@ -78,7 +78,7 @@ JOINTS = {
 }
 _ENDS = " ends"
 # kinds that are not drawn to check the law
-_SPECIAL = ("soft", "alike", "early", "compliant", "ends")
+_SPECIAL = ("soft", "alike", "early", "compliant", _ENDS)
 FRESH = {kind: n for kind, n in JOINTS.items() if not kind.endswith(_SPECIAL)}
 FRESH |= {"strain both": 280, "strain elastic": 90, "stress elastic": 60}
 # Joints that are solved on several meshes, and the sizes of their elements over R: the error of the
@@ -151,7 +151,7 @@ class Drawn:
 
 def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[Drawn]:
     """``number`` joints of a ``kind``, one of `JOINTS`; their range exceeds the range of the law by
-    ``beyond``. Half of the numbers of a kind of `_ENDS` lie at an end of their range."""
+    ``beyond``. With `_ENDS` behind the kind half of their numbers lie at an end of their range."""
     sequence = qmc.Sobol(8, seed=seed).random_base2(number.bit_length())
     for u in sequence[:number]:
         shares = np.clip(2 * u - 0.5, 0.0, 1.0) if kind.endswith(_ENDS) else u
@@ -343,7 +343,7 @@ def main() -> None:
     if given.fresh:
         of = {given.kind: 1} if given.kind else FRESH
         if given.ends:
-            of = {kind + _ENDS: share for kind, share in of.items()}
+            of = {kind.removesuffix(_ENDS) + _ENDS: share for kind, share in of.items()}
         rows = fresh(given.fresh, given.seed, of)
         print(sweep_file(rows, given.element_size), end="")
         return
