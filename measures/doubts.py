@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
+from archord.materials.hardening import TabularHardening
 from archord.materials.material import of_small_strain
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
@@ -28,6 +29,7 @@ _PLASTIC = 0.5  # PEEQ over the strain, from which on bodies strain by yielding
 _OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
 _INCOMPRESSIBLE = 100.0  # modulus of uniaxial strain over shear modulus: nu = 0.495
 _COERCIVE = 0.25  # gamma_factor over the stiffness, below which contact may be too soft
+_FLAT = 0.01  # rise of the yield stress that a table leaves out, over its last stress
 _LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
 _FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
 _MIXED_TURN = 0.02  # angle at which 2 % of a gap is seen as slip
@@ -46,6 +48,19 @@ def contrast_doubts(bodies: Sequence[Body]) -> list[str]:
     return [
         f"{stiffest!r} is {ratio:.1e} times as stiff as {softest!r}: look whether their E have the "
         "same unit"
+    ]
+
+
+def plane_doubts(problem: Problem) -> list[str]:
+    """A warning of a deck whose elements are named for other kinematics than the ``problem``
+    has, of which its user said nothing."""
+    named = problem.mesh.plane
+    solved = problem.kinematics.name
+    if named in ("", solved):
+        return []
+    return [
+        f'the elements of the mesh are named for "{named}", but "{solved}" is solved: give '
+        f'analysis.plane (of a Problem kinematics), "{solved}" if it is meant'
     ]
 
 
@@ -141,6 +156,25 @@ def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
         text = f"elements turn by {angle:.2g} rad, which {false_strain}; {LARGE}"
         said.append(Doubt(text, angle))
     return said
+
+
+def hardening_doubts(state: Accepted) -> Iterator[str]:
+    """A warning of each body whose PEEQ is so far beyond its last point of hardening that a
+    straight line on would raise the yield stress. Collective."""
+    for body in state.system.problem.bodies:
+        law = getattr(of_small_strain(body.material), "hardening", None)
+        if not isinstance(law, TabularHardening) or len(law.points) == 1:
+            continue
+        (before, lower), (last, stress) = law.points[-2:]
+        peeq, *_ = state.largest_peeq(body.name)
+        rise = (stress - lower) / (last - before) * (peeq - last) / stress
+        if rise > _FLAT:
+            text = f"PEEQ reaches {peeq:.2g} in {body.name!r}, whose hardening ends at {last:.2g}"
+            yield Doubt(
+                f"{text}: its yield stress stays at {stress:g}, where a straight line on would be "
+                f"{100 * rise:.3g} % higher",
+                rise,
+            )
 
 
 def _turning_pairs(system: System, angle: float) -> list[str]:

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from archord.measures.account import Account, Driven, Values, sizes
 from archord.measures.doubts import (
     contrast_doubts,
+    plane_doubts,
     point_doubts,
     stiff_quadrilaterals,
     volume_doubts,
@@ -56,6 +57,7 @@ def general_account(
     """
     name = given.mesh_name if given else mesh_name(scene)
     file = given.mesh_file if given else scene.mesh.file
+    unsaid = given.kinematics is None if given else "plane" not in scene.analysis.model_fields_set
     with timer("mesh"), as_input_error(name):
         problem = given.on(comm) if given else general_problem(scene, comm)
         scene = placed(scene, problem.mesh)
@@ -80,6 +82,8 @@ def general_account(
     frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
     warnings += friction_doubts(frictions)
     warnings += contrast_doubts(problem.bodies)
+    if unsaid:
+        warnings += plane_doubts(problem)
     warnings += point_doubts(problem)
     warnings += volume_doubts(system)
     warnings += stiff_quadrilaterals(system)

@@ -15,6 +15,7 @@ from archord.measures.doubts import (
     distortion_doubts,
     few_facets,
     gamma_doubts,
+    hardening_doubts,
     round_off_doubts,
     told_of_facets,
 )
@@ -29,6 +30,7 @@ from archord.solver.path.system import System
 
 _FEWEST_FACETS = 3
 _FAR_TURN = 0.02  # angle at which linear rotations stretch radii by 0.02 %
+_FOLLOWING = 0.02  # change of area vectors, over their size
 _FALSE = 0.05  # gap of fixed partners that is none, over what the contact presses together
 _SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating bodies
 _CARRYING = 0.01  # of the same, where the springs carry what contact should
@@ -73,6 +75,19 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
             text = f"PEEQ reaches {largest:.2g}, too much for small-strain theory; {LARGE}"
             yield Doubt(text, largest)
         yield from distortion_doubts(system, largest, small=small)
+        yield from hardening_doubts(state)
+
+    def pressures(state: Accepted, m: Record) -> Iterator[str]:
+        u = system.equilibrium.displacement()
+        for load in system.problem.loads:
+            _, pressure = state.driven[load.drive]
+            if small or not load.pressure * pressure:
+                continue
+            off = system.equilibrium.drives.loads.dead_error(load.facets, u)
+            if off > _FOLLOWING:
+                text = f"the pressure {load.drive!r} acts on undeformed areas along undeformed"
+                by = f"a pressure that follows the surface would differ by {100 * off:.2g} %"
+                yield Doubt(f"{text} normals: {by}", off)
 
     def angles(state: Accepted, m: Record) -> Iterator[str]:
         angle = max((abs(state.driven[name][0]) for name in turning), default=0.0)
@@ -88,7 +103,7 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
     def stiffness(state: Accepted, m: Record) -> Iterator[str]:
         yield from gamma_doubts(system)
 
-    return [surfaces, strains, angles, balances, stiffness, _spring_doubts]
+    return [surfaces, strains, pressures, angles, balances, stiffness, _spring_doubts]
 
 
 def _facet_doubts(state: Accepted, m: Record, surface: str, pressure: str) -> list[str]:

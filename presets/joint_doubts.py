@@ -14,6 +14,7 @@ from archord.measures.doubts import (
     contrast_doubts,
     distortion_doubts,
     few_facets,
+    hardening_doubts,
     round_off_doubts,
     told_of_facets,
 )
@@ -105,6 +106,7 @@ def step_checks(scene: Scene, system: System) -> list[Check]:
             )
             yield Doubt(text, delta)
         yield from distortion_doubts(system, m["peeq_max"], small=small and not far)
+        yield from hardening_doubts(state)
 
     def balances(state: Accepted, m: Record) -> Iterator[str]:
         if m.contact_area:

@@ -28,7 +28,7 @@ class Region:
     """The ``q`` integration points of ``n`` cells or facets of a set, whose cells this rank owns.
 
     - ``nodes`` ``(n, a)``: of the cells
-    - ``shape`` ``(n, q, a)``: the basis of the displacements
+    - ``shape`` ``(n, q, a)``, ``gradient`` ``(n, q, a, d)``: the basis of the displacements
     - ``point`` ``(n, q, d)``: coordinates
     - ``normal`` ``(n, q, d)``: outward, of unit length, of facets
     - ``drawn`` ``(n, q)``: area or length in a plane, volume or area in space
@@ -38,6 +38,7 @@ class Region:
 
     nodes: np.ndarray
     shape: Array
+    gradient: Array
     point: Array
     normal: Array
     drawn: Array
@@ -103,7 +104,9 @@ class Loads:
             drawn = size * w
         weight = drawn * self.kinematics.measure(basis.point)
         nodes = self.V.dofmap.list[cells]
-        return Region(nodes, basis.shape, basis.point, normal, drawn, weight, mesh.comm)
+        return Region(
+            nodes, basis.shape, basis.gradient, basis.point, normal, drawn, weight, mesh.comm
+        )
 
     def _spread(self, on: Region, density: Array) -> Array:
         """The forces ``(n_owned, d)`` of a ``density`` ``(n, q, d)`` per area or volume."""
@@ -129,6 +132,18 @@ class Loads:
             raise ValueError(f"the density of a load has the integral {total:g}: nothing is loaded")
         forces = self._spread(on, density[..., None] * np.array(load.force))
         return forces / (self.problem.whole * total)
+
+    def dead_error(self, facets: str, u: Array) -> float:
+        """How far the area vectors of a set of ``facets`` change at the nodal displacements ``u``
+        ``(n_nodes, d)``, over their size: what a pressure on undeformed areas misses."""
+        on = self.region(facets=facets)
+        F = np.eye(u.shape[1]) + np.einsum("nqaj,nai->nqij", on.gradient, u[on.nodes])
+        pulled = np.linalg.solve(np.swapaxes(F, -1, -2), on.normal[..., None])[..., 0]
+        place = on.point + np.einsum("nqa,nai->nqi", on.shape, u[on.nodes])
+        ring = self.kinematics.measure(place) / self.kinematics.measure(on.point)
+        growth = np.linalg.det(F) * ring
+        change = growth[..., None] * pulled - on.normal  # Nanson
+        return float(on.integral(np.linalg.norm(change, axis=-1)) / on.integral())
 
     def mean_motion(self, mean: Mean) -> Array:
         """Derivative ``(n_owned, d)`` of the mean motion by the displacements of the nodes. Raises

@@ -225,7 +225,7 @@ def distribute(
     places = {name: made.x[nodes] for name, nodes in made.point_sets.items() if comm.rank == 0}
     points, point_tags = comm.bcast((places, _tags_at_points(made)))
     sets = made.cell_sets, made.facet_sets, points
-    return TaggedMesh(mesh, cells, facets, *sets, made.notes, point_tags)
+    return TaggedMesh(mesh, cells, facets, *sets, made.notes, made.plane, point_tags)
 
 
 def _tags_at_points(mesh: MeshArrays) -> dict[str, list[frozenset[int]]]:
@@ -307,6 +307,7 @@ def gathered(tagged: TaggedMesh) -> MeshArrays | None:
         dict(tagged.cell_sets),
         dict(tagged.facet_sets),
         notes=tagged.notes,
+        plane=tagged.plane,
     )
     tree = cKDTree(x)
     near = SAME_PLACE * np.abs(x).max(initial=0.0)

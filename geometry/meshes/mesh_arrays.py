@@ -54,6 +54,7 @@ class MeshArrays:
     - ``cell_sets``, ``facet_sets``: the tags of each set, several where sets overlap
     - ``point_sets``: the nodes of each set
     - ``notes``: what to warn of
+    - ``plane``: the kinematics that a deck's elements are named for, "" where none are
     """
 
     x: Array
@@ -66,6 +67,7 @@ class MeshArrays:
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     point_sets: dict[str, np.ndarray] = field(default_factory=dict)
     notes: Names = ()
+    plane: str = ""
 
     @property
     def order(self) -> int:

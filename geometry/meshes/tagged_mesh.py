@@ -28,6 +28,7 @@ class TaggedMesh:
     - ``cell_sets``, ``facet_sets``: the tags of each set, several where sets overlap
     - ``point_sets``: coordinates ``(k, 2)`` of the nodes of each set
     - ``notes``: what to warn of, by how the mesh was made
+    - ``plane``: the kinematics that a deck's elements are named for, "" where none are
     - ``point_tags``: the tags of the cells at nodes of the point sets, empty where not needed: they
       tell nodes of several bodies at one place apart
     """
@@ -39,6 +40,7 @@ class TaggedMesh:
     facet_sets: Sets
     point_sets: Mapping[str, Array] = field(default_factory=dict)
     notes: Names = ()
+    plane: str = ""
     point_tags: Mapping[str, Sequence[frozenset[int]]] = field(default_factory=dict)
 
     @property

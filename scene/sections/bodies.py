@@ -25,6 +25,7 @@ _NU = "Poisson's ratio, unless a material brings it"
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 _SOFTEST = 1e-8  # ratio of the moduli
 _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
+_PERCENT = 2.0  # strain of a table that may be given in percent
 _STRONGEST = 0.5  # the same; above it no body yields, and units may be mixed
 
 
@@ -196,12 +197,20 @@ def require_solids(solids: Mapping[Names, Solid]) -> None:
 
 
 def strength_doubts(solids: Mapping[str, Solid]) -> list[str]:
-    """A warning of each of the ``solids``, by their names, that is too strong for its E to
-    yield."""
-    return [
+    """A warning of each of the ``solids``, by their names, that is too strong for its E to yield,
+    or hardens over strains that may be percents."""
+    said = [
         f"the yield stress of {name!r}, {solid.yield_stress:g}, is "
         f"{solid.yield_stress / solid.E:.2g} times its E, {solid.E:g}: it does not yield; look "
         "whether both have the same unit"
         for name, solid in solids.items()
         if solid.yield_stress is not None and solid.yield_stress > _STRONGEST * solid.E
     ]
+    for name, solid in solids.items():
+        points = getattr(solid.hardening, "engineering", solid.hardening)
+        if isinstance(points, list) and points[-1][0] > _PERCENT:
+            said.append(
+                f"the hardening of {name!r} goes to a strain of {points[-1][0]:g}, which is "
+                f"{100 * points[-1][0]:g} %: look whether it is in percent"
+            )
+    return said

@@ -38,6 +38,7 @@ _KINDS = {
     2: re.compile(r"(?:CP[ES]|CAX)([3468])[A-Z]*"),
     3: re.compile(r"C3D(4|8|10|20)[A-Z]*"),
 }
+_PLANES = {"CPE": "strain", "CPS": "stress", "CAX": "axisymmetric"}
 _PRISMS = re.compile(r"C3D(6|15)[A-Z]*")
 _SHAPES = {
     2: {3: TRIANGLE, 6: TRIANGLE, 4: QUADRILATERAL, 8: QUADRILATERAL},
@@ -78,6 +79,7 @@ class _Model:
     - ``nodes``: places
     - ``elements``: the nodes of elements by their dimension: trusses, plane and solid ones
     - ``without_area``: elements that are none of these
+    - ``planes``: the kinematics that plane elements are named for
     - ``sets``: the keys of sets by kind and by name, as it is first written
     - ``surfaces``: elements and the name of a face, by the surface's name
     - ``internal``: names of sets for the file's own use
@@ -87,6 +89,7 @@ class _Model:
         self.nodes: dict[int, list[float]] = {}
         self.elements: dict[int, dict[int, list[int]]] = {1: {}, 2: {}, 3: {}}
         self.without_area: set[int] = set()
+        self.planes: set[str] = set()
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[tuple[list[int], str]]] = defaultdict(list)
         self.internal: set[str] = set()
@@ -137,6 +140,8 @@ class _Model:
                 "and C3D of 4, 8, 10 or 20 nodes"
             )
         [(dim, n_nodes)] = found
+        if dim == 2:
+            self.planes.add(_PLANES[name[:3]])
         size = 1 + n_nodes
         values = [scope.key(value) for row in rows for value in row if value]
         if len(values) % size:
@@ -285,7 +290,9 @@ def read_abaqus(path: Path) -> MeshArrays:
             point_sets[name] = rest
     facets = {name: np.concatenate(of_parts) for name, of_parts in facet_sets.items()}
     mesh = MeshArrays.of_sets(kind, x, cells, cell_sets, facets, point_sets)
-    return replace(mesh, notes=tuple(notes))
+    one_plane = d == 2 and len(model.planes) == 1
+    plane = model.planes.pop() if one_plane else ""
+    return replace(mesh, notes=tuple(notes), plane=plane)
 
 
 def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarray:
