@@ -23,6 +23,7 @@ from archord.measures.edge import AnyProfile
 from archord.measures.energies import largest_energies
 from archord.measures.measure import Accepted
 from archord.measures.record import Record
+from archord.measures.unmet_bodies import UnmetBodies
 from archord.report.doubts import Doubt
 from archord.scene.parts import IN_PLANE, IN_SPACE, turns
 from archord.scene.problem import ProblemScene
@@ -100,10 +101,16 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
             yield from round_off_doubts(state, scene.analysis.tolerance)
         yield from balance_doubts(m, _UNBALANCED, scene.analysis.tolerance)
 
+    unmet = UnmetBodies(system) if scene.mesh.shape is None else None
+
+    def passing(state: Accepted, m: Record) -> Iterator[str]:
+        if unmet is not None:
+            yield from unmet.doubts()
+
     def stiffness(state: Accepted, m: Record) -> Iterator[str]:
         yield from gamma_doubts(system)
 
-    return [surfaces, strains, pressures, angles, balances, stiffness, _spring_doubts]
+    return [surfaces, strains, pressures, angles, balances, passing, stiffness, _spring_doubts]
 
 
 def _facet_doubts(state: Accepted, m: Record, surface: str, pressure: str) -> list[str]:

@@ -150,9 +150,11 @@ class _Hull(NamedTuple):
         return np.where(inward & on_side & (depth > spare), depth, 0.0)
 
 
-def overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
-    """Boundary vertices of a body, or middles of its cells there, that lie in another by more than
-    is ``allowed``."""
+def depths(
+    mesh: MeshArrays, inside: Inside, allowed: float
+) -> Iterator[tuple[str, str, float, Array]]:
+    """How deep a body lies in another one at most, and where: of their boundary vertices and the
+    middles of cells there, deeper than is ``allowed``."""
     into = _INTO_CURVED if mesh.order > 1 else _INTO_STRAIGHT
     outline = _Outline if mesh.dimension == 2 else _Hull
     outlines = {}
@@ -165,10 +167,16 @@ def overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
         x = inner.points[near.all(axis=1)]
         depth = outer.depth(x, allowed, into) if len(x) else np.zeros(0)
         if depth.any():
-            deep = f"{depth.max():.3g}"
-            at = place(x[depth.argmax()])
-            cure = (
-                "draw them apart, or, if they are pressed together, give their interaction "
-                f"overlap = {deep}"
-            )
-            yield f"the body {a!r} lies {deep} deep in the body {b!r} at {at}: {cure}"
+            yield a, b, float(depth.max()), x[depth.argmax()]
+
+
+def overlaps(mesh: MeshArrays, inside: Inside, allowed: float) -> Iterator[str]:
+    """Boundary vertices of a body, or middles of its cells there, that lie in another by more than
+    is ``allowed``."""
+    for a, b, depth, at in depths(mesh, inside, allowed):
+        deep = f"{depth:.3g}"
+        cure = (
+            "draw them apart, or, if they are pressed together, give their interaction "
+            f"overlap = {deep}"
+        )
+        yield f"the body {a!r} lies {deep} deep in the body {b!r} at {place(at)}: {cure}"
