@@ -4,7 +4,8 @@
 
 #include "closest_point.h"
 
-enum { MOST = 5 }; /* nodes of a facet (degree 4) */
+enum { MOST = 5 };  /* nodes of a facet (degree 4) */
+enum { NONE = -2 }; /* facet is faced */
 static const double TIE = 1e-10; /* of two facets as near, which meet at an angle, the first one, whatever the rounding */
 
 typedef struct {
@@ -58,7 +59,7 @@ static double closest_on_facet(int p, const double *coefficients, const double *
 
 int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t p, const double *X,
                        const int32_t *before, const int32_t *after, const double *coefficients, const int32_t *home,
-                       int32_t reach, double margin, double end_margin, int32_t steps, int32_t *facet, double *xi,
+                       const int32_t *faced, int32_t reach, double margin, double end_margin, int32_t steps, int32_t *facet, double *xi,
                        double *point, double *normal, double *tangent, double *bend, double *shape, double *slope,
                        uint8_t *slides, uint8_t *found, int32_t *lost)
 {
@@ -70,8 +71,9 @@ int32_t closest_points(int32_t m, const double *x, const double *outward, int32_
         for (int c = 1 - reach; c <= 1 + reach; c++) {
             const int32_t k = near[c];
             if (k < 0) continue;
-            const double low = before[k] < 0 ? -end_margin : -margin;
-            const double high = 1 + (after[k] < 0 ? end_margin : margin);
+            const double beyond_end = faced[i] == NONE ? 0 : end_margin;
+            const double low = before[k] < 0 ? -beyond_end : -margin;
+            const double high = 1 + (after[k] < 0 ? beyond_end : margin);
             const double at = closest_on_facet(p, coefficients, X + 2 * (p + 1) * k, x, 1 - 0.5 * c, low, high, steps);
             const Frame f = frame(p, coefficients, X + 2 * (p + 1) * k, at, N, dN);
             const double d2 = (x[0] - f.y[0]) * (x[0] - f.y[0]) + (x[1] - f.y[1]) * (x[1] - f.y[1]);
@@ -85,8 +87,8 @@ int32_t closest_points(int32_t m, const double *x, const double *outward, int32_
         const double d[2] = {x[0] - f.y[0], x[1] - f.y[1]};
         const double along = (d[0] * f.t[0] + d[1] * f.t[1]) / (speed * speed); /* what is left of the Newton step */
         const int clamped = xi[i] <= low_best || xi[i] >= high_best;
-        const int beyond = (before[k] < 0 && xi[i] <= -end_margin && along < 0)
-                           || (after[k] < 0 && xi[i] >= 1 + end_margin && along > 0);
+        const int beyond = (before[k] < 0 && xi[i] <= low_best && along < 0)
+                           || (after[k] < 0 && xi[i] >= high_best && along > 0);
         double *n = normal + 2 * i;
         n[0] = f.t[1] / speed, n[1] = -f.t[0] / speed;
         for (int j = 0; j < 2; j++) point[2 * i + j] = f.y[j], tangent[2 * i + j] = f.t[j];

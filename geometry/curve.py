@@ -26,6 +26,8 @@ _END_MARGIN = (
     0.05  # part of its length by which a facet is continued beyond a free end of its curve
 )
 _CONTINUED = 0.5  # the same of a facet where points are to stay on theirs
+EVERY = -1  # `faced`: all facets are continued
+NONE = -2  # no facet is
 _NEWTON_STEPS = 30
 _SAMPLES = 4  # points a facet, among which the nearest facet is searched
 _ROUND = (
@@ -210,7 +212,12 @@ class Curve:
         return nearest // _SAMPLES
 
     def closest_point(
-        self, x: Array, outward: Array, displacement: Array, start: Index | None = None
+        self,
+        x: Array,
+        outward: Array,
+        displacement: Array,
+        start: Index | None = None,
+        faced: Index | None = None,
     ) -> Projection:
         """Closest points on the curve displaced by ``displacement`` (as ``X``) of the points ``x``
         ``(m, 2)``.
@@ -219,21 +226,24 @@ class Curve:
         it. ``start`` holds a facet for each point near its partner (by default `nearest_facet`, a
         search without a radius). Newton runs on that facet and its two neighbours, kept within
         each, and the nearest result is taken; a point that leaves them, or the piece that they
-        belong to, is searched for on the whole curve. Raises `ProjectionError` if one between the
-        curve's ends gets no partner.
+        belong to, is searched for on the whole curve. Beyond a free end facets are continued a
+        little for points whose ``faced`` facet is not `NONE`. Raises `ProjectionError` if one
+        between the curve's ends gets no partner.
         """
         home = self.nearest_facet(x, displacement) if start is None else start
-        partners = self._project(x, outward, displacement, home)
+        if faced is None:
+            faced = np.full(len(x), EVERY)
+        partners = self._project(x, outward, displacement, home, faced)
         n_away = self._leaves(home, partners).sum()
         if n_away and start is None:
             raise ProjectionError(
                 f"{n_away} contact points have closest points beyond the facets searched"
             )
         if n_away:
-            return self.closest_point(x, outward, displacement)
+            return self.closest_point(x, outward, displacement, faced=faced)
         lost = ~partners.found
         if start is not None and self.n_pieces > 1 and lost.any():
-            elsewhere = self.closest_point(x[lost], outward[lost], displacement)
+            elsewhere = self.closest_point(x[lost], outward[lost], displacement, faced=faced[lost])
             for name, values in vars(partners).items():
                 values[lost] = getattr(elsewhere, name)
         return partners
@@ -252,7 +262,8 @@ class Curve:
     def continued(self, x: Array, outward: Array, displacement: Array, facet: Index) -> Projection:
         """As `closest_point`, but on the given facets, each a polynomial continued beyond its ends:
         smooth in ``x``."""
-        return self._project(x, outward, displacement, facet, reach=0, margin=_CONTINUED)
+        every = np.full(len(x), EVERY)
+        return self._project(x, outward, displacement, facet, every, reach=0, margin=_CONTINUED)
 
     def _project(
         self,
@@ -260,6 +271,7 @@ class Curve:
         outward: Array,
         displacement: Array,
         home: Index,
+        faced: Index,
         reach: int = 1,
         margin: float = 0.0,
     ) -> Projection:
@@ -268,8 +280,8 @@ class Curve:
         partners = Projection.empty(len(x), self.degree + 1)
         points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
         nodes = (self.X + displacement)[self.connectivity]
-        start = home.astype(np.int32, copy=False)
-        curve: list[np.ndarray] = [nodes, self.before, self.after, self._coefficients, start]
+        near = [facets.astype(np.int32, copy=False) for facets in (home, faced)]
+        curve: list[np.ndarray] = [nodes, self.before, self.after, self._coefficients, *near]
         results: list[np.ndarray] = list(vars(partners).values())
         on_nodes = results.pop()
         first_lost = np.zeros(1, dtype=np.int32)
@@ -383,7 +395,12 @@ class RigidCircle(RigidRound):
     """
 
     def closest_point(
-        self, x: Array, outward: Array, displacement: Array, start: Index | None = None
+        self,
+        x: Array,
+        outward: Array,
+        displacement: Array,
+        start: Index | None = None,
+        faced: Index | None = None,
     ) -> Projection:
         """Closest points on the disc moved by ``displacement`` ``(1, 2)``; see
         `Curve.closest_point`."""

@@ -15,7 +15,7 @@ import basix
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import Index
+from archord.geometry.curve import NONE, Index
 from archord.geometry.patches import Patches
 from archord.geometry.vectors import crossed
 from archord.kernels.compiled import library, pointer, structure
@@ -26,6 +26,7 @@ _FLAT = 1e-15  # least second moment of a polygon, of the sum of both
 _EVEN = 1e-6  # third moment, of a polygon stretched to unit ones, that round-off may turn
 _SLIVER = 1 / 40  # of the mean area of the polygons on a facet
 _APART = 10.0  # distance of facets with unit sides, as good as infinite
+_ACROSS = 1e-6  # the product of unit normals of facets that stand on each other
 _REACH = 1.2  # of facets, in radii: how far apart those may be that overlie each other
 
 
@@ -79,7 +80,7 @@ def _overlying(own: Patches, opposite: Patches) -> tuple[Index, Index]:
     other = np.concatenate([np.asarray(found, dtype=np.int64) for found in near])
     apart = np.linalg.norm(centre[other] - over[facet], axis=1)
     is_near = apart < _REACH * (radius[facet] + other_radius[other])
-    is_facing = (normal[facet] * other_normal[other]).sum(axis=1) < 0
+    is_facing = (normal[facet] * other_normal[other]).sum(axis=1) < -_ACROSS
     chosen = is_near & is_facing
     return facet[chosen], other[chosen]
 
@@ -185,7 +186,8 @@ def coincide(own: Patches, opposite: Patches) -> bool:
     """Whether the undeformed surfaces are the same where they face each other."""
     middle, normal, radius = own.spheres()
     undeformed = np.zeros_like(opposite.X)
-    over = opposite.closest_point(middle, normal, undeformed)
+    nothing = np.full(len(middle), NONE)
+    over = opposite.closest_point(middle, normal, undeformed, faced=nothing)
     apart = np.linalg.norm(over.point - middle, axis=1)
     is_same = apart < _TOUCH * radius
     return bool(is_same[over.found].all())

@@ -7,6 +7,8 @@
 enum { MOST = 25, POWERS = 5, EDGES = 4, STEPS = 30 }; /* nodes of a facet (degree 4), and powers of each coordinate */
 enum { S, T };                                         /* the coordinates xi on a facet */
 enum { SS, ST, TT };                                   /* second derivatives */
+enum { EVERY = -1 };                           /* facet is faced */
+static const double ACROSS = 1e-6; /* the product of unit normals of surfaces that stand on each other */
 static const double TIE = 1e-10; /* of facets as near, which meet at an angle, the first one, whatever the rounding */
 
 typedef struct {
@@ -17,6 +19,7 @@ typedef struct {
 typedef struct {
     int32_t facet, edge, corner;
     double xi[2], distance2;
+    int continued; /* whether the facet is continued by its margins */
 } Place;
 
 static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -73,15 +76,31 @@ static void distance(const Frame *f, const double *x, int convex, double *g, dou
     for (int c = SS; c <= TT; c++) H[c] = metric[c];
 }
 
-/* The corners of a facet that is continued by its margins, where consecutive edges meet. */
-static void continued_corners(const Patches *p, int32_t facet, double corner[EDGES + 1][2])
+/* Whether two facets are the same one or meet at a corner. */
+static int touch(const Patches *p, int32_t facet, int32_t other)
+{
+    const int32_t *one = p->corners + (int64_t)p->n_edges * facet, *two = p->corners + (int64_t)p->n_edges * other;
+    for (int a = 0; a < p->n_edges; a++)
+        for (int b = 0; b < p->n_edges; b++)
+            if (one[a] == two[b]) return 1;
+    return 0;
+}
+
+/* Where the edge e of a facet lies, which may be continued. */
+static double end(const Patches *p, const Place *at, int e)
+{
+    const double margin = at->continued ? p->margin[(int64_t)p->n_edges * at->facet + e] : 0;
+    return p->lines[3 * e + 2] + margin;
+}
+
+/* The corners of a facet, where consecutive edges meet. */
+static void corners_of(const Patches *p, const Place *at, double corner[EDGES + 1][2])
 {
     const int n = p->n_edges;
-    const double *margin = p->margin + (int64_t)n * facet;
     for (int e = 0; e < n; e++) {
         const int before = (e + n - 1) % n;
         const double *a = p->lines + 3 * before, *b = p->lines + 3 * e;
-        const double at_a = a[2] + margin[before], at_b = b[2] + margin[e], det = a[S] * b[T] - a[T] * b[S];
+        const double at_a = end(p, at, before), at_b = end(p, at, e), det = a[S] * b[T] - a[T] * b[S];
         corner[e][S] = (at_a * b[T] - a[T] * at_b) / det;
         corner[e][T] = (a[S] * at_b - at_a * b[S]) / det;
     }
@@ -92,13 +111,12 @@ static void continued_corners(const Patches *p, int32_t facet, double corner[EDG
 static void least(const Patches *p, double corner[EDGES + 1][2], const double *g, const double *H, Place *at)
 {
     const int n = p->n_edges;
-    const double *margin = p->margin + (int64_t)n * at->facet;
     const double det = H[SS] * H[TT] - H[ST] * H[ST], xi[2] = {at->xi[S], at->xi[T]};
     const double free[2] = {xi[S] - (H[TT] * g[S] - H[ST] * g[T]) / det, xi[T] - (H[SS] * g[T] - H[ST] * g[S]) / det};
     int inside = det > 0;
     for (int e = 0; e < n; e++) {
         const double *line = p->lines + 3 * e;
-        inside &= line[S] * free[S] + line[T] * free[T] <= line[2] + margin[e];
+        inside &= line[S] * free[S] + line[T] * free[T] <= end(p, at, e);
     }
     at->edge = at->corner = -1;
     if (inside) {
@@ -125,12 +143,13 @@ static void least(const Patches *p, double corner[EDGES + 1][2], const double *g
 }
 
 /* Newton's method on one facet. */
-static Place closest_on_facet(const Patches *p, int32_t facet, const double *x)
+static Place closest_on_facet(const Patches *p, int32_t facet, int32_t faced, const double *x)
 {
     const double middle = p->n_edges == 3 ? 1.0 / 3 : 0.5;
-    Place at = {facet, -1, -1, {middle, middle}, 0};
+    const int continued = faced == EVERY || (faced >= 0 && touch(p, facet, faced));
+    Place at = {facet, -1, -1, {middle, middle}, 0, continued};
     double M[6][MOST], corner[EDGES + 1][2], g[2], H[3];
-    continued_corners(p, facet, corner);
+    corners_of(p, &at, corner);
     for (int step = 0; step < STEPS; step++) {
         const double before[2] = {at.xi[S], at.xi[T]};
         monomials(p, at.xi, M);
@@ -146,10 +165,10 @@ static Place closest_on_facet(const Patches *p, int32_t facet, const double *x)
     return at;
 }
 
-static void keep_nearer(const Patches *p, int32_t facet, const double *x, const Place *from, Place *nearest)
+static void keep_nearer(const Patches *p, int32_t facet, int32_t faced, const double *x, const Place *from, Place *nearest)
 {
     if (facet < 0 || facet == from->facet) return;
-    const Place other = closest_on_facet(p, facet, x);
+    const Place other = closest_on_facet(p, facet, faced, x);
     if (other.distance2 < nearest->distance2 * (1 - TIE)) *nearest = other;
 }
 
@@ -165,17 +184,18 @@ static int corner_passed(const Patches *p, const Place *at)
 }
 
 /* From the facet home on, over edges and corners, to the facets that are nearer. */
-static Place walk(const Patches *p, int32_t home, const double *x, int32_t others)
+static Place walk(const Patches *p, int32_t home, int32_t faced, const double *x, int32_t others)
 {
-    Place at = closest_on_facet(p, home, x);
+    Place at = closest_on_facet(p, home, faced, x);
     for (int32_t step = 0; step < others; step++) {
         Place nearest = at;
-        if (at.edge >= 0) keep_nearer(p, p->beyond[(int64_t)p->n_edges * at.facet + at.edge], x, &at, &nearest);
+        const int32_t *across = p->beyond + (int64_t)p->n_edges * at.facet;
+        if (at.edge >= 0) keep_nearer(p, across[at.edge], faced, x, &at, &nearest);
         const int corner = corner_passed(p, &at);
         if (corner >= 0) {
             const int32_t vertex = p->corners[(int64_t)p->n_edges * at.facet + corner];
             for (int32_t c = p->first[vertex]; c < p->first[vertex + 1]; c++)
-                keep_nearer(p, p->around[c], x, &at, &nearest);
+                keep_nearer(p, p->around[c], faced, x, &at, &nearest);
         }
         if (nearest.facet == at.facet) break;
         at = nearest;
@@ -183,20 +203,20 @@ static Place walk(const Patches *p, int32_t home, const double *x, int32_t other
     return at;
 }
 
-/* Whether a point lies beyond a free border at which its place ends: the force -g on the place pushes it over there. */
+/* Whether a point lies beyond an end of the surface at which its place ends: the force -g on the place pushes it over there. */
 static int is_beyond(const Patches *p, const Place *at, const double *g)
 {
     const int n = p->n_edges;
-    const int32_t *across = p->beyond + (int64_t)n * at->facet;
+    const uint8_t *ends = p->ends + (int64_t)n * at->facet;
     if (at->edge >= 0) {
         const double *a = p->lines + 3 * at->edge;
-        return across[at->edge] < 0 && g[S] * a[S] + g[T] * a[T] < 0;
+        return ends[at->edge] && g[S] * a[S] + g[T] * a[T] < 0;
     }
     if (at->corner < 0) return 0;
     const int before = (at->corner + n - 1) % n;
     const double *a = p->lines + 3 * before, *b = p->lines + 3 * at->corner, det = a[S] * b[T] - a[T] * b[S];
     const double of_a = -(g[S] * b[T] - g[T] * b[S]) / det, of_b = -(a[S] * g[T] - a[T] * g[S]) / det;
-    return (across[before] < 0 && of_a > 0) || (across[at->corner] < 0 && of_b > 0);
+    return (ends[before] && of_a > 0) || (ends[at->corner] && of_b > 0);
 }
 
 /* How xi moves by the product of distance and tangents: the inverse of H where the place may move. */
@@ -216,13 +236,13 @@ static void mobility(const Patches *p, const Place *at, const double *H, double 
 }
 
 int32_t closest_on_patches(const Patches *p, int32_t m, const double *x, const double *outward, const int32_t *home,
-                           int32_t others, int32_t *facet, double *xi, double *point, double *normal, double *tangent,
+                           const int32_t *faced, int32_t others, int32_t *facet, double *xi, double *point, double *normal, double *tangent,
                            double *bend, double *shape, double *slope, double *along, uint8_t *found, int32_t *lost)
 {
     int32_t n_lost = 0;
     const int k = p->k;
     for (int64_t i = 0; i < m; i++, x += 3, outward += 3) {
-        const Place at = walk(p, home[i], x, others);
+        const Place at = walk(p, home[i], faced[i], x, others);
         double M[6][MOST], g[2], H[3];
         monomials(p, at.xi, M);
         const Frame f = frame(p, at.facet, M);
@@ -250,7 +270,7 @@ int32_t closest_on_patches(const Patches *p, int32_t m, const double *x, const d
             for (int d = S; d <= T; d++) bend[4 * i + 2 * c + d] = dot(n, f.k[c + d]);
         }
         mobility(p, &at, H, along + 4 * i);
-        found[i] = !is_beyond(p, &at, g) && dot(n, outward) < 0;
+        found[i] = !is_beyond(p, &at, g) && dot(n, outward) < -ACROSS;
         if (at.edge >= 0 || at.corner >= 0) continue;
         const double *A = along + 4 * i; /* what is left of the Newton step */
         const double left = fabs(A[0] * g[S] + A[1] * g[T]) + fabs(A[2] * g[S] + A[3] * g[T]);
@@ -264,7 +284,7 @@ int32_t closest_on_patches(const Patches *p, int32_t m, const double *x, const d
 void coordinates_on_patches(const Patches *p, int32_t m, const double *x, const int32_t *facet, double *xi)
 {
     for (int64_t i = 0; i < m; i++) {
-        const Place at = closest_on_facet(p, facet[i], x + 3 * i);
+        const Place at = closest_on_facet(p, facet[i], EVERY, x + 3 * i);
         for (int c = S; c <= T; c++) xi[2 * i + c] = at.xi[c];
     }
 }

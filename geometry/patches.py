@@ -1,8 +1,9 @@
 """Surfaces of curved triangles or quadrilaterals in space, and the closest points on them.
 
 A facet is a polynomial in ``xi`` ``(s, t)`` on the reference triangle or square. Facets that share
-an edge are neighbours; an edge of one facet alone is a free border. The product of the tangents by
-``s`` and ``t`` points out of the body.
+an edge are neighbours; an edge of one facet alone is a free border. At the sharp edges of a body
+the surface ends, too: no point has its partner beyond. The product of the tangents by ``s`` and
+``t`` points out of the body.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.geometry.basis import Array, element_of
-from archord.geometry.curve import Index, ProjectionError
+from archord.geometry.curve import EVERY, Index, ProjectionError
 from archord.geometry.vectors import unit
 from archord.kernels.compiled import library, pointer, structure
 
@@ -23,6 +24,9 @@ _SOURCE = Path(__file__).with_name("patches.c")
 _BORDER_MARGIN = 0.05  # in xi, by which facets are continued beyond a free border
 _CONTINUED = 0.5  # the same of all edges where points are to stay on their facets
 _FAR = 100.0  # the same where facets are planes of coordinates
+_SHARP = np.cos(np.radians(40))  # of the angle between the normals of facets at a sharp edge
+_ACROSS = 1e-6  # the product of unit normals of facets that stand on each other
+_NEAREST = 32  # points of a surface with corners, of which one that faces a point is chosen
 _MOST_FACETS = 64  # on the way from the facet at which a point begins to its partner
 # edges as lines a . xi = b, with a outward: the first leads from the first corner to the second
 _TRIANGLE_EDGES = ((0, -1, 0), (1, 1, 1), (-1, 0, 0))
@@ -88,6 +92,7 @@ class Patches:
     corners : (n_facets, e) the same, counted on, in the order in which its edges follow
     beyond : (n_facets, e) the facet across each edge, -1 at a free border; the edge leads from the
         corner of its number to the next one
+    ends : (n_facets, e) whether the surface ends at the edge: at free borders and sharp edges
     """
 
     def __init__(self, X: Array, connectivity: Index, cell: basix.CellType, degree: int) -> None:
@@ -101,6 +106,9 @@ class Patches:
         self.corners = corners.reshape(self.vertices.shape).astype(np.int32)
         self.beyond = self._across_edges()
         self._element = element_of(cell, connectivity.shape[1])
+        are_sharp = self._are_sharp()
+        self.ends = (self.beyond < 0) | are_sharp
+        self._has_corners = bool(are_sharp.any())
         self._exponents, self._coefficients = _monomials(self._element)
         edges = _TRIANGLE_EDGES if cell == basix.CellType.triangle else _SQUARE_EDGES
         self._lines = np.array(edges, dtype=float)
@@ -130,6 +138,23 @@ class Patches:
         across[one] = other // n_edges
         across[other] = one // n_edges
         return across.reshape(self.corners.shape)
+
+    def _are_sharp(self) -> npt.NDArray[np.bool_]:
+        """Whether the edges ``(n_facets, e)`` are sharp and convex."""
+        corners = self.reference_corners()
+        middles = (corners + np.roll(corners, -1, axis=0)) / 2
+        shape, slope = self.shapes(middles)
+        nodes = self.X[self.connectivity]
+        by_s, by_t = np.einsum("eca,fai->cfei", slope, nodes)
+        normal = unit(np.cross(by_s, by_t))
+        there = self.beyond
+        facets = np.arange(self.n_facets)[:, None, None]
+        same_edge = (self.beyond[there] == facets).argmax(axis=2)
+        turned = (normal * normal[there, same_edge]).sum(axis=2)
+        centre = self.corner_points().mean(axis=1)
+        rise = ((centre[there] - shape @ nodes) * normal).sum(axis=2)
+        is_sharp: npt.NDArray[np.bool_] = (turned < _SHARP) & (rise < 0)
+        return is_sharp
 
     def shapes(self, xi: Array) -> tuple[Array, Array]:
         """Shape functions ``(m, k)`` and their derivatives ``(m, 2, k)`` at ``xi`` ``(m, 2)``."""
@@ -165,20 +190,34 @@ class Patches:
             place, near = np.divmod(pairs, self.n_facets)
         return place, near
 
-    def nearest_facet(self, x: Array, displacement: Array) -> Index:
+    def nearest_facet(self, x: Array, displacement: Array, outward: Array | None = None) -> Index:
         """Facet ``(m,)`` of the displaced surface of whose sample points one comes nearest to each
-        of ``x`` ``(m, 3)``."""
+        of ``x`` ``(m, 3)``; where the surface has sharp edges, of those that face it by its
+        ``outward`` normal ``(m, 3)``."""
         from scipy.spatial import cKDTree  # a plane problem does not pay for it
 
         xi, _ = basix.make_quadrature(self.cell, 4)
-        shape, _ = self.shapes(xi)
+        shape, slope = self.shapes(xi)
         nodes = (self.X + displacement)[self.connectivity]
-        samples = np.einsum("qa,fai->fqi", shape, nodes)
-        _, nearest = cKDTree(samples.reshape(-1, 3)).query(x)
-        return nearest // len(xi)
+        samples = np.einsum("qa,fai->fqi", shape, nodes).reshape(-1, 3)
+        tree = cKDTree(samples)
+        if outward is None or not self._has_corners:
+            _, nearest = tree.query(x)
+            return nearest // len(xi)
+        _, near = tree.query(x, k=min(_NEAREST, len(samples)))
+        by_s, by_t = np.einsum("qca,fai->cfqi", slope, nodes).reshape(2, -1, 3)
+        product = np.cross(by_s, by_t)
+        faces = np.einsum("mki,mi->mk", unit(product)[near], outward) < -_ACROSS
+        first = faces.argmax(axis=1)
+        return near[np.arange(len(x)), first] // len(xi)
 
     def closest_point(
-        self, x: Array, outward: Array, displacement: Array, start: Index | None = None
+        self,
+        x: Array,
+        outward: Array,
+        displacement: Array,
+        start: Index | None = None,
+        faced: Index | None = None,
     ) -> PatchProjection:
         """Closest points on the surface displaced by ``displacement`` (as ``X``) of the points
         ``x`` ``(m, 3)``.
@@ -187,15 +226,18 @@ class Patches:
         it. ``start`` holds a facet for each point near its partner (by default `nearest_facet`, a
         search without a radius). Newton's method runs on that facet, kept within it; where it ends
         on an edge or at a corner the facets that meet there follow, as long as they are nearer.
-        Points that have no partner near ``start`` are searched for on the whole surface. Raises
-        `ProjectionError` for a point that found none.
+        Points that have no partner near ``start`` are searched for on the whole surface. A facet at
+        a free border is a little wider for points whose ``faced`` facet it is or touches (`EVERY`
+        by default, or `NONE`). Raises `ProjectionError` for a point that found none.
         """
-        home = self.nearest_facet(x, displacement) if start is None else start
-        margin = np.where(self.beyond < 0, _BORDER_MARGIN, 0.0)
-        partners = self._project(x, outward, displacement, home, margin, _MOST_FACETS)
+        home = self.nearest_facet(x, displacement, outward) if start is None else start
+        margin = np.where(self.ends, _BORDER_MARGIN, 0.0)
+        if faced is None:
+            faced = np.full(len(x), EVERY)
+        partners = self._project(x, outward, displacement, home, faced, margin, _MOST_FACETS)
         lost = ~partners.found
         if start is not None and lost.any():
-            elsewhere = self.closest_point(x[lost], outward[lost], displacement)
+            elsewhere = self.closest_point(x[lost], outward[lost], displacement, faced=faced[lost])
             for name, values in vars(partners).items():
                 values[lost] = getattr(elsewhere, name)
         return partners
@@ -206,7 +248,8 @@ class Patches:
         """As `closest_point`, but on the given facets, each a polynomial continued beyond its
         edges: smooth in ``x``."""
         margin = np.full(self.beyond.shape, _CONTINUED)
-        return self._project(x, outward, displacement, facet, margin, others=0)
+        every = np.full(len(x), EVERY)
+        return self._project(x, outward, displacement, facet, every, margin, others=0)
 
     def coordinates(self, x: Array, facet: Index) -> Array:
         """Where the undeformed facets ``facet`` ``(m,)``, continued far beyond their edges, come
@@ -232,6 +275,7 @@ class Patches:
             "lines": self._lines,
             "margin": margin,
             "beyond": self.beyond,
+            "ends": self.ends,
             "corners": self.corners,
             "first": self._first,
             "around": self._around,
@@ -263,6 +307,7 @@ class Patches:
         outward: Array,
         displacement: Array,
         home: Index,
+        faced: Index,
         margin: Array,
         others: int,
     ) -> PatchProjection:
@@ -272,11 +317,11 @@ class Patches:
         patches = structure(_SOURCE, "Patches", members)
         partners = PatchProjection.empty(len(x), self.connectivity.shape[1])
         points = np.ascontiguousarray(x), np.ascontiguousarray(outward)
-        start = home.astype(np.int32, copy=False)
+        near = [facets.astype(np.int32, copy=False) for facets in (home, faced)]
         results: list[np.ndarray] = list(vars(partners).values())
         on_nodes = results.pop()
         first_lost = np.zeros(1, dtype=np.int32)
-        given = map(pointer, (*points, start))
+        given = map(pointer, (*points, *near))
         found = map(pointer, (*results, first_lost))
         kernel = library(_SOURCE).closest_on_patches
         n_lost = kernel(patches, len(x), *given, others, *found)

@@ -48,7 +48,12 @@ class RigidBall(RigidRound):
     _is_curved = (True, True)  # along both tangents
 
     def closest_point(
-        self, x: Array, outward: Array, displacement: Array, start: Index | None = None
+        self,
+        x: Array,
+        outward: Array,
+        displacement: Array,
+        start: Index | None = None,
+        faced: Index | None = None,
     ) -> PatchProjection:
         """Closest points on the surface moved by ``displacement`` ``(1, 3)``; see
         `Patches.closest_point`.

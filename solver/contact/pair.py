@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.geometry.curve import NONE
 from archord.materials.material import Points
 from archord.solver.contact.frame import TurningFrames, frames_at_rest, plane_frames
 from archord.solver.contact.laws.law import OPEN, STICK, Branches, ContactLaw
@@ -80,7 +81,9 @@ class Pair:
         at_rest = np.zeros_like(opposite.curve.X)
         self._outward = _flat(surface.outward)
         self._at_rest = frames_at_rest(-self._outward) if surface.in_space else None
-        self.projection = opposite.curve.closest_point(x, self._outward, at_rest)
+        nothing = np.full(len(x), NONE)
+        self.projection = opposite.curve.closest_point(x, self._outward, at_rest, faced=nothing)
+        self._faced = np.where(self.projection.found, self.projection.facet, NONE)
         self.separation = x - self.projection.point
         self.points = Points(law, len(x))
         n_tangents = x.shape[1] - 1
@@ -169,12 +172,17 @@ class Pair:
         if self._at_rest is None:
             self.frame = plane_frames(normal)
             return
-        turned = TurningFrames(self._at_rest, normal)
+        is_found = self.projection.found[:, None]
+        turned = TurningFrames(self._at_rest, np.where(is_found, normal, -self._outward))
         self.frame = turned.frame
         self.spin = turned.spin
 
     def _find_partners(self, displacement: Array, motion: Array) -> None:
-        """The closest points of the deformed surfaces."""
+        """The closest points of the deformed surfaces.
+
+        A body that bulges over the border that it was drawn along keeps its partners; a point
+        that was drawn beyond the border has none there.
+        """
         x = _flat(self.surface.point) + displacement
         curve = self.opposite.curve
         last = self.projection.facet
@@ -184,7 +192,7 @@ class Pair:
             self.projection.found[:] &= had_partner
         else:
             near = None if self.start == "anywhere" else last
-            self.projection = curve.closest_point(x, self._outward, motion, near)
+            self.projection = curve.closest_point(x, self._outward, motion, near, self._faced)
             self.start = "near"
         self.n_passing = int((self.projection.found != had_partner).sum())
         self.separation = x - self.projection.point
