@@ -196,14 +196,20 @@ def _middle(shape: Any, height: float = 0.0) -> Strip:
     return height - width, height + width
 
 
-def _rim(shape: Any, face: float, into: int) -> Strip:
+def _rim(shape: Any, face: float, into: int, pin: float = math.inf) -> Strip:
     """The strip beside the rim at a ``face``, toward ``into`` (1 or -1), behind its chamfer or
-    fillet."""
+    fillet; beside the end of the ``pin`` where that ends before."""
     width = _STRIP * shape.radius
-    blunt = shape.space.chamfer or shape.space.fillet
-    outer = face + into * blunt
-    inner = face + into * (blunt + width)
+    outer = min(face + into * shape.space.blunt, pin)
+    inner = outer + into * width
     return min(outer, inner), max(outer, inner)
+
+
+def _end(shape: Any) -> float:
+    """Where the pin of a joint, a lug or a bushing ends; a rigid one does not."""
+    if shape.pin == "none":
+        return math.inf
+    return float(shape.space.arguments()["pin_length"]) / 2
 
 
 def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
@@ -212,7 +218,7 @@ def _joint_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     contact = scene.interaction[0].name
     load = scene.load[0].name
     face = shape.space.thickness / 2
-    strips = _middle(shape), _rim(shape, face, -1)
+    strips = _middle(shape), _rim(shape, face, -1, _end(shape))
     bearing = Bearing(contact, shape.radius, (0.0, 0.0), (0.0, -1.0), math.pi / 2, *strips)
     yield Measure("delta", units.length, lambda state: -state.driven[load][0])
     yield Measure("P", units.force_of(1.0), lambda state: -state.driven[load][1])
@@ -229,7 +235,8 @@ def _bearings(shape: Any, contacts: list[str]) -> Iterator[Bearing]:
     pinned = [name for name in contacts if name.startswith("pin in ")]
     has_plates = shape.kind == "clevis"
     plate = shape.inner if has_plates else shape.space
-    strips = _middle(shape), _rim(shape, plate.thickness / 2, -1)
+    end = math.inf if has_plates else _end(shape)
+    strips = _middle(shape), _rim(shape, plate.thickness / 2, -1, end)
     yield Bearing(pinned[0], R, (0.0, 0.0), (1.0, 0.0), math.pi, *strips)
     if not has_plates:
         return
@@ -249,13 +256,14 @@ def _heights(shape: Any) -> tuple[float, float, float]:
 def _bending_measures(scene: ProblemScene, shape: Any) -> Iterator[Measure]:
     """How the pin of a clevis bends, beside a beam.
 
-    By hand the plates press evenly: the moment is P/2 (t_inner/4 + gap + t_outer/2) (Bruhn 1973,
-    chapter D1). The beam rests on the middles of the outer plates; shear adds M/(k G A).
+    By hand the plates press evenly between their rims: where these are sharp the moment is P/2
+    (t_inner/4 + gap + t_outer/2) (Bruhn 1973, chapter D1). The beam rests on the middles of the
+    outer plates; shear adds M/(k G A).
     """
     inside, bottom, top = _heights(shape)
     pin = next(body for body in scene.body if body.name == "pin")
     inner, outer = _bearings(shape, [part.name for part in scene.interaction])
-    arm = inside / 2 + shape.space.gap + (top - bottom) / 2
+    arm = (bottom + top) / 2 - (inside - shape.space.blunt) / 2
     compliance = _beam_compliance(shape, pin, arm)
 
     def force(state: Accepted) -> float:
@@ -285,7 +293,7 @@ def _beam_compliance(shape: Any, pin: Any, arm: float) -> float:
     R = shape.radius
     bore = shape.space.bore
     span = bottom + top  # between the supports
-    loaded = 2 * inside
+    loaded = 2 * (inside - shape.space.blunt)
     inertia = math.pi * (R**4 - bore**4) / 4
     area = math.pi * (R**2 - bore**2)
     shear_modulus = pin.E / (2 * (1 + pin.nu))

@@ -82,7 +82,9 @@ def _lug(run: Run) -> Part:
     if shape.space is not None:
         thickness = shape.space.thickness
         # a bushing is as long as its hole
-        bears = thickness if shape.wall else shape.space.arguments()["pin_length"]
+        if not shape.wall:
+            pin = shape.space.arguments()["pin_length"]
+            bears = min(pin, thickness - 2 * shape.space.blunt)
     force = _pulling(run, pull)
     unit = run.units[f"{pull} force"]
     return _sectioned("", _body_of(run, "lug"), force, unit, shape, thickness, bears)
@@ -104,6 +106,9 @@ def _plate(run: Run, name: str) -> Part:
             f"mesh.shape.{name}.thickness is missing, which margins need; solve it again.",
         )
     together = PLATES[name] * drawn.thickness
+    bears = math.inf
+    if in_space and not shape.wall:
+        bears = PLATES[name] * (drawn.thickness - 2 * shape.space.blunt)
     outline = drawn.outline(shape)
     lug = LugShape(
         radius=shape.radius, clearance=shape.clearance, wall=shape.wall or None, **outline
@@ -112,7 +117,7 @@ def _plate(run: Run, name: str) -> Part:
     if not in_space:
         force = force * together
     unit = run.scene.units.force_of(1.0)
-    return _sectioned(name, _body_of(run, name), force, unit, lug, together)
+    return _sectioned(name, _body_of(run, name), force, unit, lug, together, bears)
 
 
 def _sectioned(
@@ -128,7 +133,7 @@ def _sectioned(
     inner = "hole" if lug.wall else "pin"
     note = f"bearing by hand is {BEARING:g} times the strength on the diameter of the {inner}"
     if bears < thickness:
-        note += f", over the length {bears:g} of the pin"
+        note += f", over the length {bears:g} on which the pin lies"
 
     def by_hand(_: str, strength: float) -> Amounts:
         return lug_forces(lug, strength, thickness, bears)
@@ -140,12 +145,13 @@ def _sectioned(
 def _pin(run: Run, inner: Part) -> Part:
     """The pin of a clevis in space, under the force on its ``inner`` plate."""
     shape = _shape_of(run)
+    both_rims = 2 * shape.space.blunt
     pin = ClevisPin(
         shape.radius,
         shape.space.bore,
-        shape.inner.thickness,
-        shape.outer.thickness,
-        shape.space.gap,
+        shape.inner.thickness - both_rims,
+        shape.outer.thickness - both_rims,
+        shape.space.gap + both_rims,
     )
     plates = [_plate(run, name) for name in PLATES]
     notes = ["by hand the proof strength counts at the surface, the tensile one all over a section"]

@@ -8,8 +8,9 @@ pin of diameter ``d``, or a bushing (``d = D``), and the proof strength or the t
     bearing       1.5 f d t                               EN 1993-1-8, table 3.10
     shear-out     2 (e - D/2 cos 40 deg) t f / sqrt(3)    Bruhn 1973, chapter D1
 
-Of the pin of a clevis, of outer radius ``R`` and bore ``r``, through an inner plate ``t_i`` thick
-and two outer ones, each ``t_o`` thick and a gap ``g`` away:
+Chamfers and fillets shorten what bears: for ``t`` then stands the length between them. Of the pin
+of a clevis, of outer radius ``R`` and bore ``r``, that an inner plate bears on over ``t_i`` and two
+outer ones each over ``t_o``, a gap ``g`` away:
 
     shear                    2 pi (R^2 - r^2) f / sqrt(3)
     bending, even bearing    2 M / (t_i/4 + g + t_o/2)             Bruhn 1973, chapter D1
@@ -57,8 +58,8 @@ def lug_forces(
 
 @dataclass(frozen=True)
 class ClevisPin:
-    """The pin of a clevis: its ``radius`` and ``bore``, the thicknesses of the ``inner`` plate and
-    of each ``outer`` one, and the ``gap`` between them."""
+    """The pin of a clevis: its ``radius`` and ``bore``, the lengths over which the ``inner`` plate
+    and each ``outer`` one bear, and the ``gap`` between these."""
 
     radius: float
     bore: float

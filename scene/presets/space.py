@@ -33,6 +33,11 @@ class Depth(Section):
         "element size at these rims over element_size", default=0.5, ge=0.02, le=1
     )
 
+    @property
+    def blunt(self) -> float:
+        """How far from the faces the rims end, and the holes begin to bear."""
+        return self.chamfer or self.fillet
+
     def check_rims(self, radius: float, thickness: float) -> None:
         """Raise `Fault` for rims that do not fit a hole of this ``radius`` in a plate."""
         require(not (self.chamfer and self.fillet), "space.fillet", "is instead of a chamfer")

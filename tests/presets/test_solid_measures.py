@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.output.run import solve_scene
-from archord.presets.solid_measures import Bearing, mean_over, shear_factor
+from archord.presets.solid_measures import Bearing, mean_over, shear_factor, solid_measures
 from archord.scene.file import parse_any
 
 STEEL = {"E": 210000.0, "nu": 0.3}
@@ -49,6 +49,35 @@ def test_a_joint_in_space_lies_between_the_planes(tmp_path):
     assert 0.97 * stress["p0"] < solid["p0"] < 1.03 * strain["p0"]
     assert 0.8 * solid["p0"] < solid["rim pressure"] < 0.98 * solid["p0"]
     assert solid["eps"] == pytest.approx(stress["eps"], rel=0.04)
+
+
+def test_a_pin_that_ends_in_its_hole_presses_there(tmp_path):
+    """The rim pressure is told beside its end, where nothing is at the face."""
+    space = {"space": {"thickness": 8.0, "pin_length": 4.0}}
+    solid = last_of(JOINT | space, tmp_path / "joint")
+    assert solid["rim pressure"] > 1.05 * solid["p0"]
+
+
+@pytest.mark.parametrize("rim", [{}, {"chamfer": 0.5}, {"fillet": 0.5}])
+def test_plates_bear_between_their_rims_by_hand(rim):
+    """The moment about the mid-plane of half the force on the middles of what bears."""
+    plate = STEEL | {"width": 40.0, "length": 40.0}
+    scene = parse_any(
+        {
+            "clevis": {"radius": 10.0, "clearance": 0.02},
+            "space": {"gap": 2.0, **rim},
+            "inner": plate | {"thickness": 16.0},
+            "outer": plate | {"thickness": 10.0},
+            "pin": STEEL,
+            "load": {"force": 20000.0},
+        }
+    )
+    told = {measure.name: measure.value for measure in solid_measures(scene)}
+    state = SimpleNamespace(contact_force=lambda name: [2e4, 0.0, 0.0])
+    blunt = max(rim.values(), default=0.0)
+    inner = (8.0 - blunt) / 2
+    outer = 8.0 + 2.0 + 10.0 / 2
+    assert told["pin bending moment by hand"](state) == pytest.approx(1e4 * (outer - inner))
 
 
 @pytest.mark.parametrize("size", [3.0, 2.5])

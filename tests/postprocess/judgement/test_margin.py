@@ -75,12 +75,14 @@ def test_hand_formulas_are_those_of_the_sections():
         ({"thickness": 12.0, "pin_length": 6.0}, {}, 6.0),
         ({"thickness": 12.0, "pin_length": 16.0}, {}, 12.0),
         ({"thickness": 12.0}, {}, 12.0),
+        ({"thickness": 12.0, "pin_length": 16.0, "chamfer": 0.5}, {}, 11.0),
+        ({"thickness": 12.0, "pin_length": 6.0, "fillet": 0.5}, {}, 6.0),
         ({"thickness": 12.0, "pin_length": 6.0}, {"bushing": STEEL | {"thickness": 2.0}}, 12.0),
     ],
 )
-def test_a_short_pin_bears_over_its_length(space, bushing, length):
-    """The bearing force of a pin half as long as the hole was twice too large. A bushing bears over
-    the thickness of its lug."""
+def test_a_pin_bears_over_the_length_of_contact(space, bushing, length):
+    """Of a short pin, or between the chamfers or fillets of the hole. A bushing bears over the
+    thickness of its lug."""
     scene = parse_any(lug({"force": 1e4}, {"hardening": CURVE}, space=space) | bushing)
     run = SimpleNamespace(
         scene=scene,
