@@ -7,6 +7,7 @@ import tomllib
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from archord.report.readable import require_file
 from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
 from archord.scene.parts import LoadSection
 from archord.scene.sections.errors import toml_value
+
+if TYPE_CHECKING:
+    from archord.solver.path.system import System
 
 _TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
 _MAY_DIFFER = ("stepping.", "analysis.max_iterations", *_TARGETS)
@@ -178,3 +182,17 @@ def _without_targets(keys: ByName) -> ByName:
         for load in keys["load"]
     ]
     return keys | {"load": loads}
+
+
+def require_same_sides(folder: Path, before: ByName, system: System) -> None:
+    """Raise `InputError` where the run with the report ``before`` integrated a contact on other
+    sides than the ``system`` does, as earlier versions did."""
+    shares = before.get("model", {}).get("contact_shares")
+    if not isinstance(shares, dict):
+        return
+    for interface in system.contact.interfaces:
+        name = interface.interaction.name
+        now = len(interface.pairs)
+        if len(shares.get(name, interface.pairs)) != now:
+            said = f"was solved with {name!r} integrated on {len(shares[name])} sides"
+            raise InputError(folder, f"{said}, which is {now} in this version: solve it again.")

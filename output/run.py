@@ -28,7 +28,7 @@ from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import write_history
 from archord.output.own_mesh import given_mesh, mesh_in_use, scene_text, write_mesh
 from archord.output.ranks import agreed
-from archord.output.restart import Start
+from archord.output.restart import Start, require_same_sides
 from archord.output.run_json import Report, peak_memory
 from archord.presets.account import account_of
 from archord.report.by_name import ByName, Names
@@ -104,6 +104,8 @@ def solve_scene(
         if begun_by:
             stack.enter_context(points_by(begun_by))
         account = account_of(scene, comm, timer, problem)
+        before = start.report if start else {}
+        agreed(comm, partial(require_same_sides, folder, before, account.system))
         account.system.solver.newton.watch = on_iteration
         on_start(account.system)
         output = _Output(folder, account, begun, start, problem, own_fields)

@@ -20,7 +20,6 @@ from archord.measures.doubts import (
 )
 from archord.measures.edge import fixed, per_step, surface_profiles
 from archord.measures.energies import ENERGIES
-from archord.measures.laden_surfaces import laden_surfaces
 from archord.measures.measure import Accepted, Column, column
 from archord.measures.parts import part_measures
 from archord.presets.general_doubts import ending, refusal, step_checks
@@ -87,7 +86,6 @@ def general_account(
     warnings += point_doubts(problem)
     warnings += volume_doubts(system)
     warnings += stiff_quadrilaterals(system)
-    warnings += laden_surfaces(system)
     return _account(scene, system, warnings, file)
 
 

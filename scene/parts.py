@@ -185,7 +185,9 @@ class InteractionSection(Section):
         None, description="of a run from Python: its own contact law, in words"
     )
     integrated: Name | None = key(
-        "the one facet set whose points carry the contact; both do if absent", other="hole"
+        "the one facet set whose points carry the contact; both do if absent, or the one on which "
+        "no support, coupling or load acts",
+        other="hole",
     )
     interference: NotNegative = key(
         "press fit that the mesh does not show: how far the surfaces, which are drawn in touch, "

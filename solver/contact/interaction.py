@@ -74,7 +74,8 @@ class Interaction:
     gamma_factor : float
         Nitsche's gamma over the trace constant of each contact cell.
     integrated : str
-        The one facet set whose points carry the contact. Both do by default.
+        The one facet set whose points carry the contact. By default both do, or the one on
+        which no support, coupling or load acts.
     slide : float
         How far pairs slide that the matrix gets room for from the start.
     interference : float

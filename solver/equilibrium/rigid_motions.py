@@ -146,36 +146,39 @@ class RigidMotions:
         forces there. Raises `ProjectionError`."""
         applied = self._applied(load, levels)
         is_pushed = bool(np.linalg.norm(applied))
-        step: Array = np.zeros(len(self.free))
         damping = self.drives.stiffness
         least_damping = _LEAST_DAMPING * damping
         least = np.inf
         most = 0.0
         is_near = False
+        is_beyond = False
         for _ in range(_MOST):
             push = self._push(u, levels, load)
             left = push.force + applied
             size = float(np.linalg.norm(left))
             most = max(most, push.pressed)
             before = least
-            if size > (1 if is_near else 2) * least:  # back to the place before, for a smaller step
-                u = u - np.tensordot(step, self.free, 1)
-                levels = levels - step @ self.levels
-                damping *= _DAMPING**2
-            else:
+            if size <= (1 if is_near else 2) * least:
                 least = size
                 damping = max(damping / _DAMPING, least_damping)
-                best = push
-                best_left = left
+                best = push, left, u, levels
+                is_beyond = False
+            elif best[0].pressed == 0 and not is_beyond:
+                # what stops bodies that nothing resisted is known where they have gone too far
+                is_beyond = True
+            else:  # back to the place before, for a smaller step
+                push, left, u, levels = best
+                damping *= _DAMPING**2
+                is_beyond = False
             if size <= _ROUND_OFF * most or (is_near and size > _FAST * before):
                 break
             scale = max(push.pressed, float(np.linalg.norm(applied)))
             is_near = is_near or size <= _AT_REST * scale
             if is_near and not is_pushed:
                 break
-            damped = best.stiffness + damping * np.eye(len(step))
-            whole_step = np.linalg.solve(damped, best_left)
-            step = self._shortened(whole_step, best.openings)
+            damped = push.stiffness + damping * np.eye(len(left))
+            whole_step = np.linalg.solve(damped, left)
+            step = self._shortened(whole_step, push.openings)
             u = u + np.tensordot(step, self.free, 1)
             levels = levels + step @ self.levels
         return u, levels, is_pushed and least < _STOPPED * float(np.linalg.norm(applied))

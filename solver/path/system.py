@@ -17,6 +17,7 @@ from archord.geometry.curve import ProjectionError
 from archord.kernels.compat import cell_degree, cell_nodes
 from archord.report.timer import Timer
 from archord.solver.bulk.bulk import Bulk
+from archord.solver.clean_sides import CleanSides
 from archord.solver.conditions import Mean
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction, Interface, Rigid
@@ -113,6 +114,7 @@ class System(Totals):
             self.V = displacement_space(mesh, problem.degree)
             self.bulk = self._bulk()
             self.sides: dict[str, Surface] = {}
+            self._clean_sides = CleanSides(problem, self.V)
             self.contact = Contact(self.V, [self._interface(i) for i in problem.interactions])
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
@@ -164,7 +166,7 @@ class System(Totals):
     def _interface(self, interaction: Interaction) -> Interface:
         surfaces = [self._surface(given, interaction.name) for given in interaction.surfaces]
         try:
-            return Interface(interaction, surfaces)
+            return Interface(self._clean_sides.integrated(interaction, surfaces), surfaces)
         except ProjectionError as error:
             said = f'interaction "{interaction.name}": its surfaces do not lie opposite each other'
             raise ProjectionError(f"{said}: {error}") from None

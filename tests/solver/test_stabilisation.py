@@ -354,7 +354,11 @@ def carried_by_base(kinematics: str, length: float) -> tuple[float, float]:
     return float(lacking), system.drive_displacement("press") / length
 
 
-def test_springs_carry_nothing_of_a_tiny_force_through_a_gap():
+@pytest.mark.parametrize("gamma_factor", [0.5, 2.0])
+@pytest.mark.parametrize(
+    ("on", "integrated"), [("upper", "lower"), ("lid", ""), ("lid", "upper"), ("lid", "lower")]
+)
+def test_springs_carry_nothing_of_a_tiny_force_through_a_gap(on, integrated, gamma_factor):
     """A block falls through a gap of a tenth of its height under 1e-7 of E times its face. Springs
     that begin where it has come from carry 1.3 % of the force."""
     mesh = tagged(bodies(MPI.COMM_SELF))
@@ -365,9 +369,13 @@ def test_springs_carry_nothing_of_a_tiny_force_through_a_gap():
     problem = Problem(
         mesh,
         [Body(name, Elastic(210e3, 0.3)) for name in ("lower", "upper")],
-        [Interaction("contact", ("upper", "lower"))],
+        [
+            Interaction(
+                "contact", ("upper", "lower"), integrated=integrated, gamma_factor=gamma_factor
+            )
+        ],
         [Support("base")],
-        [Load("press", on="upper", direction="z", force=-force)],
+        [Load("press", on=on, direction="z", force=-force)],
     )
     system = System(problem)
     system.solve([1.0])

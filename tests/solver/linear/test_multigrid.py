@@ -258,9 +258,7 @@ def test_a_force_takes_hardly_more_iterations_than_a_displacement(monkeypatch):
     driven = _pressed(Load("press", on="upper", direction="z", displacement=moved))
     other = _only_step(driven)
     assert driven.drive_force("press") == pytest.approx(-300.0, rel=1e-8)
-    krylov, usual = (
-        sum(solve.krylov_iterations for solve in s.attempts) / s.iterations for s in (step, other)
-    )
+    krylov, usual = (sum(solve.krylov_iterations for solve in s.attempts) for s in (step, other))
     assert step.iterations <= other.iterations + 1
     assert krylov < 2 * usual
 

@@ -1,5 +1,6 @@
-"""Contact of surfaces that supports, couplings and loads act on, too: a warning, whose cure gives
-the closed form."""
+"""Contact of surfaces that supports, couplings and loads act on, too, against closed forms."""
+
+from dataclasses import replace
 
 import pytest
 
@@ -7,6 +8,7 @@ from archord import (
     Body,
     Coupling,
     Elastic,
+    InputError,
     Interaction,
     Load,
     Mesh,
@@ -17,7 +19,7 @@ from archord import (
     rectangles,
     solve,
 )
-from archord.measures.laden_surfaces import laden_surfaces
+from archord.solver.clean_sides import CleanSides
 
 E = 1000.0
 PRESSURE = 30.0
@@ -52,15 +54,8 @@ def stated(
     )
 
 
-def cured(mesh, laden, **parts):
-    """The problem of these ``parts``, solved on the other side than the ``laden`` one, as the
-    warning says."""
-    (said,) = laden_surfaces(System(stated(mesh, **parts)))
-    other = {"upper bottom": "lower top", "lower top": "upper bottom"}[laden]
-    assert f"act on facets of {laden!r}, too, and 'contact' takes" in said
-    assert f"give integrated = {other!r}" in said
-    system = System(stated(mesh, integrated=other, **parts))
-    assert not laden_surfaces(system)
+def solved(mesh, **parts):
+    system = System(stated(mesh, **parts))
     system.solve()
     return system
 
@@ -70,25 +65,24 @@ def cured(mesh, laden, **parts):
 @pytest.mark.parametrize("on", ["upper", "upper bottom"])
 @pytest.mark.parametrize("law", ["frictionless", "tied"])
 def test_a_body_whose_motion_is_prescribed_is_a_rigid_one(mesh, on, law):
-    """Its stress, which is zero, is averaged into the pressure: the force is 8.89."""
+    """Its stress, which is zero, was averaged into the pressure: the force was 8.89."""
     push = Load("push", on=on, direction="y", displacement=-DOWN)
-    system = cured(mesh, "upper bottom", loads=[push], law=law)
+    system = solved(mesh, loads=[push], law=law)
     assert system.drive_force("push") == pytest.approx(-E * DOWN)
 
 
 @in_plane_and_space
 @pytest.mark.parametrize("on", ["lower", "lower top"])
 def test_a_held_surface_is_a_rigid_one(mesh, on):
-    """The upper body sinks in, by an eighth of its own compression."""
-    floor = Support("floor", on=on, fixed="xy")
-    system = cured(mesh, "lower top", loads=[PRESS], fixed=[floor])
+    """The upper body sank in, by an eighth of its own compression."""
+    system = solved(mesh, loads=[PRESS], fixed=[Support("floor", on=on, fixed="xy")])
     assert system.drive_displacement("press") == pytest.approx(PRESSURE / E)
 
 
 @in_plane_and_space
 def test_a_surface_may_be_moved_by_a_force(mesh):
     push = Load("push", on="upper bottom", direction="y", force=-E * DOWN)
-    system = cured(mesh, "upper bottom", loads=[push])
+    system = solved(mesh, loads=[push])
     assert system.drive_displacement("push") == pytest.approx(-DOWN)
 
 
@@ -97,28 +91,28 @@ def test_a_surface_may_have_a_distributing_coupling(mesh):
     point = (0.5, 1.0, 0.5)[: mesh().dimension]
     ram = Coupling("ram", facets="upper bottom", point=point, kind="distributing")
     push = Load("push", on="ram", direction="y", force=-E * DOWN)
-    system = cured(mesh, "upper bottom", loads=[push], couplings=[ram])
+    system = solved(mesh, loads=[push], couplings=[ram])
     assert system.drive_displacement("push") == pytest.approx(-DOWN)
 
 
 @pytest.mark.mpi
 @in_plane_and_space
 def test_a_pressure_between_bodies_lightens_the_contact(mesh):
-    """The gap is as wide as that pressure over gamma: the displacement is 2.5 % too small."""
+    """The gap was as wide as that pressure is over gamma: the displacement 2.5 % too small."""
     between = Load("between", on="upper bottom", pressure=BETWEEN)
-    system = cured(mesh, "upper bottom", loads=[PRESS, between])
+    system = solved(mesh, loads=[PRESS, between])
     compressed = (PRESSURE - BETWEEN) / E + PRESSURE / E
     assert system.drive_displacement("press") == pytest.approx(compressed)
 
 
 @in_plane_and_space
-def test_what_acts_along_smooth_surfaces_is_no_load(mesh):
-    guide = Support("guide", on="upper", fixed="x")
-    assert not laden_surfaces(System(stated(mesh, loads=[PRESS], fixed=[guide])))
+def test_what_acts_along_smooth_surfaces_changes_nothing(mesh):
+    """Both sides are integrated, as they are without."""
+    system = solved(mesh, loads=[PRESS], fixed=[Support("guide", on="upper", fixed="x")])
+    assert len(system.contact.pairs) == 2
 
 
-@pytest.mark.mpi
-def test_what_acts_far_from_the_other_body_is_no_load():
+def test_what_acts_far_from_the_other_body_changes_nothing():
     """The surfaces go on around a corner to the held and the pressed sides of their bodies."""
     tagged = MESHES["plane"]()
     sets = {
@@ -126,13 +120,35 @@ def test_what_acts_far_from_the_other_body_is_no_load():
         for body in ("lower", "upper")
     }
     made = Mesh(tagged, sets=sets).on(tagged.mesh.comm)
-    system = System(stated(lambda: made, loads=[PRESS], surfaces=tuple(sets)))
-    assert not laden_surfaces(system)
+    system = solved(lambda: made, loads=[PRESS], surfaces=tuple(sets))
+    assert len(system.contact.pairs) == 2
+    assert system.drive_displacement("press") == pytest.approx(2 * PRESSURE / E)
 
 
-def test_where_no_side_is_left_the_sets_are_to_be_cut(tmp_path):
+def test_no_side_left_is_refused(tmp_path):
     between = [Load(f"on {name}", on=name, pressure=1.0) for name in ("upper bottom", "lower top")]
-    run = solve(stated(MESHES["plane"], loads=[PRESS, *between]), tmp_path / "run")
-    said = "'upper bottom' and 'lower top', too, and 'contact' takes"
-    (warning,) = [one for one in run.warnings if said in one]
-    assert warning.endswith("leave them out of one of the sets")
+    problem = stated(MESHES["plane"], loads=[PRESS, *between])
+    said = "act on facets of 'upper bottom' and 'lower top', too, .* leave them out"
+    with pytest.raises(InputError, match=said):
+        solve(problem, tmp_path / "run")
+
+
+def test_the_other_side_is_the_cure(tmp_path):
+    between = Load("between", on="lower top", pressure=1.0)
+    problem = stated(MESHES["plane"], loads=[PRESS, between], integrated="lower top")
+    with pytest.raises(InputError, match="give integrated = 'upper bottom'"):
+        solve(problem, tmp_path / "run")
+
+
+def test_a_run_with_both_sides_is_not_continued(tmp_path, monkeypatch):
+    """Earlier versions integrated both: its history would have two forces of one path."""
+
+    def push(to):
+        loads = [Load("push", on="upper", direction="y", displacement=to)]
+        return replace(stated(MESHES["plane"], loads=loads), steps=[1] * len(to))
+
+    with monkeypatch.context() as earlier:
+        earlier.setattr(CleanSides, "integrated", lambda self, interaction, surfaces: interaction)
+        solve(push([-DOWN]), tmp_path / "run")
+    with pytest.raises(InputError, match="'contact' integrated on 2 sides, which is 1"):
+        solve(push([-DOWN, -2 * DOWN]), tmp_path / "run", restart=True)
