@@ -21,6 +21,7 @@ from archord.measures.doubts import (
 from archord.measures.edge import fixed, per_step, surface_profiles
 from archord.measures.energies import ENERGIES
 from archord.measures.measure import Accepted, Column, column
+from archord.measures.mirror_doubts import mirror_doubts
 from archord.measures.parts import part_measures
 from archord.presets.general_doubts import ending, refusal, step_checks
 from archord.presets.problem import (
@@ -78,6 +79,8 @@ def general_account(
             from archord.presets.held import require_facing
 
             warnings += require_facing(system)
+        if scene.mesh.shape is None:
+            warnings += mirror_doubts(system)
     frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
     warnings += friction_doubts(frictions)
     warnings += contrast_doubts(problem.bodies)

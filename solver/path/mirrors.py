@@ -39,6 +39,15 @@ def mirrors_of(problem: Problem, V: fem.FunctionSpace) -> list[Mirror]:
     so than the part has mirrors, as nothing tells which of them are rollers. Collective."""
     if problem.symmetry == 1:
         return []
+    found = flat_held(problem, V)
+    if 2 ** len(found) > problem.symmetry:
+        return []
+    return found
+
+
+def flat_held(problem: Problem, V: fem.FunctionSpace) -> list[Mirror]:
+    """The flat sets of facets at an end of the mesh that are held across themselves alone: mirrors
+    or rollers. Collective."""
     d = problem.kinematics.dimension
     x = V.tabulate_dof_coordinates()[:, :d]
     lowest, highest = _ends(V.mesh.comm, x)
@@ -52,8 +61,6 @@ def mirrors_of(problem: Problem, V: fem.FunctionSpace) -> list[Mirror]:
         for end in (lowest[axis], highest[axis]):
             if abs(first[axis] - end) < near:
                 found[axis, float(end)].append(nodes)
-    if 2 ** len(found) > problem.symmetry:
-        return []
     return [
         Mirror(axis, at, near, np.unique(np.concatenate(nodes)))
         for (axis, at), nodes in sorted(found.items())
