@@ -15,6 +15,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.solver.contact.contact import Contact
+from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.contact.tangent import point_rates
 from archord.solver.drives import MOVABLE, Drives
 from archord.solver.problem import Interaction, Rigid
@@ -27,6 +28,8 @@ _ROUND_OFF = 1e-9  # the same, of the largest forces on the way
 _DAMPING = 10.0  # ratio of one damping to the next
 _LEAST_DAMPING = 1e-12  # the last damping over the first, as nothing else may resist
 _BALANCED = 1e-6  # part of forces below which their resultant on free motions is none
+_UNHELD = 0.1  # part of forces that nothing holds however far bodies go
+_DIGITS = 6  # of normals that are not one
 _LOOSE = 1e-6  # part of a free motion that a body has at least which takes part in it
 
 
@@ -76,8 +79,8 @@ class RigidMotions:
         self.free = np.tensordot(free[:k].T, self._modes, 1)
         self.levels = np.zeros((free.shape[1], len(drives.rate)))
         self.levels[:, drives.unknown[moving]] = free[k:].T * drives.weight[moving]
-        of_bodies = np.abs(free[:k]).reshape(len(bodies), -1)
-        parts = of_bodies.max(axis=1, initial=0.0)
+        self._of_bodies = free[:k].T.reshape(-1, len(bodies), k // len(bodies))
+        parts = np.abs(self._of_bodies).max(axis=(0, 2), initial=0.0)
         self.loose = [body for body, part in zip(bodies, parts, strict=True) if part > _LOOSE]
         lengths = [surface.facet_lengths().mean() for surface in contact.surfaces]
         self._facet = min(lengths, default=np.inf)
@@ -216,6 +219,60 @@ class RigidMotions:
             if push > _BALANCED * size:
                 pushes.append(push)
         return min(pushes, default=0.0)
+
+    def unheld(self, load: float, *, tied: bool = False) -> str:
+        """The body that forces at the ``load`` push along a line on which no contact is in its way,
+        however far it goes; "" without one. Collective.
+
+        Translations of the bodies are sought that the forces drive most (a linear program), of
+        which none goes against the normal of a facet of a contact. Friction counts as a tie; all
+        contacts do where bodies are ``tied``.
+        """
+        from scipy.optimize import linprog  # few runs pay for it
+
+        applied = self._applied(load, self.drives.values(load))
+        d = self.drives.dimension
+        turns = self._of_bodies[:, :, d:]
+        if not applied.any() or not turns.size:  # around an axis
+            return ""
+        stands: list[Array] = [turns.reshape(len(applied), -1).T]
+        opens: list[Array] = [np.zeros((1, len(applied)))]
+        for interface in self.contact.interfaces:
+            first, second = interface.surfaces
+            apart = self._velocities(second) - self._velocities(first)
+            law = interface.pairs[0].law
+            if tied or law.has_friction or not law.unilateral:
+                stands.append(apart.T)
+                continue
+            for surface, along in ((first, apart), (second, -apart)):
+                if isinstance(surface, Surface):
+                    opens.append(self._normals(surface) @ along.T)
+        found = linprog(
+            -applied,
+            A_ub=-np.concatenate(opens),
+            b_ub=np.zeros(sum(map(len, opens))),
+            A_eq=np.concatenate(stands),
+            b_eq=np.zeros(sum(map(len, stands))),
+            bounds=(-1, 1),
+        )
+        if found.x is None or applied @ found.x <= _UNHELD * np.linalg.norm(applied):
+            return ""
+        moved = np.tensordot(found.x, self._of_bodies, 1)
+        farthest = np.abs(moved).max(axis=1).argmax()
+        return str(self.problem.bodies[farthest].name)
+
+    def _velocities(self, surface: Surface | RigidSurface) -> Array:
+        """Translation ``(r, d)`` of the body of a ``surface`` in each free motion."""
+        if isinstance(surface, RigidSurface):
+            return np.asarray(self.levels @ surface.rate)
+        body = self.problem.bodies.index(self.problem.body_of(surface.name))
+        return np.asarray(self._of_bodies[:, body, : self.drives.dimension])
+
+    def _normals(self, surface: Surface) -> Array:
+        """The different outward normals ``(k, d)`` of a ``surface``, over all ranks."""
+        own = surface.outward.reshape(-1, self.drives.dimension)
+        of_ranks = self.comm.allgather(np.unique(own.round(_DIGITS), axis=0))
+        return np.unique(np.concatenate(of_ranks), axis=0)
 
     def _shortened(self, step: Array, openings: list[Array]) -> Array:
         """The ``step``, in which no gap changes by more than a facet."""

@@ -163,6 +163,12 @@ class LoadPath:
         if self.coarse is not None and not self.coarse.follow():
             self.coarse = None
 
+    def unheld(self, load: float, *, tied: bool = False) -> str:
+        """The body that nothing can hold at the ``load``, not even if all contacts are ``tied``; ""
+        without one."""
+        springs = self.equilibrium.springs
+        return springs.rigid.unheld(load, tied=tied) if springs else ""
+
     def take_back(self) -> None:
         """Undo the last attempt."""
         self.equilibrium.restore(self.at.load, self.state)

@@ -100,6 +100,11 @@ def march(
         passed = 0.0  # part of the output step
         just_cut = False
         record = Step(target)
+        nearest = begun + rules.minimum * (target - begun)
+        unheld = path.unheld(nearest, tied=True)
+        if unheld:
+            result = Newton(False, "", 0, [], floating=unheld)
+            raise StepFailure(_why(result, path.equilibrium.problem, target, begun, size), record)
         while passed < 1:
             end = passed + size if passed + size <= 1 - _SLIVER else 1.0
             load = target if end == 1 else begun + end * (target - begun)
@@ -108,7 +113,10 @@ def march(
             attempted(load, result.iterations)
             if not result.converged:
                 path.take_back()
-                if size <= rules.minimum:
+                nearest = at.load + rules.minimum * (target - begun)
+                unheld = path.unheld(nearest)
+                if size <= rules.minimum or unheld:
+                    result.floating = unheld or result.floating
                     problem = path.equilibrium.problem
                     raise StepFailure(_why(result, problem, load, at.load, size), record)
                 size = max(rules.minimum, rules.cutback * size)
@@ -128,7 +136,7 @@ def march(
 def _why(result: Newton, problem: Problem, load: float, held: float, size: float) -> str:
     """Why the step to ``load`` failed, in one sentence."""
     name = problem.load_name
-    cut = "no smaller step is allowed"
+    cut = "no smaller step helps" if result.floating else "no smaller step is allowed"
     if size < 1:
         cut = f"the step was cut to {size:.2g} of an output step"
     last_held = f"{cut}; the last load that held is {name} = {held:.6g}"

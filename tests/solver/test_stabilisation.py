@@ -326,6 +326,55 @@ def test_a_step_in_which_springs_alone_hold_a_body_is_not_accepted(kinematics):
     assert np.abs(settled).max() < 1e-3
 
 
+@pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.parametrize(
+    ("direction", "force", "floor", "most"),
+    [("y", -1.0, False, 0), ("y", 1.0, True, 1), ("x", 1.0, True, 1)],
+    ids=["both float", "lifted", "pushed along"],
+)
+def test_what_no_contact_can_hold_is_refused_at_once(in_space, direction, force, floor, most):
+    """A force that no contact of whatever pressure balances, without smaller and smaller steps."""
+    if in_space:
+        mesh = archord.boxes({"base": (0, 0, 0, 2, 1, 2), "lid": (0.5, 1, 0.5, 1, 1, 1)}, 1.0)
+    else:
+        mesh = rectangles({"base": (0.0, 0.0, 2.0, 1.0), "lid": (0.5, 1.0, 1.0, 1.0)}, size=0.5)
+    problem = Problem(
+        mesh,
+        [Body(name, Elastic(210e3, 0.3)) for name in ("base", "lid")],
+        [Interaction("contact", ("lid bottom", "base top"))],
+        [Support("base bottom")] if floor else [],
+        [Load("load", on="lid top", direction=direction, force=force)],
+    )
+    with pytest.raises(
+        StepFailure, match=r"no contact carries '(lid|base)'.*no smaller step helps"
+    ) as raised:
+        System(problem).solve([1.0])
+    assert raised.value.attempt.cutbacks <= most
+
+
+def test_a_force_across_a_smooth_contact_may_be_held_by_a_wall():
+    """Where another contact is in the way, or friction, nothing is refused before it is tried."""
+    boxes = {
+        "base": (0.0, 0.0, 3.0, 1.0),
+        "lid": (0.5, 1.0, 1.0, 1.0),
+        "wall": (1.6, 1.0, 1.0, 1.0),
+    }
+    contacts = [
+        Interaction("contact", ("lid bottom", "base top")),
+        Interaction("stop", ("lid right", "wall left")),
+    ]
+    problem = Problem(
+        rectangles(boxes, size=0.5),
+        [Body(name, Elastic(210e3, 0.3)) for name in boxes],
+        contacts,
+        [Support("base bottom"), Support("wall right"), Support("lid left", fixed="y")],
+        [Load("load", on="lid left", direction="x", force=1.0)],
+    )
+    system = System(problem)
+    system.solve([1.0])
+    assert system.contact.resultant("stop")[0] == pytest.approx(1.0, rel=1e-6)
+
+
 def carried_by_base(kinematics: str, length: float) -> tuple[float, float]:
     """What the base lacks of the force on a block that nothing but contact holds, over this force;
     and how far the block goes, over the ``length`` of its edges."""
