@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.rectangles import as_drawn
 from archord.report.errors import InputError
 
 _SIDES = ("left", "right", "bottom", "top", "back", "front")  # as gmsh numbers them
@@ -62,7 +63,10 @@ def boxes(
     if kind not in ("tetrahedra", "hexahedra"):
         said = f'must be "tetrahedra" or "hexahedra", not {kind!r}'
         raise InputError(f"archord.boxes: kind {said}.")
-    return gmsh_to_mesh(comm, partial(_drawn, boxes, size, kind == "hexahedra"))
+    drawn, drawn_size, unit = as_drawn(boxes, size)
+    made = gmsh_to_mesh(comm, partial(_drawn, drawn, drawn_size, kind == "hexahedra"))
+    made.mesh.geometry.x[:] *= unit
+    return made
 
 
 def _drawn(boxes: Mapping[str, Box], size: float, hexahedra: bool, gmsh: Any) -> None:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import batched, chain
 
 from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import mesh_joint
-from archord.geometry.shapes.sketch import Bore, PinPart, Sketch, around
+from archord.geometry.shapes.sketch import Bore, PinPart, Sketch, around, in_radii
 
 _LAYERS = 2  # across a wall, at least
 _SLENDER = 4.0  # longest element of a wall over its thickness
@@ -40,9 +41,10 @@ def bushing(
     Sets: "pin", "flat" (the pin's line across the axis, see `lug`), "sleeve 1 inside", "sleeve 1
     outside", ..., "bore", "outer edge" and "axis" (y = 0).
     """
-    rings = [(inner / radius, outer / radius) for inner, outer in rings]
+    size, *radii = in_radii(radius, element_size, *chain.from_iterable(rings))
+    rings = list(batched(radii, 2))
     longest = [longest_edge(outer - inner) for inner, outer in rings]
-    size = min(element_size / radius, *longest)
+    size = min(size, *longest)
     within = [1.0, *(outer for _, outer in rings)]
     gaps = [touching * max(inner - r, 0.0) for (inner, _), r in zip(rings, within, strict=False)]
     shifts = [sum(gaps[i:]) for i in range(len(rings) + 1)]

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import mesh_joint
 from archord.geometry.shapes.lug import ACROSS, draw_plate, plate_size, plates_of, size_around
-from archord.geometry.shapes.sketch import PinPart, Sketch
+from archord.geometry.shapes.sketch import PinPart, Sketch, in_radii
 from archord.geometry.shapes.solid_clevis import solid_clevis
 
 _GAP = 1.0  # between the plates, in radii
@@ -45,10 +45,10 @@ def clevis(
     if space is not None:
         parts = (comm, radius, clearance, inner, outer, element_size, growth)
         return solid_clevis(*parts, space=space)
-    hole = (radius + clearance) / radius
+    hole, size = in_radii(radius, radius + clearance, element_size)
     plates = plates_of({"inner": inner, "outer": outer}, radius, hole)
     places = {"inner": 0.0, "outer": plates["inner"].tip + _GAP + plates["outer"].back}
-    size = min(element_size / radius, *(plate.ligament / ACROSS for plate in plates.values()))
+    size = min(size, *(plate.ligament / ACROSS for plate in plates.values()))
     bodies = [f"{name}{part}" for name in plates for part in (" pin", "")]
     sketch = Sketch(bodies, [*(f"{name} {part}" for name in plates for part in _SETS), "axis"])
     for name, plate in plates.items():

@@ -19,7 +19,7 @@ from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.bushing import between, draw_ring, longest_edge
 from archord.geometry.shapes.joint_mesh import mesh_joint
-from archord.geometry.shapes.sketch import Bore, PinPart, Sketch, around
+from archord.geometry.shapes.sketch import Bore, PinPart, Sketch, around, in_radii
 
 ACROSS = 3  # elements across the narrowest ligament, at least
 _SLEEVE = ["bushing inside", "bushing outside"]
@@ -50,8 +50,9 @@ def plates_of(
     """The plates of these ``outlines`` in radii of the pin, as the ``hole`` is."""
     plates = {}
     for name, keys in outlines.items():
-        side, tip, back = (keys[key] / radius for key in ("width", "edge_distance", "length"))
-        plates[name] = Plate(hole, side / 2, tip, back, keys["end"] == "round")
+        lengths = (keys["width"] / 2, keys["edge_distance"], keys["length"])
+        side, tip, back = in_radii(radius, *lengths)
+        plates[name] = Plate(hole, side, tip, back, keys["end"] == "round")
     return plates
 
 
@@ -129,13 +130,13 @@ def lug(
     pin and the bushing, whose outer radius exceeds the hole's by the ``interference``. A pin that
     is not ``touching`` is concentric.
     """
-    bore, side, tip, back = (
-        v / radius for v in (radius + clearance, width / 2, edge_distance, length)
-    )
-    outer = bore + (wall or 0.0) / radius
-    hole = outer - interference / radius
+    lengths = radius + clearance, width / 2, edge_distance, length, element_size
+    more = wall or 0.0, interference
+    bore, side, tip, back, size, thickness, overlap = in_radii(radius, *lengths, *more)
+    outer = bore + thickness
+    hole = outer - overlap
     plate = Plate(hole, side, tip, back, end == "round")
-    size = min(element_size / radius, plate.ligament / ACROSS)
+    size = min(size, plate.ligament / ACROSS)
     x = touching * max(bore - 1, 0.0)
     bodies = ["pin", "lug"]
     sets = ["pin", "hole", "flat", "clamp", "axis", "end", "sides"]

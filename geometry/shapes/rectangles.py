@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
@@ -13,6 +14,8 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 _SIDES = ("bottom", "right", "top", "left")  # as gmsh numbers them
 Box = tuple[float, float, float, float]
+_Box = TypeVar("_Box", bound=tuple[float, ...])
+_SHORTEST = 0.3  # that the longest side is drawn
 
 
 def rectangles(
@@ -47,7 +50,31 @@ def rectangles(
     >>> list(mesh.facet_sets)
     ['block bottom', 'block right', 'block top', 'block left']
     """
-    return gmsh_to_mesh(comm, partial(_drawn, boxes, size))
+    drawn, drawn_size, unit = as_drawn(boxes, size)
+    made = gmsh_to_mesh(comm, partial(_drawn, drawn, drawn_size))
+    made.mesh.geometry.x[:] *= unit
+    return made
+
+
+def as_drawn(boxes: Mapping[str, _Box], size: float) -> tuple[dict[str, _Box], float, float]:
+    """``boxes`` and ``size`` as gmsh is to draw them: alike for millimetres, metres and
+    micrometres, as the last bits decide which triangles it makes; and the unit of the drawing, a
+    power of 1000.
+
+    Numbers whose longest side is between 0.3 and 300 stay as they are.
+    """
+    longest = max((side for box in boxes.values() for side in box[len(box) // 2 :]), default=1.0)
+    if not (0 < longest < math.inf):
+        return dict(boxes), size, 1.0
+    power = math.floor(math.log(longest / _SHORTEST, 1000))
+    if power == 0:
+        return dict(boxes), size, 1.0
+
+    def drawn(length: float) -> float:
+        return float(f"{length * 1000.0**-power:.15g}")
+
+    scaled: Any = {name: tuple(map(drawn, box)) for name, box in boxes.items()}
+    return scaled, drawn(size), 1000.0**power
 
 
 def _drawn(boxes: Mapping[str, Box], size: float, gmsh: Any) -> None:

@@ -1,8 +1,8 @@
 """A joint in a plane as gmsh is to draw it: points, lines, arcs, faces, and the sets of lines.
 
-Lengths are in radii of the pin whatever the units of the scene, so meshes depend on them by
-round-off alone. A last bit may decide which triangles gmsh makes, which changed forces of a lug by
-1e-6. Shapes in space have no such bits (`solids.py`).
+Lengths are in radii of the pin, to the last bit the same in all units of the scene (`in_radii`): a
+last bit may decide which triangles gmsh makes, which changed forces of a lug by 1e-6. Shapes in
+space have no such bits (`solids.py`).
 """
 
 from __future__ import annotations
@@ -11,9 +11,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from archord.geometry.meshes.refine import Circle
 
 Place = tuple[float, float]
+_RADII = np.arange(1000, 500, -1) / 100  # tried for the pin
+_MOST_PLACES = 12  # of decimals that lengths are then
+_ROUND_OFF = 4e-15  # of lengths
 PinPart = Literal["half", "whole", "none"]
 
 
@@ -107,6 +112,23 @@ class Sketch:
             if bore:
                 paths[inside.facets] = self.path(pin, top_of_bore, side_of_bore, on=inside)
             self.face(pin, **paths)
+
+
+def in_radii(radius: float, *lengths: float) -> list[float]:
+    """The ``lengths`` over the ``radius``, to the last bit the same in all units of length.
+
+    Quotients depend on units by round-off. So they are taken of decimals as in a drawing: with the
+    radius, of 10.00, 9.99, ..., with which it and they have the fewest decimal places.
+    """
+    in_drawing = np.outer(_RADII, np.array([radius, *lengths]) / radius)
+    for places in range(_MOST_PLACES + 1):
+        decimals = in_drawing.round(places)
+        off = np.abs(in_drawing - decimals).max(axis=1)
+        are_decimals = off <= _ROUND_OFF * in_drawing.max()
+        if are_decimals.any():
+            break
+    r, *drawn = decimals[are_decimals.argmax()].tolist()
+    return [length / r for length in drawn]
 
 
 def around(x: float) -> str:
