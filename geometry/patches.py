@@ -231,7 +231,7 @@ class Patches:
         by default, or `NONE`). Raises `ProjectionError` for a point that found none.
         """
         home = self.nearest_facet(x, displacement, outward) if start is None else start
-        margin = np.where(self.ends, _BORDER_MARGIN, 0.0)
+        margin = np.where(self.beyond < 0, _BORDER_MARGIN, 0.0)
         if faced is None:
             faced = np.full(len(x), EVERY)
         partners = self._project(x, outward, displacement, home, faced, margin, _MOST_FACETS)

@@ -268,3 +268,27 @@ def test_continued_facets_keep_their_points(cell):
     found = p.continued(moved, outward, np.zeros_like(p.X), facet)
     assert (found.facet == facet).all()
     np.testing.assert_allclose(found.point, moved * [1, 1, 0], atol=1e-12)
+
+
+@every_cell
+def test_a_surface_ends_at_sharp_edges(cell):
+    """Facets go to the ridge of a roof and no farther: beside it points have the distance of their
+    own side, and above it none has a partner."""
+
+    def roof(s, t):
+        return np.stack([s, t, -np.abs(s - 0.5)], axis=-1)
+
+    p = patches(roof, cell, n=4, degree=1)
+    assert p.ends.sum() == 4 * 4 + 2 * 4
+    t = np.linspace(0.1, 0.9, 7)
+    away = 0.003
+    for side in (-1.0, 1.0):
+        normal = np.tile([side, 0.0, 1.0], (7, 1)) / np.sqrt(2)
+        foot = roof(np.full(7, 0.5 + side * away), t)
+        for gap in (-0.001, 0.001, 0.01):
+            found = closest(p, foot + gap * normal, -normal)
+            assert found.found.all()
+            np.testing.assert_allclose(found.point, foot, rtol=0, atol=1e-12)
+    up = np.tile([0.0, 0.0, 1.0], (7, 1))
+    above = roof(np.full(7, 0.5), t) + 0.01 * up
+    assert not closest(p, above, -up).found.any()
