@@ -162,11 +162,8 @@ def table_of(found: list[Off]) -> Table:
     kinds = defaultdict(list)
     for one in found:
         plane = one.kind.split()[0]
-        soft = ", soft pin" if "soft" in one.kind else ""
-        hardens = ", hardens" if "hardens" in one.kind else ""
-        friction = ", friction" if "friction" in one.kind else ""
-        large = ", large strain" if "large strain" in one.kind else ""
-        together = f"{plane} yielding{soft}{hardens}{friction}{large}, all"
+        _, *marks = one.kind.split(", ")
+        together = ", ".join([f"{plane} yielding", *marks, "all"])
         if "elastic" in one.kind:
             together = one.kind
         for kind in {one.kind, together, "all"}:
@@ -186,15 +183,15 @@ def table_of(found: list[Off]) -> Table:
 def largest_table(found: list[Off]) -> Table:
     """The largest error of P from 0.1 to 2 dR of each joint, in per cent: what half and nine in ten
     of the joints stay below, and the largest of all."""
-    table = Table("largest error of P, 0.1 to 2 dR", "number", "half", "9 in 10", "all", left=1)
+    shares = ("half {:.2f}", "9 in 10 {:.2f}", "all {:.2f}")
+    table = Table("largest error of P, 0.1 to 2 dR", "number", *shares, left=1)
     kinds = defaultdict(list)
     for one in found:
         usual = one.errors["P 0.1 to 2 dR"]
         if len(usual):
             kinds[one.kind.split()[0]].append(float(np.abs(usual).max()))
     for plane, largest in sorted(kinds.items()):
-        below = np.quantile(largest, [0.5, 0.9, 1.0])
-        table.add(plane, len(largest), *(f"{value:.2f}" for value in below))
+        table.add(plane, len(largest), *np.quantile(largest, [0.5, 0.9, 1.0]))
     return table
 
 

@@ -45,10 +45,11 @@ def mesh_table(folder: Path) -> Table:
             if size > min(solved):
                 off = 100 * (nodes[usual, 1] / finest[usual, 1] - 1)
                 errors[kind_of(joint_numbers(joint)), size].append(off)
-    table = Table("joints", "elements over R", "number", "mean", "rms/largest", left=1)
+    columns = ("elements over R {:g}", "number", "mean {:+.2f}", "rms/largest")
+    table = Table("joints", *columns, left=1)
     for (kind, size), parts in sorted(errors.items()):
         off = np.concatenate(parts)
-        table.add(kind, f"{size:g}", len(parts), f"{off.mean():+.2f}", rms_largest(off))
+        table.add(kind, size, len(parts), off.mean(), rms_largest(off))
     return table
 
 

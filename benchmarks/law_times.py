@@ -107,10 +107,10 @@ def first_laws() -> Table:
             command = [sys.executable, "-c", program]
             done = subprocess.run(command, capture_output=True, text=True, check=True)
             times[plane, body].append([1e3 * float(word) for word in done.stdout.split()])
-    table = Table("ms", "imports", "first law", left=1)
+    table = Table("ms", "imports {:.0f}", "first law {:.0f}", left=1)
     for case in cases:
         columns = zip(*times[case], strict=True)
-        table.add(" ".join(case), *(f"{statistics.median(own):.0f}" for own in columns))
+        table.add(" ".join(case), *map(statistics.median, columns))
     return table
 
 

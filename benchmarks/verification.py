@@ -40,18 +40,12 @@ def _solve(scene: Scene) -> tuple[list[Record], str]:
 
 def main() -> None:
     """Solve the cases and print the table."""
-    table = Table("what", "reference", "by", "archord", "relative difference", "cost")
+    numbers = ("reference {:.7g}", "by", "archord {:.7g}", "relative difference {:.1e}")
+    table = Table("what", *numbers, "cost")
     runs = []  # whose balances are told: the Hertzian one has a single step
 
     def compare(what: str, reference: float, source: str, ours: float, cost: str) -> None:
-        table.add(
-            what,
-            f"{reference:.7g}",
-            source,
-            f"{ours:.7g}",
-            f"{abs(ours / reference - 1):.1e}",
-            cost,
-        )
+        table.add(what, reference, source, ours, abs(ours / reference - 1), cost)
 
     for kinematics, force, source in (
         ("current", 0.0127785, "GetFEM"),

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 
 import basix
 import numpy as np
-import numpy.typing as npt
 
 from archord.geometry.vectors import crossed
 from archord.kernels.compat import cell_degree, cell_nodes
-from archord.materials.kinematics import Array
+from archord.materials.kinematics import Array, Ints
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
@@ -130,7 +129,7 @@ class CellBasis:
         return np.abs(self.determinant)
 
 
-def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
+def cell_basis(mesh: Mesh, degree: int, cells: Ints, X: Array) -> CellBasis:
     """Basis of the given ``degree`` at the reference points ``X`` ``(q, d)`` of ``cells``, or ``(n,
     q, d)`` of each."""
     geometry = tabulate(mesh.basix_cell(), cell_degree(mesh), X)

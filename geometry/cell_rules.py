@@ -6,28 +6,26 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import basix
 import numpy as np
-import numpy.typing as npt
 
 from archord.geometry.basis import bulk_quadrature_degree
+from archord.materials.kinematics import Bools, Ints
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
-
-Index = npt.NDArray[np.integer]
 
 
 class CellRule(NamedTuple):
     """A rule of this ``degree``, and which cells ``(n_owned,)`` of this rank have it."""
 
     degree: int
-    chosen: npt.NDArray[np.bool_]
+    chosen: Bools
 
-    def among(self, cells: Index) -> Index:
+    def among(self, cells: Ints) -> Ints:
         """Those of the owned ``cells`` that have the rule."""
         return cells[self.chosen[cells]]
 
 
-def cell_rules(mesh: Mesh, degree: int, in_contact: Index) -> list[CellRule]:
+def cell_rules(mesh: Mesh, degree: int, in_contact: Ints) -> list[CellRule]:
     """The rules for displacements of this ``degree``: the usual one, and where that is a reduced
     one also the full one, of the cells ``in_contact`` and of columns of single cells."""
     topology = mesh.topology
@@ -42,7 +40,7 @@ def cell_rules(mesh: Mesh, degree: int, in_contact: Index) -> list[CellRule]:
     return [CellRule(usual, ~needs_full), CellRule(full, needs_full)]
 
 
-def _in_columns(mesh: Mesh) -> npt.NDArray[np.bool_]:
+def _in_columns(mesh: Mesh) -> Bools:
     """Whether owned hexahedra ``(n_owned,)`` have two pairs of opposite facets on the boundary:
     neighbours in one direction do not suppress all deformations without energy."""
     topology = mesh.topology

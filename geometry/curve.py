@@ -10,16 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.geometry.vectors import unit
 from archord.kernels.compiled import library, pointer
+from archord.materials.kinematics import Bools, Ints
 from archord.materials.material import Array
 from archord.report.errors import is_number, require_between, require_of
 
-Index = npt.NDArray[np.integer]
+Index = Ints
 
 _SOURCE = Path(__file__).with_name("closest_point.c")
 _END_MARGIN = (
@@ -41,6 +42,19 @@ class ProjectionError(RuntimeError):
     """A point that has a partner on the opposite curve did not find it."""
 
 
+def lost_points(count: int, first: Array) -> ProjectionError:
+    """The error of so many points, the ``first`` of them at a place ``(d,)``."""
+    at = ", ".join(f"{coordinate:g}" for coordinate in first)
+    return ProjectionError(f"{count} contact points found no closest point, the first at ({at})")
+
+
+def replace_some(partners: Any, chosen: Bools, others: Any) -> None:
+    """Put ``others``, of the ``chosen`` points ``(m,)`` alone, in the place of their ``partners``,
+    both a `Projection` or both a `PatchProjection`."""
+    for name, values in vars(partners).items():
+        values[chosen] = getattr(others, name)
+
+
 @dataclass(frozen=True)
 class Projection:
     """Closest points ``y`` on an opposite curve of ``m`` points ``x``, and what their linearisation
@@ -59,8 +73,8 @@ class Projection:
     bend: Array  # (m,) n . d2y / d xi2
     shape: Array  # (m, k) shape functions of the nodes that carry y
     slope: Array  # (m, k) their derivatives in xi
-    slides: npt.NDArray[np.bool_]  # (m,)
-    found: npt.NDArray[np.bool_]  # (m,)
+    slides: Bools  # (m,)
+    found: Bools  # (m,)
     nodes: Index  # (m, k) the nodes that carry y
 
     @property
@@ -95,7 +109,7 @@ def lagrange(degree: int) -> Array:
     return np.ascontiguousarray(inverse.T)
 
 
-def in_pieces(start: np.ndarray, end: np.ndarray, height: Array) -> np.ndarray:
+def in_pieces(start: Ints, end: np.ndarray, height: Array) -> Ints:
     """Order that links facets end to start: open pieces first, closed ones from their facet of
     least ``height`` on."""
     starting_at = {int(node): facet for facet, node in enumerate(start)}
@@ -244,11 +258,10 @@ class Curve:
         lost = ~partners.found
         if start is not None and self.n_pieces > 1 and lost.any():
             elsewhere = self.closest_point(x[lost], outward[lost], displacement, faced=faced[lost])
-            for name, values in vars(partners).items():
-                values[lost] = getattr(elsewhere, name)
+            replace_some(partners, lost, elsewhere)
         return partners
 
-    def _leaves(self, home: Index, partners: Projection) -> npt.NDArray[np.bool_]:
+    def _leaves(self, home: Index, partners: Projection) -> Bools:
         """Which points ``(m,)`` have partners at an end of the facets around ``home`` beyond which
         the curve goes on."""
         before = self.before[home]
@@ -298,10 +311,7 @@ class Curve:
             *map(pointer, (*results, first_lost)),
         )
         if n_lost:
-            at = "({:g}, {:g})".format(*x[first_lost[0]])
-            raise ProjectionError(
-                f"{n_lost} contact points found no closest point, the first at {at}"
-            )
+            raise lost_points(n_lost, x[first_lost[0]])
         on_nodes[:] = self.connectivity[partners.facet]
         return partners
 

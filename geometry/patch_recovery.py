@@ -19,6 +19,7 @@ import basix
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.materials.kinematics import Ints
 
 # squared distance over the farthest point's, within which points of wide patches count alike
 _CORE = 0.05
@@ -61,8 +62,8 @@ class PatchRecovery:
         self,
         kind: basix.CellType,
         nodes: Array,
-        cells: np.ndarray,
-        between: Sequence[np.ndarray],
+        cells: Ints,
+        between: Sequence[Ints],
         points: Array,
         degree: int,
     ) -> None:
@@ -87,7 +88,7 @@ class PatchRecovery:
         self._fit_patches(ray, self._patch[vertex], alone[vertex])
         self._mean_of_vertices(nodes, between, wanted, source)
 
-    def _fit_patches(self, ray: Array, patch: np.ndarray, wide: np.ndarray) -> None:
+    def _fit_patches(self, ray: Array, patch: Ints, wide: np.ndarray) -> None:
         """The fits of all patches by the ``ray`` ``(p, q, d)`` from their vertices to their points;
         in ``wide`` ones ``(p,)`` near points count more."""
         is_point = self._is_point[self._cell]
@@ -109,7 +110,7 @@ class PatchRecovery:
     def _mean_of_vertices(
         self,
         nodes: Array,
-        between: Sequence[np.ndarray],
+        between: Sequence[Ints],
         wanted: np.ndarray,
         source: np.ndarray,
     ) -> None:
@@ -150,7 +151,7 @@ class PatchRecovery:
         return np.add.reduceat(parts[:, 0], self._start)
 
 
-def _powers(degree: int, dimension: int) -> np.ndarray:
+def _powers(degree: int, dimension: int) -> Ints:
     """The powers ``(c, d)`` of all monomials up to a ``degree``, the lower degrees first."""
     powers = np.indices((degree + 1,) * dimension).reshape(dimension, -1).T
     total = powers.sum(axis=1)
@@ -159,9 +160,7 @@ def _powers(degree: int, dimension: int) -> np.ndarray:
     return powers[chosen]
 
 
-def _boundary(
-    kind: basix.CellType, cells: np.ndarray, n_vertices: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _boundary(kind: basix.CellType, cells: Ints, n_vertices: int) -> tuple[np.ndarray, np.ndarray]:
     """The edges ``(e, 2)`` between vertices, and which vertices ``(n_vertices,)`` lie on the
     boundary."""
     topology = basix.topology(kind)
@@ -172,7 +171,7 @@ def _boundary(
     return edges, outside
 
 
-def _distinct(cells: np.ndarray, parts: list[list[int]]) -> tuple[np.ndarray, np.ndarray]:
+def _distinct(cells: Ints, parts: list[list[int]]) -> tuple[Ints, Ints]:
     """The edges or faces ``(e, v)`` that ``cells`` have as these ``parts``, by their vertices in
     rising order, and how many cells ``(e,)`` have each."""
     vertices = cells[:, np.array(parts)]
@@ -180,7 +179,7 @@ def _distinct(cells: np.ndarray, parts: list[list[int]]) -> tuple[np.ndarray, np
     return np.unique(rising, axis=0, return_counts=True)
 
 
-def _inward(edges: np.ndarray, outside: np.ndarray) -> np.ndarray:
+def _inward(edges: Ints, outside: np.ndarray) -> Ints:
     """Pairs ``(k, 2)`` of a vertex on the boundary and a neighbour inside."""
     both = np.concatenate([edges, edges[:, ::-1]])
     begins_outside = outside[both[:, 0]]
@@ -188,9 +187,7 @@ def _inward(edges: np.ndarray, outside: np.ndarray) -> np.ndarray:
     return both[begins_outside & ends_inside]
 
 
-def _patches(
-    cells: np.ndarray, outside: np.ndarray, alone: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _patches(cells: Ints, outside: np.ndarray, alone: np.ndarray) -> tuple[Ints, Ints]:
     """The vertices and the cells ``(p,)`` of their patches: one layer around vertices inside, two
     around those on the boundary that are ``alone``."""
     n_cells, k = cells.shape
@@ -208,7 +205,7 @@ def _patches(
     return np.append(vertex[inside], wide_vertex), np.append(cell[inside], wide_cell)
 
 
-def _joined(keys: np.ndarray, of: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _joined(keys: Ints, of: Ints, items: Ints) -> tuple[Ints, Ints]:
     """All ``items`` ``of`` each of ``keys``, in turn, and the place in ``keys`` of each."""
     order = np.argsort(of, kind="stable")
     rising = of[order]

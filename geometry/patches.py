@@ -13,12 +13,12 @@ from pathlib import Path
 
 import basix
 import numpy as np
-import numpy.typing as npt
 
 from archord.geometry.basis import Array, element_of
-from archord.geometry.curve import EVERY, Index, ProjectionError
+from archord.geometry.curve import EVERY, Index, lost_points, replace_some
 from archord.geometry.vectors import unit
 from archord.kernels.compiled import library, pointer, structure
+from archord.materials.kinematics import Bools
 
 _SOURCE = Path(__file__).with_name("patches.c")
 _BORDER_MARGIN = 0.05  # in xi, by which facets are continued beyond a free border
@@ -54,7 +54,7 @@ class PatchProjection:
     shape: Array  # (m, k) shape functions of the nodes that carry y
     slope: Array  # (m, 2, k) their derivatives in xi
     along: Array  # (m, 2, 2)
-    found: npt.NDArray[np.bool_]  # (m,)
+    found: Bools  # (m,)
     nodes: Index  # (m, k) the nodes that carry y
 
     @property
@@ -238,8 +238,7 @@ class Patches:
         lost = ~partners.found
         if start is not None and lost.any():
             elsewhere = self.closest_point(x[lost], outward[lost], displacement, faced=faced[lost])
-            for name, values in vars(partners).items():
-                values[lost] = getattr(elsewhere, name)
+            replace_some(partners, lost, elsewhere)
         return partners
 
     def continued(
@@ -326,10 +325,7 @@ class Patches:
         kernel = library(_SOURCE).closest_on_patches
         n_lost = kernel(patches, len(x), *given, others, *found)
         if n_lost:
-            at = "({:g}, {:g}, {:g})".format(*x[first_lost[0]])
-            raise ProjectionError(
-                f"{n_lost} contact points found no closest point, the first at {at}"
-            )
+            raise lost_points(n_lost, x[first_lost[0]])
         on_nodes[:] = self.connectivity[partners.facet]
         return partners
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.geometry.basis import Array, CellBasis
 from archord.kernels.compiled import library, pointer
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import Ints, Kinematics
 
 _SOURCE = Path(__file__).with_name("strain.c")
 _ON_AXIS = 1e-9  # radius over the largest one, below which a point lies on the axis
 
 
-def strain_terms(kinematics: Kinematics, *, large: bool = False) -> npt.NDArray[np.int32]:
+def strain_terms(kinematics: Kinematics, *, large: bool = False) -> Ints:
     """A component of the displacement, a derivative, and the component of the strain, or of the
     gradient at ``large`` strain, that gets their product ``(t, 3)``."""
     places = np.arange(len(kinematics.terms)) if large else kinematics.small.argmax(axis=0)
@@ -36,7 +35,7 @@ class PointStrain:
         self,
         kinematics: Kinematics,
         basis: CellBasis,
-        dofs: npt.NDArray[np.int32],
+        dofs: Ints,
         *,
         large: bool = False,
     ) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 
 
@@ -39,7 +39,7 @@ class Hardening(Protocol):
         """Plastic work density: the integral of `stress` from 0."""
         ...
 
-    def at(self, points: npt.NDArray[np.integer]) -> Hardening:
+    def at(self, points: Ints) -> Hardening:
         """The law of these ``points`` of an array, where each has its own."""
         return self
 
@@ -63,7 +63,7 @@ class Scaled(Hardening):
         """Plastic work density."""
         return self.factor * self.law.work(peeq)
 
-    def at(self, points: npt.NDArray[np.integer]) -> Scaled:
+    def at(self, points: Ints) -> Scaled:
         """Of these points."""
         return Scaled(self.law, self.factor[points])
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening, LinearHardening
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array, Material
 from archord.materials.return_map import PlasticState, radial_return, return_map
 
@@ -65,7 +65,7 @@ class J2Material(Elastic):
             return radial_return(strain, state, self, *linear)
         return return_map(strain, state, self, self.hardening)
 
-    def flows(self, old: PlasticState, new: PlasticState) -> npt.NDArray[np.bool_]:
+    def flows(self, old: PlasticState, new: PlasticState) -> Bools:
         """The points ``(n,)`` whose PEEQ has grown."""
         return new.peeq > old.peeq
 

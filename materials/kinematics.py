@@ -20,6 +20,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.floating]
 Arrays = dict[str, Array]  # by name
+Ints = npt.NDArray[np.integer]  # numbers of nodes, cells, steps
+Bools = npt.NDArray[np.bool_]  # which of them
 Plane = Literal["strain", "stress", "axisymmetric", "space"]
 
 

@@ -15,9 +15,8 @@ from dataclasses import is_dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
-import numpy.typing as npt
 
-from archord.materials.kinematics import Array, Arrays, Kinematics, Plane
+from archord.materials.kinematics import Array, Arrays, Bools, Kinematics, Plane
 
 __all__ = ["Array", "Arrays", "Material", "Plane", "Points", "State"]
 State = Any
@@ -85,7 +84,7 @@ class Material(Protocol):
         """
         ...
 
-    def flows(self, old: State, new: State) -> npt.NDArray[np.bool_] | bool:
+    def flows(self, old: State, new: State) -> Bools | bool:
         """Which points ``(n,)`` left the `elastic_tangent` on the way from the ``old`` state to the
         ``new`` one: all of them, where a material does not tell."""
         return True
@@ -176,7 +175,7 @@ class Points:
         return deepcopy(self.trial)
 
     @property
-    def flows(self) -> npt.NDArray[np.bool_]:
+    def flows(self) -> Bools:
         """Which points ``(n,)`` left the elastic tangent at the last strain seen."""
         return np.broadcast_to(self.acting.flows(self.state, self.trial), self.n)
 

@@ -20,12 +20,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.kernels.compiled import library, pointer
 from archord.materials.elasticity import ENGINEERING, Elastic
 from archord.materials.hardening import Hardening
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import Ints, Kinematics
 from archord.materials.material import Array
 
 _SOURCE = Path(__file__).with_name("radial_return.c")
@@ -134,7 +133,7 @@ def _consistent_tangent(softened: Array, flow: Array, zeta: Array, q: Array, slo
     return softened - factor[:, None, None] * along[:, :, None] * along[:, None, :]
 
 
-def beyond(stress: Array, hardening: Hardening, peeq: Array) -> npt.NDArray[np.integer]:
+def beyond(stress: Array, hardening: Hardening, peeq: Array) -> Ints:
     """Numbers of the points whose von Mises ``stress`` ``(n,)`` exceeds the yield stress. Raises
     ValueError where the law gives none."""
     strength = hardening.stress(peeq)

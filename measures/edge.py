@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.geometry.vectors import ALIKE
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
@@ -274,7 +275,7 @@ def _patch_profile(side: Surface, weight: Array, raw_pressure: Array, **others: 
     )
 
 
-def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: np.ndarray) -> Array:
+def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: Ints) -> Array:
     """L2 projection ``(n, q)`` of ``pressure`` at points of pieces onto one function a facet that
     is linear in the places ``xi`` ``(n, q, 2)`` on it; facet integrals are kept exactly. The facets
     ``(n,)`` of the pieces are counted from 0 on."""
@@ -288,9 +289,7 @@ def project_on_patches(pressure: Array, xi: Array, weight: Array, facet: np.ndar
     return (functions @ np.linalg.solve(moments, right)[facet])[..., 0]
 
 
-def recovered(
-    patches: Patches, xi: Array, weight: Array, facet: np.ndarray, pressure: Array
-) -> Array:
+def recovered(patches: Patches, xi: Array, weight: Array, facet: Ints, pressure: Array) -> Array:
     """Pressure ``(facets, c)`` at the corners of the ``patches``: L2 projection of ``pressure``
     ``(n, q)`` at points of pieces onto a continuous function that is linear on triangles and
     bilinear on quadrilaterals. The force is kept exactly.

@@ -22,6 +22,7 @@ from archord.geometry.basis import dimension_of
 from archord.geometry.meshes.cells import are_mirrored, turned
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
+from archord.materials.kinematics import Ints
 from archord.output.cell_fields import CELL_FIELDS, CellField, cell_means
 from archord.output.files.disk import replace_file
 from archord.output.files.step_file import StepFile, times
@@ -130,7 +131,7 @@ class FieldWriter:
         of_cells = [name for name in fields if "/" not in name and name != "displacement"]
         self._write_xdmf(list(of_nodes), of_cells)
 
-    def _in_vtk_order(self, sides: np.ndarray) -> np.ndarray:
+    def _in_vtk_order(self, sides: Ints) -> Ints:
         """Nodes ``(k, b)`` of faces in VTK's order, from basix'; edges as they are."""
         if sides.shape[1] not in CELLS:
             return sides

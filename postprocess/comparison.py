@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array, Arrays
 from archord.postprocess.curve import first_loading, gap_name
 from archord.postprocess.run import Run
@@ -45,7 +46,7 @@ class Comparison:
     step_by_step: bool
     load: Array  # (n,)
     values: Arrays  # (r, n)
-    interpolated: np.ndarray  # (r, n) whether the values lie between steps
+    interpolated: Bools  # (r, n) whether the values lie between steps
     unlike: Sequence[str] = ()
 
     def relative(self, name: str) -> Array:
@@ -193,7 +194,7 @@ def _curves_of_joints(runs: Sequence[Run]) -> Curves:
     return tables, {named[name]: labels[name] for name in named}, per["p0"]
 
 
-def _at(load: Array, table: Arrays, between: np.ndarray) -> Arrays:
+def _at(load: Array, table: Arrays, between: Bools) -> Arrays:
     """The first loading of a run at ``load`` ``(n,)``; interpolated where that lies ``between`` its
     own loads."""
     own = table["load"]

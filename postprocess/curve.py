@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array
 from archord.scene.presets.joint import Scene
 
@@ -88,7 +89,7 @@ def rms(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def on_first_loading(delta: Array, P: Array) -> np.ndarray:
+def on_first_loading(delta: Array, P: Array) -> Bools:
     """Whether each of the steps ``(n,)`` is one of `RunCurve.loading`."""
     deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (delta, P))
     deeper = delta > deepest * (1 + 1e-9)

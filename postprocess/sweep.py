@@ -133,7 +133,7 @@ class Sweep:
         said = []
         for key, name in short.items():
             named = name if names.count(name) == 1 else key
-            said.append(f"{named} = {_shown(row[key])} {units.get(key, '')}".rstrip())
+            said.append(f"{named} = {shown(row[key], 'none')} {units.get(key, '')}".rstrip())
         return ", ".join(said) or f"case {case}"
 
     @cached_property
@@ -151,8 +151,8 @@ class Sweep:
         return found, faults
 
 
-def _shown(value: object) -> str:
-    """A value of a varied key; a missing one is no number."""
+def shown(value: object, missing: str) -> str:
+    """A value of a table, ``missing`` for what is no number."""
     if isinstance(value, float):
-        return "none" if np.isnan(value) else f"{value:.6g}"
+        return missing if np.isnan(value) else f"{value:.6g}"
     return str(value)

@@ -4,7 +4,6 @@ needs it."""
 from __future__ import annotations
 
 import itertools
-import math
 import textwrap
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -14,7 +13,7 @@ import numpy as np
 from archord.postprocess.comparison import COMMON, COMPARED, Comparison, differing_keys
 from archord.postprocess.probes.probe import Probe
 from archord.postprocess.run import Run
-from archord.postprocess.sweep import Sweep
+from archord.postprocess.sweep import Sweep, shown
 from archord.report.by_name import Words
 from archord.report.doubts import kind, of_cases
 from archord.report.table import Table
@@ -65,7 +64,7 @@ def sweep_text(sweep: Sweep) -> str:
     lines = [f"{sweep.folder}: {len(sweep)} case{plural}: {sweep.states}"]
     fixed = [key for key in sweep.keys if key not in sweep.moving]
     if fixed:
-        said = [f"{key} = {_cell(cases[key].iloc[0])}" for key in fixed]
+        said = [f"{key} = {shown(cases[key].iloc[0], '-')}" for key in fixed]
         lines.append(f"in all cases: {', '.join(said)}")
     ends = [name for name in shown_columns(cases) if name != "delta"]
     names = ["case", "run", *sweep.moving, "status", *ends]
@@ -176,7 +175,7 @@ def _table_of(frame: Any) -> Table:
 
     headings = with_headings(frame)
     rows = frame.itertuples(index=False)
-    return Table(*headings, rows=(map(_cell, row) for row in rows))
+    return Table(*headings, rows=([shown(value, "-") for value in row] for row in rows))
 
 
 def _named(rows: Iterable[tuple[str, str]], width: int) -> str:
@@ -313,10 +312,3 @@ def _note(comparison: Comparison) -> str:
     if comparison.interpolated.any():
         note += "; ~: between steps, by a monotone cubic"
     return f"{note}."
-
-
-def _cell(value: object) -> str:
-    """A value of a table; "-" where there is none."""
-    if isinstance(value, float):
-        return "-" if math.isnan(value) else f"{value:.6g}"
-    return str(value)

@@ -14,6 +14,7 @@ from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.motions import AXISYMMETRIC, PLANE, SPACE, free_motions
 from archord.geometry.meshes.quality import beyond_axis, place
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.report.by_name import Words
 from archord.solver.conditions import Dirichlet
@@ -202,7 +203,7 @@ def _shared(problem: Problem, whole: MeshArrays, owner: Words) -> Iterator[str]:
             )
 
 
-def _middle(whole: MeshArrays, facet: np.ndarray) -> str:
+def _middle(whole: MeshArrays, facet: Ints) -> str:
     """The middle of the corners of a ``facet``, in words."""
     corners = whole.x[facet[: whole.dimension]]
     return place(corners.mean(axis=0))
@@ -381,12 +382,12 @@ def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
         yield f"{said}: of its interference of {wanted:g} only {left:.3g} presses them together"
 
 
-def _corners(whole: MeshArrays, name: str) -> np.ndarray:
+def _corners(whole: MeshArrays, name: str) -> Ints:
     """The first corners ``(k, d)``, as many as span a facet, of the facets of a set."""
     return whole.facets_of(name)[:, : whole.dimension]
 
 
-def _nodes(whole: MeshArrays, name: str, of_cells: bool = False) -> np.ndarray:
+def _nodes(whole: MeshArrays, name: str, of_cells: bool = False) -> Ints:
     """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone;
     none of another name."""
     if not of_cells and (name in whole.facet_sets or name in whole.point_sets):

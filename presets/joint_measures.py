@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array
 from archord.measures.account import Account, Driven, Values, sizes
 from archord.measures.edge import per_step
@@ -168,7 +169,7 @@ class JointMeasures:
         R = self.scene.joint.radius
         eps = max([_eps(state), *(m["eps"] for m in state.before)])
 
-        def near(x: Array) -> np.ndarray:
+        def near(x: Array) -> Bools:
             angle = np.arctan2(np.abs(x[:, 0]), -x[:, 1])
             return (angle <= eps) & (np.abs(np.hypot(*x.T) - R) <= R / 2)
 

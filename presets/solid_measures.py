@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array
 from archord.measures.measure import Accepted, Measure
 from archord.scene.problem import ProblemScene
@@ -152,14 +153,14 @@ def solid_measures(scene: ProblemScene) -> Iterator[Measure]:
         yield from _bending_measures(scene, shape)
 
 
-def _inside(X: Array, strip: Strip) -> np.ndarray:
+def _inside(X: Array, strip: Strip) -> Bools:
     """Whether points ``(n, q, 3)`` are in a ``strip``."""
     low, high = strip
     z = X[..., 2]
     return (z >= low) & (z <= high)
 
 
-def _above(x: Array) -> np.ndarray:
+def _above(x: Array) -> Bools:
     """Whether points ``(m, 3)`` are in the upper half of the whole."""
     return x[:, 2] > 0
 

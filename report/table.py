@@ -16,13 +16,16 @@ class Table:
     table of a document.
 
     The first ``left`` columns hold text, the others numbers, which are aligned on the right. Cells
-    may be anything that has a `str`.
+    may be anything that has a `str`. A heading may end in the format of the numbers below it, as
+    ``"error {:.1e}"`` does; text below it stays as it is.
     """
 
     def __init__(
         self, *headings: str, rows: Iterable[Iterable[object]] = (), left: int = 0
     ) -> None:
-        self.headings = headings
+        parts = [heading.partition(" {:") for heading in headings]
+        self.headings = [heading for heading, _, _ in parts]
+        self.formats = [form.rstrip("}") for _, _, form in parts]
         self.left = left
         self.rows: list[list[str]] = []
         for row in rows:
@@ -37,11 +40,12 @@ class Table:
         """Add a row. Raises `ValueError` if it is not as long as the headings."""
         if len(cells) != len(self.headings):
             raise ValueError(f"a row of {len(cells)} cells under {len(self.headings)} headings")
-        self.rows.append([str(cell) for cell in cells])
+        pairs = zip(cells, self.formats, strict=True)
+        self.rows.append([str(x) if isinstance(x, str) else format(x, form) for x, form in pairs])
 
     def __str__(self) -> str:
         """In columns two spaces apart; without a line of headings where all are empty."""
-        lines = [list(self.headings), *self.rows] if any(self.headings) else self.rows
+        lines = [self.headings, *self.rows] if any(self.headings) else self.rows
         columns = []
         for k, cells in enumerate(zip(*lines, strict=True)):
             width = max(map(len, cells))
@@ -53,7 +57,7 @@ class Table:
     def within(self, width: int) -> str:
         """As `str`, but in blocks of columns that are no wider than ``width``, each beginning with
         the first column."""
-        lines = [list(self.headings), *self.rows]
+        lines = [self.headings, *self.rows]
         wide = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
         room = width + 2 - wide[0]
         blocks: list[list[int]] = [[]]

@@ -14,6 +14,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from archord.materials.kinematics import Bools, Ints
 from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.laws.named import contact_law
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -82,17 +83,17 @@ class CleanSides:
             f"so that the stress there is not the contact's of {interaction.name!r}: {cure}"
         )
 
-    def _held_along(self, surface: Surface) -> np.ndarray:
+    def _held_along(self, surface: Surface) -> Bools:
         """The axes ``(d,)`` along which any facet of a ``surface`` is held. Collective."""
         found = np.atleast_1d(self._held_facets(surface).any(axis=0))
         self.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.LOR)
         return found
 
-    def _held_facets(self, surface: Surface) -> np.ndarray:
+    def _held_facets(self, surface: Surface) -> Bools:
         """Whether all nodes of a facet are held along an axis ``(n, d)``."""
-        return self.held[_nodes(surface)].all(axis=1)
+        return np.all(self.held[_nodes(surface)], axis=1)
 
-    def _acts(self, surface: Surface, opposite: Surface | RigidSurface, along: np.ndarray) -> bool:
+    def _acts(self, surface: Surface, opposite: Surface | RigidSurface, along: Bools) -> bool:
         """Whether anything acts across facets of a ``surface`` that may meet the ``opposite`` one,
         or holds them ``along`` an axis ``(d,)``. Collective."""
         nodes = _nodes(surface)
@@ -105,12 +106,12 @@ class CleanSides:
         return self.comm.allreduce(bool(acts.any()), op=MPI.LOR)
 
 
-def _nodes(surface: Surface) -> np.ndarray:
+def _nodes(surface: Surface) -> Ints:
     """The nodes ``(n, k)`` of this rank's facets of a ``surface``."""
     return np.take_along_axis(surface.cell_dofs, surface.trace, axis=1)
 
 
-def _beside(surface: Surface, opposite: Surface) -> np.ndarray:
+def _beside(surface: Surface, opposite: Surface) -> Bools:
     """Which of this rank's facets ``(n,)`` of a ``surface`` are in the box around the ``opposite``
     one, grown by a facet and by how far the boxes of both are apart."""
     own = surface.curve.X

@@ -21,6 +21,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.materials.kinematics import Bools, Ints
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.loads import Loads
@@ -129,7 +130,7 @@ class Drives:
         by_force = self.problem.moving_drives() & self._controlled("force")
         return by_force | (means & self._controlled("displacement"))
 
-    def _with_anchors(self, names: Iterable[str]) -> np.ndarray:
+    def _with_anchors(self, names: Iterable[str]) -> Bools:
         """Which levels ``(l,)`` are of the drives of these ``names``, or of anchors."""
         chosen = np.ones(len(self.rate), dtype=bool)
         chosen[: len(self.names)] = np.isin(self.names, list(names))
@@ -237,7 +238,7 @@ class Drives:
         largest = [max(map(abs, drive.path), default=1.0) or 1.0 for drive in self._drives]
         return np.append(self.values(factor)[: len(largest)] / largest, self.problem.fitted(factor))
 
-    def held_by(self, name: str) -> np.ndarray:
+    def held_by(self, name: str) -> Bools:
         """Which displacements ``(n_owned, d)`` the supports ``name`` prescribe, the last ones where
         several do."""
         return self._holder[: self.n_owned] == self._prescribed.names.index(name)
@@ -247,7 +248,7 @@ class Drives:
         node."""
         return self._prescribed.share_of(name)[: self.n_owned]
 
-    def nodes_of(self, body: Body) -> np.ndarray:
+    def nodes_of(self, body: Body) -> Ints:
         """Nodes ``(n,)`` of the ``body`` on this rank, ghosts included."""
         return np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
 

@@ -15,6 +15,7 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, cell_basis
+from archord.materials.kinematics import Ints
 from archord.solver.conditions import DeadLoad, Mean
 from archord.solver.contact.facets import boundary_facets, facet_kind, facet_normals
 from archord.solver.problem import Problem
@@ -36,7 +37,7 @@ class Region:
     - ``comm``: the ranks
     """
 
-    nodes: np.ndarray
+    nodes: Ints
     shape: Array
     gradient: Array
     point: Array
@@ -70,7 +71,7 @@ class Loads:
             )
         return found
 
-    def cells_of(self, name: str) -> np.ndarray:
+    def cells_of(self, name: str) -> Ints:
         """The cells ``(n,)`` of a set that this rank owns."""
         topology = self.V.mesh.topology
         cells = np.unique(self.problem.mesh.cells_in(name))
@@ -89,7 +90,7 @@ class Loads:
         xi, w = basix.make_quadrature(facet_kind(self.V.mesh.basix_cell()), LOAD_DEGREE)
         return self._at(found.cells, found.origin[:, None] + xi @ found.axes, w, found.axes)
 
-    def _at(self, cells: np.ndarray, X: Array, w: Array, axes: Array | None) -> Region:
+    def _at(self, cells: Ints, X: Array, w: Array, axes: Array | None) -> Region:
         """Points ``X`` ``(n, q, d)`` of ``cells`` with weights ``w`` ``(q,)``, of facets along
         their ``axes`` ``(n, d - 1, d)``."""
         mesh = self.V.mesh

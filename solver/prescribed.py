@@ -18,6 +18,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.geometry.meshes.quality import place
+from archord.materials.kinematics import Ints
 from archord.solver.problem import Dirichlet, Drive, Problem
 
 _ALIKE = 1e-9  # of the larger of two displacements: a difference that is round-off
@@ -38,7 +40,7 @@ class _Motion:
     name: str
     facets: str
     axis: int
-    nodes: np.ndarray
+    nodes: Ints
     rate: Array
     moves: bool = False
     together: bool = False
@@ -101,7 +103,7 @@ class Prescribed:
         held[nodes] = np.where(by_supports < 0, len(self.names), by_supports)
         return _Motion("the axis", "the axis", 0, nodes, self._at_rest(nodes))
 
-    def _at_rest(self, nodes: np.ndarray) -> Array:
+    def _at_rest(self, nodes: Ints) -> Array:
         """Rates ``(l, k)`` of ``nodes`` that no drive moves."""
         return np.zeros((len(self._drives), len(nodes)))
 
@@ -164,10 +166,10 @@ class Prescribed:
             motion.together |= any((name, facets, other) in found for other in others)
         return [found[key] for key in sorted(found)]
 
-    def _rate(self, support: Dirichlet, nodes: np.ndarray) -> Array | float:
+    def _rate(self, support: Dirichlet, nodes: Ints) -> Array | float:
         return support.rate(self._x[nodes]) if callable(support.rate) else support.rate
 
-    def _note(self, motion: _Motion, nodes: np.ndarray) -> None:
+    def _note(self, motion: _Motion, nodes: Ints) -> None:
         name = self.names.index(motion.name)
         self.holder[nodes, motion.axis] = name
         self._holds[name, nodes, motion.axis] = True
@@ -193,11 +195,11 @@ class Prescribed:
                     common = np.intersect1d(stopped, fix.nodes)
                     met += self._first_place(m, f, common)
         free = self._comm.allreduce(free)
-        for m, f, place in self._everywhere(met):
+        for m, f, x in self._everywhere(met):
             motion = moving[m]
             fix = fixing[f]
             axis = self._axes[motion.axis]
-            at = _at(place)
+            at = place(x)
             if not free[m]:
                 raise ValueError(
                     f"{motion} moves nothing: supports fix all its nodes in {axis}, "
@@ -227,14 +229,14 @@ class Prescribed:
             unlike = difference.max(axis=1, initial=0.0) > max(round_off[a], round_off[b])
             is_free = ~fixed[common, first.axis]
             met += self._first_place(a, b, common[unlike & is_free])
-        for a, b, place in self._everywhere(met):
+        for a, b, x in self._everywhere(met):
             raise ValueError(
-                f"{moving[a]} and {moving[b]} move their common node at {_at(place)} "
+                f"{moving[a]} and {moving[b]} move their common node at {place(x)} "
                 f"differently in {self._axes[moving[a].axis]}: leave it out of one of the sets, "
                 "let both move alike, or load one of them by a pressure or a distributing coupling"
             )
 
-    def _first_place(self, a: int, b: int, nodes: np.ndarray) -> list[tuple[int, int, Place]]:
+    def _first_place(self, a: int, b: int, nodes: Ints) -> list[tuple[int, int, Place]]:
         """Where the motions ``a`` and ``b`` meet first, by coordinates, at ``nodes`` of this
         rank; nothing without any."""
         digits = _ALIKE * self._size
@@ -245,9 +247,9 @@ class Prescribed:
     def _everywhere(self, met: list[tuple[int, int, Place]]) -> list[tuple[int, int, Place]]:
         """What met on any rank, each pair once, in an order that all ranks agree on. Collective."""
         first: dict[tuple[int, int], Place] = {}
-        for a, b, place in sorted(found for here in self._comm.allgather(met) for found in here):
-            first.setdefault((a, b), place)
-        return [(a, b, place) for (a, b), place in first.items()]
+        for a, b, x in sorted(found for here in self._comm.allgather(met) for found in here):
+            first.setdefault((a, b), x)
+        return [(a, b, x) for (a, b), x in first.items()]
 
 
 def _courses(drives: list[Drive]) -> Array:
@@ -267,7 +269,3 @@ def _courses(drives: list[Drive]) -> Array:
             courses[k, : len(factors)] = drive.values(factors)
     reduced: Array = np.asarray(np.linalg.qr(courses.T, mode="r"))
     return reduced.T
-
-
-def _at(place: Place) -> str:
-    return f"({', '.join(f'{x:g}' for x in place)})"

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.formats.source import Mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.faults import fault_of
-from archord.materials.kinematics import PLANE_STRAIN, Kinematics, kinematics
+from archord.materials.kinematics import PLANE_STRAIN, Ints, Kinematics, kinematics
 from archord.materials.named import named_material
 from archord.report.errors import (
     InputError,
@@ -372,7 +372,7 @@ class Problem:
         """The part of interferences that is there at the load ``factor``."""
         return min(max(factor, 0.0), 1.0) if self.fit else 1.0
 
-    def cells_of(self, body: Body) -> np.ndarray:
+    def cells_of(self, body: Body) -> Ints:
         """Cells ``(n,)`` of the body on this rank, ghosts included."""
         return self.mesh.cells_in(body.cells)
 

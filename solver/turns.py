@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.materials.kinematics import Bools
 from archord.solver.conditions import Turn
 
 _SKEW = np.array([np.cross(axis, np.eye(3)).T for axis in np.eye(3)])  # e_k x, (3, 3, 3)
@@ -25,7 +26,7 @@ class FiniteTurn:
     levels : (3,) numbers of the drives; behind the last one where it does not turn
     """
 
-    def __init__(self, turn: Turn, names: Sequence[str], x: Array, held: np.ndarray) -> None:
+    def __init__(self, turn: Turn, names: Sequence[str], x: Array, held: Bools) -> None:
         self.held = held
         self.arms = x - np.array(turn.point)
         numbers = {name: level for level, name in enumerate(names)}

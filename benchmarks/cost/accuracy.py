@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from archord.benchmarks.case import Case, E, paper_joint, varied
+from archord.materials.kinematics import Array
 from archord.output.run import Outcome
 from archord.postprocess.judgement.convergence import difference
 from archord.presets.mesh_family import RATIO, MeshFamily
@@ -86,13 +87,13 @@ def run(
     return rows, faults
 
 
-def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarray:
+def reference(case: Case, folder: Path, said: Callable[[str], None]) -> Array:
     """The curve on a much finer mesh, extrapolated with order 3 from it and the one before; of a
     plastic joint in steps an eighth as long, whose error is extrapolated with order 1 from steps
     twice as long on the mesh before."""
     family = MeshFamily(case.scene, 1.0)
 
-    def curve(mesh: int, substeps: int) -> np.ndarray:
+    def curve(mesh: int, substeps: int) -> Array:
         level = family.scene_of(mesh, substeps)
         assert level is not None
         outcome = Case(f"{case.name} {mesh} {substeps}", level).solve(folder)

@@ -188,12 +188,12 @@ def references(case: str, folder: Path, said: Said, table: Table) -> ByName:
             found = reference(solved, name, others.get(name))
             entry[kinematics][name] = [in_digits(found.value, 9), in_digits(found.error, 2)]
             limits = [f"{limit.value:.9g} (order {limit.order:.1f})" for limit in found.limits]
-            table.add(case, kinematics, name, f"{found.value:.9g}", f"{found.error:.1e}", *limits)
+            table.add(case, kinematics, name, found.value, found.error, *limits)
         fine = solve(case, kinematics, folder, said, edge=True)
         samples = [[mesh.found["profile"] for mesh in family] for family in fine]
         profile, error = mean_profile(samples)
         sizes = [", ".join(f"{mesh.size:g}" for mesh in family) for family in fine]
-        table.add(case, kinematics, "profile", "", f"{error:.1e}", *sizes)
+        table.add(case, kinematics, "profile", "", error, *sizes)
         entry["profile_error"][kinematics] = in_digits(error, 2)
         entry["profile"][kinematics] = [in_digits(p, 7) for p in profile]
     return entry
@@ -202,7 +202,7 @@ def references(case: str, folder: Path, said: Said, table: Table) -> ByName:
 def main(folder: Path, chosen: Sequence[str]) -> None:
     """Make the references of the ``chosen`` cases, of all without any."""
     table = Table(
-        *("case", "kinematics", "quantity", "value", "relative error"),
+        *("case", "kinematics", "quantity", "value {:.9g}", "relative error {:.1e}"),
         *("first family", "second family"),
         left=3,
     )

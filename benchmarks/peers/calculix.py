@@ -220,12 +220,12 @@ def compare(scene: Path, overrides: Sequence[str], folder: Path) -> Table:
     ours = run_once(Process("archord", command, folder, lambda: Run(folder / "run")))
     calculix = process(load_scene(scene, overrides), folder / "calculix")
     theirs = run_once(replace(calculix, limit=_LONG))
-    table = Table("", "archord", "CalculiX", "difference", left=1)
+    table = Table("", "archord {:.6g}", "CalculiX {:.6g}", "difference {:+.2%}", left=1)
     run = ours.result
     opinion = theirs.result
 
     def add(what: str, one: float, other: float) -> None:
-        table.add(what, f"{one:.6g}", f"{other:.6g}", f"{other / one - 1:+.2%}")
+        table.add(what, one, other, other / one - 1)
 
     for load, forces in opinion.forces.items():
         column = f"{load} force" if load else "P"

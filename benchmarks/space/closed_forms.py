@@ -170,18 +170,14 @@ FORMS = {
 def main(arguments: Sequence[str]) -> None:
     """Print the table of the forms and sizes that the ``arguments`` name."""
     chosen, sizes = named(arguments, FORMS)
-    table = Table("form", "size", "quantity", "by", "expected", "archord", "off", "goal", left=1)
+    numbers = ("expected {:.6g}", "archord {:.6g}", "off {:+.1e}", "goal {:g}")
+    table = Table("form", "size {:g}", "quantity", "by", *numbers, left=1)
     for name in chosen or FORMS:
         form = FORMS[name]
         for size in sizes or [form.size]:
             for found, goal in zip(form.compare(size), form.goals, strict=True):
-                numbers = (
-                    f"{found.reference:.6g}",
-                    f"{found.ours:.6g}",
-                    f"{found.ours / found.reference - 1:+.1e}",
-                    f"{goal:g}",
-                )
-                table.add(name, f"{size:g}", found.what, found.by, *numbers)
+                what, expected, by, ours = found
+                table.add(name, size, what, by, expected, ours, ours / expected - 1, goal)
     print(table.markdown())
 
 

@@ -122,13 +122,12 @@ def quickest(error: float, points: Sequence[Point]) -> tuple[str, float]:
     return ">", max(point.seconds for point in points)
 
 
-def rows(name: str, found: Mapping[str, Sequence[Point]]) -> Iterator[tuple[str, ...]]:
+def rows(name: str, found: Mapping[str, Sequence[Point]]) -> Iterator[tuple[object, ...]]:
     """The rows of a case: its meshes, and last the seconds within the error of its goal."""
     for ours, theirs in zip(*found.values(), strict=True):
-        cells = (name, f"{ours.size:g}", str(ours.n_dofs))
         ended = ours.seconds and theirs.seconds
-        times = f"{theirs.seconds / ours.seconds:.1f}" if ended else ""
-        yield (*cells, *_told(ours), *_told(theirs), times)
+        times = theirs.seconds / ours.seconds if ended else ""
+        yield (name, ours.size, ours.n_dofs, *_told(ours), *_told(theirs), times)
     goal = GOALS[name]
     (far, ours), (more, theirs) = (quickest(goal.error, of_code) for of_code in found.values())
     within = f"within {100 * goal.error:g}"
@@ -136,10 +135,10 @@ def rows(name: str, found: Mapping[str, Sequence[Point]]) -> Iterator[tuple[str,
     yield (name, "", "", within, f"{far}{ours:.1f}", within, f"{more}{theirs:.1f}", times)
 
 
-def _told(point: Point) -> tuple[str, str]:
+def _told(point: Point) -> tuple[object, object]:
     if math.isinf(point.error):
         return "stopped", ""
-    return f"{100 * point.error:+.3f}", f"{point.seconds:.1f}"
+    return 100 * point.error, point.seconds
 
 
 def add_panel(name: str, found: Mapping[str, Sequence[Point]], folder: Path) -> None:
@@ -173,8 +172,9 @@ def main() -> None:
     parser.add_argument("--into", type=Path, help="folder of the work-precision benchmark")
     given = parser.parse_args()
     chosen, sizes = named(given.names, GOALS)
-    headings = [f"{code}: {what}" for code in CODES for what in ("error [%]", "s")]
-    table = Table("case", "size", "dofs", *headings, "times", left=1)
+    numbers = ("error [%] {:+.3f}", "s {:.1f}")
+    headings = [f"{code}: {number}" for code in CODES for number in numbers]
+    table = Table("case", "size {:g}", "dofs", *headings, "times {:.1f}", left=1)
     for name in chosen or GOALS:
         found = points(CASES[name], sizes or SIZES)
         for row in rows(name, found):

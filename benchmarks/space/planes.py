@@ -53,8 +53,8 @@ def table_of(thicknesses: Sequence[float]) -> Table:
     planes = [
         solved({"joint": fine, "analysis": {"plane": plane}}) for plane in ("stress", "strain")
     ]
-    over = [f"{what}/{plane}" for what in ("P", "p0") for plane in ("stress", "strain")]
-    table = Table("t/R", "delta/dR", *over, "rim/p0")
+    over = [f"{what}/{plane} {{:.3f}}" for what in ("P", "p0") for plane in ("stress", "strain")]
+    table = Table("t/R {:g}", "delta/dR {:g}", *over, "rim/p0 {:.3f}")
     for ratio in thicknesses:
         thickness = ratio * _RADIUS
         solid = solved({"space": {"thickness": thickness, "rim_ratio": 1.0}})
@@ -65,7 +65,7 @@ def table_of(thicknesses: Sequence[float]) -> Table:
             peaks = [found["p0"] / plane["p0"] for plane in flat]
             rim = found["rim pressure"] / found["p0"]
             moved = 3.2 * step / len(solid)
-            table.add(f"{ratio:g}", f"{moved:g}", *(f"{v:.3f}" for v in (*forces, *peaks, rim)))
+            table.add(ratio, moved, *forces, *peaks, rim)
     return table
 
 

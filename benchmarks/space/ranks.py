@@ -38,6 +38,7 @@ from archord.benchmarks.space.joints import CASES
 from archord.geometry.meshes.cells import n_corners
 from archord.geometry.meshes.fenicsx import boxes, gathered, sectors
 from archord.kernels.blocks import blocks_of
+from archord.materials.kinematics import Ints
 from archord.report.table import Table
 from archord.solver.linear.multigrid import Multigrid
 from archord.solver.path.system import System
@@ -106,7 +107,7 @@ def rows_of_parts(problem: Problem) -> Iterator[tuple[str | int, ...]]:
             yield cut.__name__, n_parts, d * len(made.x), own, shared, met // d
 
 
-def _own_and_shared(cells: np.ndarray, part: np.ndarray, n_parts: int) -> tuple[int, int, int]:
+def _own_and_shared(cells: Ints, part: Ints, n_parts: int) -> tuple[int, int, int]:
     """The largest numbers of own and of shared nodes of the parts of ``cells`` ``(n, k)``, and of
     other parts with which they are shared."""
     pairs = np.unique(cells * n_parts + part[:, None])

@@ -25,6 +25,7 @@ from archord.geometry.basis import (
     lagrange_element,
     order_of,
 )
+from archord.materials.kinematics import Bools, Ints
 
 _HIGHEST = 3  # order
 _SERENDIPITY = {QUADRILATERAL: (8, 9), HEXAHEDRON: (20, 27)}  # nodes, without and with middle ones
@@ -61,7 +62,7 @@ def n_sides(kind: basix.CellType) -> int:
     return len(basix.topology(kind)[-2])
 
 
-def entities_of(kind: basix.CellType, cells: np.ndarray, dim: int) -> np.ndarray:
+def entities_of(kind: basix.CellType, cells: Ints, dim: int) -> Ints:
     """Nodes ``(m s, b)`` of the edges (``dim`` 1), faces or insides of ``cells`` ``(m, a)``, cell
     by cell."""
     of_entity = _closures(kind, cells.shape[1])[dim]
@@ -69,28 +70,28 @@ def entities_of(kind: basix.CellType, cells: np.ndarray, dim: int) -> np.ndarray
 
 
 @cache
-def _closures(kind: basix.CellType, nodes: int) -> list[np.ndarray]:
+def _closures(kind: basix.CellType, nodes: int) -> list[Ints]:
     """For each dimension the nodes ``(s, b)`` of the entities of a cell of so many ``nodes``."""
     return [np.array(of_dim) for of_dim in element_of(kind, nodes).entity_closure_dofs]
 
 
-def sides_of(kind: basix.CellType, cells: np.ndarray) -> np.ndarray:
+def sides_of(kind: basix.CellType, cells: Ints) -> Ints:
     """Nodes ``(m s, b)`` of the sides of ``cells`` ``(m, a)``, cell by cell."""
     return entities_of(kind, cells, dimension_of(kind) - 1)
 
 
-def along(sides: np.ndarray) -> np.ndarray:
+def along(sides: Ints) -> Ints:
     """Edges ``sides`` ``(k, b)`` with their nodes as they follow each other."""
     return sides[:, [0, *range(2, sides.shape[1]), 1]]
 
 
-def lengths(x: Array, edges: np.ndarray) -> Array:
+def lengths(x: Array, edges: Ints) -> Array:
     """How far the ends of ``edges`` ``(k, b)`` are from each other ``(k,)``."""
     ends = x[edges[:, :2]]
     return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
 
-def distinct(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def distinct(corners: Ints) -> tuple[Ints, Ints]:
     """Where each edge or face comes first among ``corners`` ``(k, c)``, and the number ``(k,)`` of
     each.
 
@@ -106,12 +107,12 @@ def distinct(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, number
 
 
-def corners_of(kind: basix.CellType, sides: np.ndarray) -> np.ndarray:
+def corners_of(kind: basix.CellType, sides: Ints) -> Ints:
     """The corners ``(k, c)`` of ``sides`` ``(k, b)`` of cells."""
     return sides[:, : n_corners(side_kind(kind))]
 
 
-def sides_among(kind: basix.CellType, sides: np.ndarray, others: np.ndarray) -> np.ndarray:
+def sides_among(kind: basix.CellType, sides: Ints, others: Ints) -> Bools:
     """Whether each of the ``sides`` ``(k, b)`` is one of the ``others`` ``(j, b)``."""
     together = np.concatenate([corners_of(kind, sides), corners_of(kind, others)])
     _, which = distinct(together)
@@ -119,7 +120,7 @@ def sides_among(kind: basix.CellType, sides: np.ndarray, others: np.ndarray) -> 
     return np.isin(own, of_others)
 
 
-def sides_between(kind: basix.CellType, cells: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def sides_between(kind: basix.CellType, cells: Ints, corners: Ints) -> Ints:
     """Which of `sides_of` ``cells`` has each row of ``corners`` ``(k, c)``; where none has, a
     number beyond them."""
     sides = sides_of(kind, cells)
@@ -129,7 +130,7 @@ def sides_between(kind: basix.CellType, cells: np.ndarray, corners: np.ndarray) 
     return first[wanted]
 
 
-def outer_sides(kind: basix.CellType, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def outer_sides(kind: basix.CellType, cells: Ints) -> tuple[Ints, Ints]:
     """The sides ``(k, b)`` of ``cells`` that belong to one cell alone, and that cell ``(k,)``."""
     sides = sides_of(kind, cells)
     first, which = distinct(corners_of(kind, sides))
@@ -144,7 +145,7 @@ def in_mirror(X: Array) -> Array:
     return np.stack([y, x, *others], axis=1)
 
 
-def are_mirrored(kind: basix.CellType, x: Array) -> np.ndarray:
+def are_mirrored(kind: basix.CellType, x: Array) -> Bools:
     """Which cells ``(m,)`` have a negative determinant at the first of their nodes ``x`` ``(m, a,
     d)``."""
     distance = basix.geometry(kind).sum(axis=1)
@@ -153,7 +154,7 @@ def are_mirrored(kind: basix.CellType, x: Array) -> np.ndarray:
     return np.linalg.det(edges) < 0
 
 
-def turned(kind: basix.CellType, order: int, cells: np.ndarray, which: np.ndarray) -> np.ndarray:
+def turned(kind: basix.CellType, order: int, cells: Ints, which: Bools) -> Ints:
     """``cells`` ``(m, a)`` of this ``order``, those ``which`` ``(m,)`` are chosen with their nodes
     as in a mirror."""
     points = lagrange_element(kind, order).points
@@ -179,9 +180,7 @@ def inner_weights(kind: basix.CellType, order: int) -> Array:
     return inside @ np.linalg.pinv(on_sides)
 
 
-def with_middle_nodes(
-    kind: basix.CellType, x: Array, cells: np.ndarray
-) -> tuple[Array, np.ndarray]:
+def with_middle_nodes(kind: basix.CellType, x: Array, cells: Ints) -> tuple[Array, Ints]:
     """Nodes and ``cells`` with middle nodes, for quadrilaterals ``(m, 8)`` and hexahedra ``(m,
     20)``, which have none in their faces and inside.
 
@@ -205,9 +204,9 @@ def with_middle_nodes(
 def in_basix_order(
     kind: basix.CellType,
     x: Array,
-    cells: np.ndarray,
+    cells: Ints,
     permutation: Callable[[CellType, int], list[int]],
-) -> tuple[Array, np.ndarray]:
+) -> tuple[Array, Ints]:
     """Nodes and ``cells`` ``(m, a)`` from those in another program's order.
 
     Quadrilaterals of 8 nodes get a ninth, hexahedra of 20 nodes seven more.

@@ -29,6 +29,7 @@ from archord.geometry.meshes.overlap import PIECES, Inside, overlaps, polygons
 from archord.geometry.meshes.quality import faults, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
+from archord.materials.kinematics import Bools, Ints
 
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 # of the clearance: sagitta from which corners of straight sides show in the pressure
@@ -118,7 +119,7 @@ def _of_bodies(mesh: MeshArrays, inside: Inside, millimetres: bool) -> Iterator[
             )
 
 
-def parts(kind: basix.CellType, cells: np.ndarray) -> np.ndarray:
+def parts(kind: basix.CellType, cells: Ints) -> Ints:
     """The part ``(m,)`` of each of ``cells``, from 0: cells that share sides are of one part."""
     if not len(cells):
         return np.zeros(0, dtype=np.int32)
@@ -142,7 +143,7 @@ def _of_surface(mesh: MeshArrays, inside: Inside, name: str) -> Iterator[str]:
         )
 
 
-def cracks(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
+def cracks(mesh: MeshArrays, body: str, cells: Bools) -> Iterator[str]:
     """A warning of nodes of a ``body`` of these ``cells`` that ought to be one."""
     sides, _ = outer_sides(mesh.kind, mesh.cells[cells])
     nodes = np.unique(corners_of(mesh.kind, sides))
@@ -157,7 +158,7 @@ def cracks(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
         )
 
 
-def holes(mesh: MeshArrays, body: str, cells: np.ndarray) -> Iterator[str]:
+def holes(mesh: MeshArrays, body: str, cells: Bools) -> Iterator[str]:
     """Warnings of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a
     facet set, and of nodes in which its boundary meets itself."""
     sides, _ = outer_sides(mesh.kind, mesh.cells[cells])
@@ -224,7 +225,7 @@ def gaps(mesh: MeshArrays, name: str) -> Iterator[str]:
         )
 
 
-def _goes_on(mesh: MeshArrays, edge: np.ndarray, direction: Mapping[int, Array]) -> bool:
+def _goes_on(mesh: MeshArrays, edge: Ints, direction: Mapping[int, Array]) -> bool:
     """Whether an ``edge`` meets facets, which have a ``direction`` at their ends, and turns little
     there."""
     own = mesh.x[edge[1]] - mesh.x[edge[0]]
@@ -233,7 +234,7 @@ def _goes_on(mesh: MeshArrays, edge: np.ndarray, direction: Mapping[int, Array])
     return max(cosines, default=0.0) > _STRAIGHT
 
 
-def _outside(mesh: MeshArrays, facets: np.ndarray) -> np.ndarray:
+def _outside(mesh: MeshArrays, facets: Ints) -> Bools:
     """Whether each of the ``facets`` ``(k, b)`` is on the boundary of the mesh."""
     outer, _ = outer_sides(mesh.kind, mesh.cells)
     return sides_among(mesh.kind, facets, outer)
@@ -275,7 +276,7 @@ def _sagitta(mesh: MeshArrays, pair: Pair) -> Iterator[tuple[str, bool]]:
         yield f"{arcs}: {corners}; {remedy}", False
 
 
-def _arcs(mesh: MeshArrays, facets: np.ndarray) -> tuple[float, Array]:
+def _arcs(mesh: MeshArrays, facets: Ints) -> tuple[float, Array]:
     """The radius of the circle or cylinder that ``facets`` lie on, 0 for none, and points ``(k,
     pieces + 1, d)`` on their edges, in space less what runs along the axis."""
     if mesh.dimension == 2:

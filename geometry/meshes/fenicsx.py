@@ -26,6 +26,7 @@ from archord.geometry.meshes.mesh_cache import kept_mesh
 from archord.geometry.meshes.refine import Circle, on_circles
 from archord.geometry.meshes.tagged_mesh import SAME_PLACE, TaggedMesh
 from archord.kernels.compat import cell_nodes
+from archord.materials.kinematics import Ints
 
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 _MOST_SECTORS = 4  # in space: beyond, boxes have fewer nodes on their sides
@@ -242,7 +243,7 @@ def _tags_at_points(mesh: MeshArrays) -> dict[str, list[frozenset[int]]]:
     }
 
 
-def _beside_others(x: Array) -> np.ndarray:
+def _beside_others(x: Array) -> Ints:
     """The nodes ``(k,)`` of all ``x`` ``(n, d)`` that may lie where another one is, and few more:
     those with the same place along a slanted line."""
     along = x @ _SLANTED[: x.shape[1]]
@@ -252,7 +253,7 @@ def _beside_others(x: Array) -> np.ndarray:
     return order[np.union1d(first, first + 1)]
 
 
-def _tags_at(mesh: MeshArrays, nodes: np.ndarray) -> dict[int, frozenset[int]]:
+def _tags_at(mesh: MeshArrays, nodes: Ints) -> dict[int, frozenset[int]]:
     """The tags of the cells at each of the ``nodes``."""
     cell, place = np.nonzero(np.isin(mesh.cells, nodes))
     found = defaultdict[int, set[int]](set)
@@ -331,7 +332,7 @@ def usual_cut(dimension: int, n_parts: int) -> Cut:
     return boxes if dimension == 3 and n_parts > _MOST_SECTORS else sectors
 
 
-def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+def sectors(x: Array, cells: Ints, n_parts: int) -> Ints:
     """The rank ``(n,)`` of each of the ``cells`` ``(n, k)`` with vertices ``x`` ``(m, d)``: sectors
     around the origin, or the z axis, numbered from below, of as many cells each.
 
@@ -343,7 +344,7 @@ def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     return _in_turn(np.arctan2(middle_y, middle_x), n_parts)
 
 
-def slices(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+def slices(x: Array, cells: Ints, n_parts: int) -> Ints:
     """As the `usual_cut`, for bodies around pins along z: two parts of many cells are slices across
     z, which have equally much of what touches. Of two sectors one has more of the loaded side of a
     hole; they share less, which counts for few cells."""
@@ -352,18 +353,18 @@ def slices(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     return _in_turn(x[cells].mean(axis=1)[:, 2], n_parts)
 
 
-def strips(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+def strips(x: Array, cells: Ints, n_parts: int) -> Ints:
     """As `sectors`, but in strips across the mesh's longest extent, for contact in any place."""
     longest = np.argmax(np.ptp(x, axis=0)) if len(x) else 0
     return _in_turn(x[cells].mean(axis=1)[:, longest], n_parts)
 
 
-def boxes(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+def boxes(x: Array, cells: Ints, n_parts: int) -> Ints:
     """As `sectors`, but in boxes: the cells are cut in two across their longest extent, and so on.
     Their sides shrink with their number, and what is in contact is mostly in one box."""
     middle = x[cells].mean(axis=1)
     part = np.zeros(len(cells), dtype=np.int32)
-    uncut: list[tuple[np.ndarray, int, int]] = [(np.arange(len(cells)), 0, n_parts)]
+    uncut: list[tuple[Ints, int, int]] = [(np.arange(len(cells)), 0, n_parts)]
     while uncut:
         chosen, first, n = uncut.pop()
         part[chosen] = first
@@ -378,7 +379,7 @@ def boxes(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     return part
 
 
-def _in_turn(place: Array, n_parts: int) -> np.ndarray:
+def _in_turn(place: Array, n_parts: int) -> Ints:
     """The part ``(n,)`` of each cell, cut along its ``place`` ``(n,)`` into parts of as many cells
     each."""
     n = len(place)

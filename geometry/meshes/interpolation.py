@@ -23,6 +23,7 @@ from archord.geometry.basis import (
     element_of,
     table_of,
 )
+from archord.materials.kinematics import Ints
 
 _NEWTON = 8  # iterations for the reference point: the cells are nearly straight
 _STRAIGHT = 1e-9  # last step in a reference cell
@@ -45,7 +46,7 @@ class Interpolation:
     - ``_weights`` ``(k, a)``: their shape functions
     """
 
-    def __init__(self, kind: basix.CellType, x: Array, cells: np.ndarray, to: Array) -> None:
+    def __init__(self, kind: basix.CellType, x: Array, cells: Ints, to: Array) -> None:
         self._element = element_of(kind, cells.shape[1])
         parts = _SIMPLICES[kind]
         simplices = cells[:, parts].reshape(-1, parts.shape[1])
@@ -77,7 +78,7 @@ class Interpolation:
         return np.einsum("ka,kac->kc", self._weights, values[self._nodes])
 
 
-def _located(x: Array, simplices: np.ndarray, to: Array) -> tuple[np.ndarray, Array]:
+def _located(x: Array, simplices: Ints, to: Array) -> tuple[Ints, Array]:
     """The number of a straight triangle or tetrahedron ``(m, d + 1)`` with vertices ``x``
     ``(n, d)`` around each point of ``to`` ``(k, d)``, or next to it, and the point's reference
     coordinates ``(k, d)`` there."""
@@ -93,7 +94,7 @@ def _located(x: Array, simplices: np.ndarray, to: Array) -> tuple[np.ndarray, Ar
     return cell[best], X[best]
 
 
-def _candidates(x: Array, simplices: np.ndarray, to: Array) -> tuple[np.ndarray, np.ndarray]:
+def _candidates(x: Array, simplices: Ints, to: Array) -> tuple[Ints, Ints]:
     """Pairs ``(p,)`` of a point of ``to`` and a simplex whose bounding box it is in, or the
     nearest simplex."""
     d = x.shape[1]

@@ -17,6 +17,7 @@ from archord.geometry.basis import Array, dimension_of, lagrange_element, tabula
 from archord.geometry.meshes.cells import is_simplex, parts_of
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.vectors import crossed
+from archord.materials.kinematics import Ints
 
 _DEEPEST = 6  # cuts; a part that is open then is 1/64 of its cell long
 # in space, of a cell's largest determinant: a smallest one above this is not looked for
@@ -70,7 +71,7 @@ def _extremes(kind: basix.CellType, value: Array, degree: int) -> tuple[Array, A
     return smallest, largest
 
 
-def _determinants(mesh: MeshArrays, cells: np.ndarray, degree: int) -> Array:
+def _determinants(mesh: MeshArrays, cells: Ints, degree: int) -> Array:
     """Determinants ``(n, q)`` of ``cells`` at the Lagrange nodes of the ``degree``, which determine
     the polynomial."""
     slopes = tabulate(mesh.kind, mesh.order, _points(mesh.kind, degree))[1:]

@@ -25,6 +25,7 @@ from archord.geometry.meshes.cells import (
     with_middle_nodes,
 )
 from archord.geometry.meshes.tagged_mesh import tags_of
+from archord.materials.kinematics import Bools, Ints
 from archord.report.by_name import Names
 from archord.report.errors import shown
 
@@ -59,10 +60,10 @@ class MeshArrays:
 
     x: Array
     kind: basix.CellType
-    cells: np.ndarray
-    bodies: np.ndarray
-    facets: np.ndarray
-    tags: np.ndarray
+    cells: Ints
+    bodies: Ints
+    facets: Ints
+    tags: Ints
     cell_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     point_sets: dict[str, np.ndarray] = field(default_factory=dict)
@@ -124,9 +125,9 @@ class MeshArrays:
         cls,
         kind: basix.CellType,
         x: Array,
-        cells: np.ndarray,
-        cell_sets: Mapping[str, np.ndarray],
-        facet_sets: Mapping[str, np.ndarray],
+        cells: Ints,
+        cell_sets: Mapping[str, Ints],
+        facet_sets: Mapping[str, Ints],
         point_sets: Mapping[str, np.ndarray],
         numbers: Numbers | None = None,
     ) -> MeshArrays:
@@ -161,11 +162,11 @@ class MeshArrays:
         points = {name: nodes[nodes >= 0] for name, nodes in points.items()}
         return cls(x, kind, cells, bodies, facets, tags, named_cells, named_facets, points)
 
-    def facets_of(self, name: str) -> np.ndarray:
+    def facets_of(self, name: str) -> Ints:
         """Nodes ``(k, b)`` of the facets of a set; none if there is no such set."""
         return self.facets[self.within(name)]
 
-    def within(self, name: str) -> np.ndarray:
+    def within(self, name: str) -> Bools:
         """Which of the `facets` are in a set; none if there is no such set."""
         return np.isin(self.tags, self.facet_sets.get(name, ()))
 
@@ -193,7 +194,7 @@ class MeshArrays:
             x, cells = with_middle_nodes(self.kind, x, cells)
         return self.with_cells(x, cells)
 
-    def with_cells(self, x: Array, cells: np.ndarray) -> MeshArrays:
+    def with_cells(self, x: Array, cells: Ints) -> MeshArrays:
         """This mesh with the nodes ``x`` and ``cells`` of another order that lie where this one's
         lie."""
         corners = corners_of(self.kind, self.facets)
@@ -201,7 +202,7 @@ class MeshArrays:
         facets = sides_of(self.kind, cells)[numbers]
         return replace(self, x=x, cells=cells, facets=facets)
 
-    def centred(self, kept: np.ndarray = _NONE) -> MeshArrays:
+    def centred(self, kept: Ints = _NONE) -> MeshArrays:
         """This mesh with the nodes inside faces and cells where the nodes around them want them,
         but for nodes that are ``kept``."""
         x = self.x.copy()
@@ -228,8 +229,8 @@ def _counted(names: Iterable[str]) -> dict[str, int]:
 
 
 def _sides_of_sets(
-    kind: basix.CellType, cells: np.ndarray, new: np.ndarray, sets: Mapping[str, np.ndarray]
-) -> dict[str, np.ndarray]:
+    kind: basix.CellType, cells: Ints, new: Ints, sets: Mapping[str, Ints]
+) -> dict[str, Ints]:
     """Which of `sides_of` ``cells`` are in each of the ``sets``, whose corners ``(k, c)`` have
     ``new`` numbers; found at once, as all sides are sorted for it."""
     if not sets:
@@ -240,8 +241,8 @@ def _sides_of_sets(
 
 
 def _one_tag_each(
-    sets: Mapping[str, np.ndarray], numbers: Mapping[str, int]
-) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
+    sets: Mapping[str, Ints], numbers: Mapping[str, int]
+) -> tuple[Ints, Ints, dict[str, tuple[int, ...]]]:
     """The members ``(k,)`` of all ``sets`` as they first come, a tag for each, and the tags of
     every set.
 
@@ -274,7 +275,7 @@ class _Group(NamedTuple):
 
     tag: int
     types: set[int]
-    nodes: np.ndarray
+    nodes: Ints
 
 
 def _tags(groups: Mapping[str, _Group]) -> dict[str, int]:

@@ -15,6 +15,7 @@ from archord.geometry.meshes.cells import along, outer_sides, side_kind
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import place
 from archord.geometry.patches import Patches
+from archord.materials.kinematics import Bools, Ints
 
 # of a side: how deep bodies may overlap by their sides being straight, or curved
 _INTO_STRAIGHT = 0.02
@@ -26,7 +27,7 @@ _BESIDE = 1e-6  # of a reference side: how far beyond it the foot of a point cou
 Inside = Mapping[str, np.ndarray]  # which cells ``(n,)`` are in each body
 
 
-def polygons(mesh: MeshArrays, edges: np.ndarray) -> Array:
+def polygons(mesh: MeshArrays, edges: Ints) -> Array:
     """Points ``(k, pieces + 1, d)`` on ``edges`` ``(k, b)``."""
     order = edges.shape[1] - 1
     places = np.linspace(0, 1, PIECES + 1)
@@ -47,7 +48,7 @@ class _Outline(NamedTuple):
     end: Array
 
     @classmethod
-    def of(cls, mesh: MeshArrays, cells: np.ndarray) -> _Outline:
+    def of(cls, mesh: MeshArrays, cells: Ints) -> _Outline:
         sides, behind = outer_sides(mesh.kind, cells)
         middles = mesh.x[cells[behind]].mean(axis=1)
         polygon = polygons(mesh, sides)
@@ -56,7 +57,7 @@ class _Outline(NamedTuple):
         corners = mesh.x[sides[:, 0]]
         return cls(np.concatenate([corners, middles]), start, end)
 
-    def contains(self, x: Array) -> np.ndarray:
+    def contains(self, x: Array) -> Bools:
         """Whether points ``(k, 2)`` lie within: a ray to the right crosses an odd number of
         pieces."""
         to = x[:, None] - self.start
@@ -110,7 +111,7 @@ class _Hull(NamedTuple):
     outward: Array
 
     @classmethod
-    def of(cls, mesh: MeshArrays, cells: np.ndarray) -> _Hull:
+    def of(cls, mesh: MeshArrays, cells: Ints) -> _Hull:
         sides, behind = outer_sides(mesh.kind, cells)
         middles = mesh.x[cells[behind]].mean(axis=1)
         patches = Patches(mesh.x, sides, side_kind(mesh.kind), mesh.order)

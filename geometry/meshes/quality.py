@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import basix
@@ -15,6 +15,7 @@ from archord.geometry.meshes.cells import corners_of, distinct, entities_of, len
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.kernels.compat import cell_nodes
+from archord.materials.kinematics import Bools
 from archord.report.by_name import Amounts
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
@@ -37,7 +38,7 @@ _UNLIKE_CORNERS = {
 }
 
 
-def place(x: Array) -> str:
+def place(x: Iterable[float]) -> str:
     """A point as text."""
     return f"({', '.join(f'{value:g}' for value in x)})"
 
@@ -144,13 +145,13 @@ def _unsound(mesh: MeshArrays) -> Iterator[str]:
     yield f"{len(bad)} cells are folded or have no {measure}, the worst at {at}: {how}"
 
 
-def is_folded(mesh: MeshArrays, smallest: Array, largest: Array) -> np.ndarray:
+def is_folded(mesh: MeshArrays, smallest: Array, largest: Array) -> Bools:
     """Whether cells ``(n,)`` are folded, by their `smallest_determinants` and the largest ones."""
     lowest = -_DISTORTED * largest if mesh.order > 1 else 0.0
     return (smallest < lowest) | _turned_at_points(mesh)
 
 
-def _turned_at_points(mesh: MeshArrays) -> np.ndarray:
+def _turned_at_points(mesh: MeshArrays) -> Bools:
     """Whether the determinants of a cell ``(n,)`` do not have one sign at its integration
     points."""
     J, _ = _jacobians(mesh)

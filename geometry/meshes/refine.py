@@ -19,6 +19,7 @@ from archord.geometry.meshes.cells import corners_of, parts_of, side_kind
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.tagged_mesh import tags_of
 from archord.geometry.vectors import unit
+from archord.materials.kinematics import Ints
 
 _OFF_CIRCLE = 0.05  # of the radius
 _ELSEWHERE = 1e-4  # of the radius: more than the rounding of a file moves nodes onto their circle
@@ -59,7 +60,7 @@ class Circle(NamedTuple):
         return np.abs(np.linalg.norm(x - self.foot(x), axis=1) - self.radius)
 
 
-def cylinder_through(x: Array, facets: np.ndarray) -> Circle | None:
+def cylinder_through(x: Array, facets: Ints) -> Circle | None:
     """The cylinder that the corners of ``facets`` ``(k, 3 or more)`` lie on; None if there is
     none.
 
@@ -228,7 +229,7 @@ def _cut(mesh: MeshArrays) -> MeshArrays:
     return replace(made, cells=cells, bodies=bodies, facets=facets, tags=tags)
 
 
-def _parts(kind: basix.CellType, p: int, nodes: np.ndarray) -> np.ndarray:
+def _parts(kind: basix.CellType, p: int, nodes: Ints) -> Ints:
     """Nodes ``(m s, b)`` of the parts, of order ``p``, of cells with ``nodes`` ``(m, a)`` of order
     2 p."""
     points = parts_of(kind, lagrange_element(kind, p).points)

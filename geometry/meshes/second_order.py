@@ -14,6 +14,7 @@ from archord.geometry.meshes.cells import (
     sides_between,
     sides_of,
 )
+from archord.materials.kinematics import Ints
 
 
 class SecondOrder:
@@ -28,12 +29,12 @@ class SecondOrder:
       hexahedra ``(m, 8)``, between which the nodes behind the vertices lie
     """
 
-    def __init__(self, kind: basix.CellType, nodes: np.ndarray) -> None:
+    def __init__(self, kind: basix.CellType, nodes: Ints) -> None:
         self._kind = kind
         m = len(nodes)
         self.corners = n_corners(kind)
         self._vertices, vertex = np.unique(nodes[:, : self.corners], return_inverse=True)
-        parts = [vertex.reshape(m, -1)]
+        parts: list[Ints] = [vertex.reshape(m, -1)]
         self.between = []
         # nodes ``(e, b)`` of the entities with a node in the middle, and its weights ``(b,)``
         self._middles = []
@@ -44,7 +45,8 @@ class SecondOrder:
             if n_corners(of_dim) != 2**dim:
                 entities = entities[:0]
             around = entities[:, : n_corners(of_dim)]
-            first = which = np.arange(len(entities))  # a cell shares its inside with no other
+            first: np.ndarray = np.arange(len(entities))  # a cell shares its inside with no other
+            which = first
             if dim < dimension_of(kind):
                 first, which = distinct(around)
             middle = np.full((1, dim), 0.5)
@@ -63,7 +65,7 @@ class SecondOrder:
         ]
         return np.concatenate([values[self._vertices], *middles])
 
-    def sides(self, corners: np.ndarray) -> np.ndarray:
+    def sides(self, corners: Ints) -> Ints:
         """Nodes of the sides of cells with the vertices ``corners`` ``(k, c)``: of edges ``(k, 3)``
         the first one, the middle, the last one; of faces ``(k, 6)`` or ``(k, 9)`` in basix'
         order."""

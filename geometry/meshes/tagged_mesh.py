@@ -13,6 +13,7 @@ from dolfinx.mesh import Mesh, MeshTags, compute_incident_entities
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.materials.kinematics import Bools, Ints
 from archord.report.by_name import Names
 
 SAME_PLACE = 1e-8  # of the mesh's size
@@ -52,17 +53,17 @@ class TaggedMesh:
         """Tags of the cell set ``name``. Raises ValueError, also for a set without cells."""
         return tags_of("cell", self.cell_sets, name)
 
-    def cells_in(self, name: str) -> np.ndarray:
+    def cells_in(self, name: str) -> Ints:
         """Cells ``(n,)`` of the cell set ``name`` on this rank, ghosts included. Raises
         ValueError."""
         return _tagged(self.cells, self.cell_tags(name))
 
-    def facets_in(self, name: str) -> np.ndarray:
+    def facets_in(self, name: str) -> Ints:
         """Facets ``(n,)`` of the facet set ``name`` on this rank, ghosts included. Raises
         ValueError."""
         return _tagged(self.facets, tags_of("facet", self.facet_sets, name))
 
-    def dofs_in(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
+    def dofs_in(self, V: fem.FunctionSpace, name: str) -> Ints:
         """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet and point set
         ``name``, or in the cell set where it is neither. Collective; raises ValueError."""
         found = []
@@ -79,7 +80,7 @@ class TaggedMesh:
         known = [*self.facet_sets, *self.point_sets, *self.cell_sets]
         raise ValueError(unknown("facet, point or cell set", name, known))
 
-    def _nodes_at(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
+    def _nodes_at(self, V: fem.FunctionSpace, name: str) -> Ints:
         from scipy.spatial import cKDTree  # a solve without point sets does not pay for it
 
         points = self.point_sets[name]
@@ -93,7 +94,7 @@ class TaggedMesh:
         here = cKDTree(x).query_ball_point(points, near)
         n_owned = V.dofmap.index_map.size_local
 
-        def is_told() -> np.ndarray:
+        def is_told() -> Bools:
             """Whether as many nodes are at each point as the set has there. Collective."""
             owned = [sum(dof < n_owned for dof in dofs) for dofs in here]
             return comm.allreduce(np.array(owned)) == list(map(len, alike))
@@ -118,7 +119,7 @@ class TaggedMesh:
         cells = self.cells.indices[np.isin(self.cells.values, list(tags))]
         return set(V.dofmap.list[cells].ravel().tolist())
 
-    def cells_behind(self, name: str) -> np.ndarray:
+    def cells_behind(self, name: str) -> Ints:
         """Cells ``(n,)`` of this rank at the facets of the set ``name``, ghosts included."""
         d = self.dimension
         self.mesh.topology.create_connectivity(d - 1, d)
@@ -132,7 +133,7 @@ class TaggedMesh:
         return set().union(*parts)
 
 
-def _tagged(entities: MeshTags, tags: tuple[int, ...]) -> np.ndarray:
+def _tagged(entities: MeshTags, tags: tuple[int, ...]) -> Ints:
     """The ``entities`` ``(n,)`` of this rank that have one of the ``tags``."""
     return entities.indices[np.isin(entities.values, tags)]
 

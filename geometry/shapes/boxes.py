@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.rectangles import as_drawn
+from archord.geometry.shapes.rectangles import as_drawn, name_body
 from archord.report.errors import InputError
 
 _SIDES = ("left", "right", "bottom", "top", "back", "front")  # as gmsh numbers them
@@ -73,11 +73,7 @@ def _drawn(boxes: Mapping[str, Box], size: float, hexahedra: bool, gmsh: Any) ->
     mesh = gmsh.model.mesh
     for name, place in boxes.items():
         box = gmsh.model.occ.addBox(*place)
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [box], name=name)
-        faces = gmsh.model.getBoundary([(3, box)], oriented=False)
-        for side, (_, face) in zip(_SIDES, faces, strict=True):
-            gmsh.model.addPhysicalGroup(2, [face], name=f"{name} {side}")
+        faces = name_body(gmsh, name, (3, box), _SIDES)
         if hexahedra:
             for _, line in gmsh.model.getBoundary(faces, combined=False, oriented=False):
                 length = gmsh.model.occ.getMass(1, line)

@@ -11,6 +11,7 @@ from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL, Array, lagrange_el
 from archord.geometry.meshes.fenicsx import distribute, gathered
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
+from archord.materials.kinematics import Ints
 
 
 def layered(plane: TaggedMesh, heights: Mapping[str, Sequence[float]]) -> TaggedMesh:
@@ -29,8 +30,8 @@ def layered(plane: TaggedMesh, heights: Mapping[str, Sequence[float]]) -> Tagged
 
 def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshArrays:
     """The arrays of a `layered` mesh."""
-    cell_sets: dict[str, list[np.ndarray]] = defaultdict(list)
-    facet_sets: dict[str, list[np.ndarray]] = defaultdict(list)
+    cell_sets: dict[str, list[Ints]] = defaultdict(list)
+    facet_sets: dict[str, list[Ints]] = defaultdict(list)
     point_sets: dict[str, list[np.ndarray]] = defaultdict(list)
     x = []
     cells = []
@@ -56,8 +57,8 @@ def extruded(plane: MeshArrays, heights: Mapping[str, Sequence[float]]) -> MeshA
                 facet_sets[f"{name} above"].append(columns[..., -1])
         for name in plane.facet_sets:
             ends = plane.facets_of(name)[:, :2]
-            own = ends[np.isin(ends, corners).all(axis=1)]
-            facet_sets[name].append(_sides(over[own], plane.order))
+            inside = ends[np.isin(ends, corners).all(axis=1)]
+            facet_sets[name].append(_sides(over[inside], plane.order))
         for name, nodes in plane.point_sets.items():
             point_sets[name].append(over[nodes].ravel())
         n_nodes += len(feet)
@@ -79,7 +80,7 @@ def _node_heights(levels: tuple[float, ...], order: int) -> Array:
     return np.interp(steps, np.arange(n_layers + 1), levels)
 
 
-def _sides(over: np.ndarray, order: int) -> np.ndarray:
+def _sides(over: Ints, order: int) -> Ints:
     """Corners ``(n layers, 4)`` of the faces over edges, whose two ends have the nodes ``over``
     ``(n, 2, heights)`` them."""
     low = over[..., :-1:order]
@@ -115,7 +116,7 @@ def _cells_by_heights(
     return cells
 
 
-def _hexahedra(plane: MeshArrays, chosen: np.ndarray, over: np.ndarray) -> np.ndarray:
+def _hexahedra(plane: MeshArrays, chosen: Ints, over: Ints) -> Ints:
     """The cells ``(n layers, b)`` over the ``chosen`` ones ``(n,)`` of the plane mesh, whose nodes
     have the nodes ``over`` ``(nodes, levels)`` them."""
     order = plane.order

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
@@ -80,9 +80,19 @@ def as_drawn(boxes: Mapping[str, _Box], size: float) -> tuple[dict[str, _Box], f
 def _drawn(boxes: Mapping[str, Box], size: float, gmsh: Any) -> None:
     for name, (x, y, width, height) in boxes.items():
         face = gmsh.model.occ.addRectangle(x, y, 0, width, height)
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(2, [face], name=name)
-        lines = gmsh.model.getBoundary([(2, face)], oriented=False)
-        for side, (_, line) in zip(_SIDES, lines, strict=True):
-            gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
+        name_body(gmsh, name, (2, face), _SIDES)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+
+def name_body(
+    gmsh: Any, name: str, body: tuple[int, int], sides: Sequence[str]
+) -> list[tuple[int, int]]:
+    """Name a ``body``, a dimension and a tag of gmsh, and what bounds it by its ``sides``; returns
+    the dimensions and tags of what bounds it."""
+    dimension, tag = body
+    gmsh.model.occ.synchronize()
+    gmsh.model.addPhysicalGroup(dimension, [tag], name=name)
+    boundary = gmsh.model.getBoundary([body], oriented=False)
+    for side, (_, part) in zip(sides, boundary, strict=True):
+        gmsh.model.addPhysicalGroup(dimension - 1, [part], name=f"{name} {side}")
+    return boundary

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from archord.materials.elasticity import principal_stresses, von_mises
-from archord.materials.kinematics import PLANE_STRAIN, kinematics
+from archord.materials.kinematics import PLANE_STRAIN, Ints, kinematics
 from archord.materials.material import Array, Arrays
 from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arrays.arc import opened
@@ -92,14 +92,14 @@ class Fields:
     step: int
     delta: float  # or the load factor
     coordinates: Array  # (n, 2) undeformed
-    cells: np.ndarray  # (m, 6), or (m, 9) of quadrilaterals
-    body: np.ndarray  # (m,) the tag of the cell's body
+    cells: Ints  # (m, 6), or (m, 9) of quadrilaterals
+    body: Ints  # (m,) the tag of the cell's body
     displacement: Array  # (n, 2)
     cell: Arrays  # means of cells by name: scalars (m,), tensors (m, 4)
     nodal: Arrays  # recovered at the nodes: scalars (n,), tensors (n, 4)
     components: Names = PLANE_STRAIN.names  # of tensors (., 4)
     bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
-    edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along named sets
+    edges: Mapping[str, Ints] = field(default_factory=dict)  # (k, 3) nodes along named sets
 
     von_mises = _known("cell", "von_mises", "``(m,)``")
     mean_stress = _known("cell", "mean_stress", "``(m,)`` third of the trace")
@@ -118,7 +118,7 @@ class Fields:
         return self.coordinates + self.displacement
 
     @cached_property
-    def body_of_node(self) -> np.ndarray:
+    def body_of_node(self) -> Ints:
         """Body ``(n,)`` that every node belongs to; bodies share none."""
         found = np.zeros(len(self.coordinates), dtype=self.body.dtype)
         found[self.cells] = self.body[:, None]
@@ -144,11 +144,11 @@ class Fields:
         return found
 
     @property
-    def triangles(self) -> np.ndarray:
+    def triangles(self) -> Ints:
         """Nodes ``(m, k, 3)`` of the straight triangles that every cell is drawn by."""
         return self.cells[:, _SUBTRIANGLES[self.cells.shape[1]]]
 
-    def facets(self) -> np.ndarray:
+    def facets(self) -> Ints:
         """Edges ``(k, 3)`` of all cells, which lie on the left: first node, the one between, last
         node."""
         edges = self.cells[:, EDGES[self.cells.shape[1]]]
@@ -157,7 +157,7 @@ class Fields:
         edges[clockwise] = edges[clockwise, :, ::-1]
         return edges.reshape(-1, 3)
 
-    def outline(self) -> np.ndarray:
+    def outline(self) -> Ints:
         """The `facets` that are on the boundary of the bodies."""
         edges = self.facets()
         ends = np.sort(edges[:, [0, 2]], axis=1)

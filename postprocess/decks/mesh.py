@@ -10,7 +10,8 @@ import numpy as np
 from archord.geometry.basis import Array, dimension_of
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.cells import are_mirrored, lengths
-from archord.postprocess.decks.numbering import Ints, numbering
+from archord.materials.kinematics import Ints
+from archord.postprocess.decks.numbering import numbering
 from archord.solver.path.system import System
 from archord.solver.problem import Interaction, Rigid
 
@@ -93,7 +94,7 @@ def deck_mesh(system: System) -> DeckMesh:
                 raise ValueError("a rigid ball or cylinder cannot be exported; a body can")
             length = lengths(x, surfaces[opposite].nodes).mean()
             rim, ring = _ring(disc.circle, length)
-            ring += len(x)
+            ring = ring + len(x)
             x = np.concatenate([x, rim])
             n_before = sum(map(len, elements.values()))
             number = n_before + np.arange(len(ring))

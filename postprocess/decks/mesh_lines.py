@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.materials.kinematics import Ints
 from archord.postprocess.decks.mesh import label, surface_name
 from archord.postprocess.decks.model import DeckModel
-from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import continued, joined, number
 
 _FAMILIES = {"strain": "CPE", "stress": "CPS", "axisymmetric": "CAX", "space": "C3D"}

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archord.materials.kinematics import Ints
 from archord.materials.material import Arrays
 from archord.postprocess.decks.mesh import DeckMesh, label, surface_name
-from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import number
 from archord.report.by_name import Amounts
 from archord.solver.path.system import System

@@ -9,12 +9,10 @@ from typing import Any, NamedTuple
 
 import basix
 import numpy as np
-import numpy.typing as npt
 
 from archord.geometry.basis import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE
 from archord.geometry.meshes.formats.abaqus import SIDES
-
-Ints = npt.NDArray[np.int64]
+from archord.materials.kinematics import Ints
 
 # corners of a cell as elements count them, by their numbers in basix, and the order of those in a
 # mirror

@@ -12,9 +12,9 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.meshes.cells import lengths
+from archord.materials.kinematics import Ints
 from archord.postprocess.decks.mesh import DeckSurface, label, surface_name
 from archord.postprocess.decks.model import DeckModel
-from archord.postprocess.decks.numbering import Ints
 from archord.postprocess.decks.rows import number
 from archord.presets.held import drawn_gaps
 from archord.solver.problem import Interaction

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve, rms
 from archord.postprocess.judgement.convergence import Order, Refined, group
@@ -236,7 +237,7 @@ def _joint(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
     return LawJoint(run.R, run.dR, run.E_star, block_yield=run.sigY if c else None, k=k, c=c or 1.0)
 
 
-def _selected(run: RunCurve, load_range: tuple[float, float]) -> np.ndarray:
+def _selected(run: RunCurve, load_range: tuple[float, float]) -> Bools:
     """Which steps ``(n,)`` of ``run`` lie in the range of ``delta/dR``, ends included. Raises
     `InputError` if none."""
     load = run.x

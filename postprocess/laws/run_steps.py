@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from archord.materials.kinematics import Bools, Ints
 from archord.materials.material import Array
 from archord.postprocess.curve import on_first_loading
 from archord.postprocess.run import Run
@@ -48,12 +49,12 @@ class RunSteps:
     begin: int = 0
 
     @property
-    def closed(self) -> np.ndarray:
+    def closed(self) -> Bools:
         """Where anything touches."""
         return self.y > _OPEN * self.y.max()
 
     @property
-    def first(self) -> np.ndarray:
+    def first(self) -> Ints:
         """Indices of the steps that were deeper than all before."""
         return np.flatnonzero(on_first_loading(self.x, self.y))
 

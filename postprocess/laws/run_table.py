@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.postprocess.curve import rms
 from archord.postprocess.laws.general.joint_curve import JointCurve, hermite
@@ -66,7 +67,7 @@ class _WayBack(NamedTuple):
 
     curve: _Cubic
     ratio: Array
-    steps: np.ndarray
+    steps: Ints
     said: str
 
 
@@ -124,7 +125,7 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
     return replace(curve, about=about)
 
 
-def _steps_of_loading(steps: RunSteps) -> np.ndarray:
+def _steps_of_loading(steps: RunSteps) -> Ints:
     """Indices of the steps of first loading, from the first contact on."""
     first = steps.first
     has_force = steps.y.max(initial=0.0) > 0
@@ -137,7 +138,7 @@ def _steps_of_loading(steps: RunSteps) -> np.ndarray:
     return k
 
 
-def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> ByName:
+def _tables(steps: RunSteps, k: Ints, loading: _Cubic, back: _WayBack) -> ByName:
     """All cubics at the nodes of both ways, by their names in `JointCurve`."""
     on_way_back = back.curve.x
     distance = np.abs(on_way_back[:, None] - loading.x).min(axis=1)
@@ -160,7 +161,7 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
     return tables | steps.units
 
 
-def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
+def _way_back(steps: RunSteps, k: Ints, loading: _Cubic) -> _WayBack:
     """The way back of the largest displacement that the run unloads from after yielding; first
     loading if it does not yield. ``k`` are the steps of ``loading``."""
     start = loading.x[-len(k) - 1]
@@ -196,7 +197,7 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
     return _WayBack(curve, ratio, way, said)
 
 
-def _require_way_back(steps: RunSteps, k: np.ndarray) -> None:
+def _require_way_back(steps: RunSteps, k: Ints) -> None:
     """Raise `InputError` of a run that does not yield, but rubs, and never comes back from the
     steps ``k``: it would come back by other forces."""
     rubbed = steps.run.columns.get("friction_dissipation", [0.0])
@@ -207,7 +208,7 @@ def _require_way_back(steps: RunSteps, k: np.ndarray) -> None:
         )
 
 
-def _last_unloading(steps: RunSteps, k: np.ndarray, least: float) -> np.ndarray:
+def _last_unloading(steps: RunSteps, k: Ints, least: float) -> Ints:
     """Indices of the steps of the last unloading from one of the steps ``k`` that has dissipated
     more than ``least``. Raises `InputError` without one of enough steps."""
     folder = steps.run.folder
@@ -238,7 +239,7 @@ def _shift(loading: _Cubic, dissipated: Array, least: float) -> Array:
 
 
 def _errors_back(
-    curve: JointCurve, steps: RunSteps, k: np.ndarray, back: _WayBack
+    curve: JointCurve, steps: RunSteps, k: Ints, back: _WayBack
 ) -> tuple[Array | None, str]:
     """Errors at the nodes of the way back from there, over the force it begins at; None of what
     does not yield and has not come back. And in words the errors of the unloadings that ``curve``
@@ -278,7 +279,7 @@ def _worst(curve: JointCurve, errors: dict[float, Array]) -> Array:
     return np.interp(curve.x, known, largest)
 
 
-def _unloadings(steps: RunSteps, k: np.ndarray) -> list[np.ndarray]:
+def _unloadings(steps: RunSteps, k: Ints) -> list[Ints]:
     """Indices of the steps of each way back from one of the steps ``k``, which begins it."""
     back = np.append(np.diff(steps.x) < 0, False)
     return [np.arange(i, i + back[i:].argmin() + 1) for i in k if back[i]]

@@ -25,6 +25,7 @@ from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import measures, place, poor_cells, quality
 from archord.geometry.meshes.refine import cylinder_through
 from archord.geometry.patches import Patches
+from archord.materials.kinematics import Array, Bools, Ints
 from archord.output.user_file import save_figure
 from archord.report.figure import new_figure
 from archord.report.table import Table
@@ -42,18 +43,19 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     extent = f"{extents} from {lowest}"
     head = f"{name}: {len(mesh.cells)} {kind}, {len(mesh.x)} nodes, {extent}"
     cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
-    size = "area" if is_plane else "volume"
-    bodies = Table("cell set", "cells", size, "parts", "Jacobian", "roundness", left=1)
+    size = "area {:.6g}" if is_plane else "volume {:.6g}"
+    worst = ("Jacobian {:.2g}", "roundness {:.2g}")
+    bodies = Table("cell set", "cells", size, "parts", *worst, left=1)
     good = quality(mesh)
     for name, inside in cells.items():
         n_parts = parts(mesh.kind, mesh.cells[inside]).max(initial=-1) + 1
-        worst = [f"{values[inside].min(initial=1.0):.2g}" for values in good]
-        total = area[inside].sum()
-        bodies.add(name, inside.sum(), f"{total:.6g}", n_parts, *worst)
+        lowest_of = [values[inside].min(initial=1.0) for values in good]
+        bodies.add(name, inside.sum(), area[inside].sum(), n_parts, *lowest_of)
     row = _facet_row if is_plane else _face_row
     shape = ["circle"] if is_plane else ["middle", "cylinder"]
-    size = "length" if is_plane else "area"
-    columns = ["facet set", "of", *shape, "facets", size, "shortest", "longest"]
+    size = "length {:.5g}" if is_plane else "area {:.5g}"
+    extremes = ("shortest {:.5g}", "longest {:.5g}")
+    columns = ["facet set", "of", *shape, "facets", size, *extremes]
     facets = Table(*columns, left=columns.index("facets"))
     for name in mesh.facet_sets:
         entries = row(mesh, mesh.facets_of(name), cells)
@@ -71,16 +73,14 @@ def mesh_text(name: str, mesh: MeshArrays) -> str:
     return "\n\n".join(parts_of_text)
 
 
-def _owners(mesh: MeshArrays, facets: np.ndarray, cells: Mapping[str, np.ndarray]) -> str:
+def _owners(mesh: MeshArrays, facets: Ints, cells: Mapping[str, Bools]) -> str:
     """The sets of the ``cells`` behind facets."""
     corners = corners_of(mesh.kind, facets)
     behind = sides_between(mesh.kind, mesh.cells, corners) // n_sides(mesh.kind)
     return ", ".join(name for name, inside in cells.items() if inside[behind].any())
 
 
-def _face_row(
-    mesh: MeshArrays, facets: np.ndarray, cells: Mapping[str, np.ndarray]
-) -> list[object]:
+def _face_row(mesh: MeshArrays, facets: Ints, cells: Mapping[str, Bools]) -> list[object]:
     """Owners, middle, cylinder, number, area, shortest and longest edge of the ``facets`` of a set
     in space."""
     kind = side_kind(mesh.kind)
@@ -94,18 +94,15 @@ def _face_row(
     length = lengths(mesh.x, entities_of(kind, facets, 1))
     area = Patches(mesh.x, facets, kind, mesh.order).areas().sum()
     owners = _owners(mesh, facets, cells)
-    return [owners, middle, said, len(facets), *_sizes(area, length)]
+    return [owners, middle, said, len(facets), area, *_extremes(length)]
 
 
-def _sizes(whole: float, length: np.ndarray) -> list[str]:
-    """The ``whole`` of a set, and the shortest and the longest ``length`` ``(k,)`` in it."""
-    sizes = [whole, length.min(initial=np.inf), length.max(initial=0.0)]
-    return [f"{value:.5g}" for value in sizes]
+def _extremes(length: Array) -> tuple[float, float]:
+    """The shortest and the longest ``length`` ``(k,)`` in a set."""
+    return length.min(initial=np.inf), length.max(initial=0.0)
 
 
-def _facet_row(
-    mesh: MeshArrays, edges: np.ndarray, cells: Mapping[str, np.ndarray]
-) -> list[object]:
+def _facet_row(mesh: MeshArrays, edges: Ints, cells: Mapping[str, Bools]) -> list[object]:
     """Owners, circle, number, length, shortest and longest of the ``edges`` of a set."""
     nodes, count = np.unique(edges[:, :2], return_counts=True)
     curve = Curve(mesh.x, edges.shape[1] - 1, along(edges))
@@ -123,7 +120,7 @@ def _facet_row(
     if len(nodes) and (count == 2).all():
         said.append("closed")
     owners = _owners(mesh, edges, cells)
-    return [owners, ", ".join(said), len(edges), *_sizes(length.sum(), length)]
+    return [owners, ", ".join(said), len(edges), length.sum(), *_extremes(length)]
 
 
 def draw_mesh(mesh: MeshArrays, target: Path) -> Path:
@@ -183,7 +180,7 @@ def _draw_solids(mesh: MeshArrays, target: Path) -> Path:
     return save_figure(figure, target)
 
 
-def _triangles(mesh: MeshArrays, facets: np.ndarray) -> np.ndarray:
+def _triangles(mesh: MeshArrays, facets: Ints) -> Ints:
     """Nodes ``(k, 3)`` of the triangles that facets in space are, or are cut into."""
     corners = corners_of(mesh.kind, facets)
     if corners.shape[1] == 3:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arrays.fields import Fields
@@ -111,8 +112,8 @@ def draw_field(
     run: Run,
     fields: Fields,
     x: Array,
-    shown: np.ndarray,
-    ranged: np.ndarray,
+    shown: Bools,
+    ranged: Bools,
     field: str = "",
 ) -> None:
     """A ``field`` in the ``shown`` cells ``(m,)`` with the nodes at ``x``: by default PEEQ, grey

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.pictures.problems import (
@@ -77,7 +78,7 @@ class Skin(NamedTuple):
     corners: Array
     values: Array
     edges: Array
-    beside: np.ndarray
+    beside: Ints
 
 
 class View(NamedTuple):
@@ -157,7 +158,7 @@ def skin_of(run: Run, fields: Fields, values: Array, cut: str = "") -> Skin:
     return Skin(corners, at_corners, x[ends], beside)
 
 
-def _sharp(triangles: np.ndarray, normal: Array) -> tuple[np.ndarray, np.ndarray]:
+def _sharp(triangles: Ints, normal: Array) -> tuple[Ints, Ints]:
     """The ends ``(j, 2)`` of the sides at which ``triangles`` ``(k, 3)`` with these ``normal``
     vectors meet at a sharp angle, and the two triangles ``(j, 2)`` beside each."""
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

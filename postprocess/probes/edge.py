@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.vectors import unit
+from archord.materials.kinematics import Bools, Ints
 from archord.materials.material import Array, Arrays
 from archord.postprocess.arrays.fields import Fields
 from archord.postprocess.probes.angles import angles_about, rising
@@ -70,7 +71,7 @@ def _at_meeting(run: Probed, fields: Fields, edge: str, quantity: str) -> Along:
     return _once(fields, nodes, joined, s, values)
 
 
-def _once(fields: Fields, nodes: np.ndarray, joined: np.ndarray, s: Array, values: Array) -> Along:
+def _once(fields: Fields, nodes: Ints, joined: Bools, s: Array, values: Array) -> Along:
     """``values`` and ``s`` ``(k, 3)`` at the ``nodes`` ``(k, 3)`` of facets, each node once: the
     last node of a facet that is ``joined`` to the next one is the first node there."""
     shown = np.ones(nodes.shape, dtype=bool)
@@ -79,7 +80,7 @@ def _once(fields: Fields, nodes: np.ndarray, joined: np.ndarray, s: Array, value
     return Along(x, s[shown], values[shown])
 
 
-def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
+def _along(fields: Fields, edge: str) -> tuple[Ints, Array, float]:
     """Nodes ``(k, 3)`` along the facets of an ``edge``, piece by piece, with the body on the left,
     but on arcs counterclockwise; ``s`` ``(k, 3)`` of a `Probe` there, and the radius of an arc
     (else 0)."""
@@ -92,7 +93,7 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     _, once = np.unique(nodes[:, 1], return_index=True)
     nodes = nodes[once]
     starts = x[nodes[:, 0]]
-    height = starts @ [1.0, 1e-3]
+    height: Array = starts @ [1.0, 1e-3]
     radius = 0.0
     circle = circle_through(x[np.unique(nodes)])
     if circle is not None:
@@ -117,7 +118,7 @@ def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     return nodes, s, radius
 
 
-def _tangents(run: Probed, fields: Fields, nodes: np.ndarray) -> tuple[Array, np.ndarray]:
+def _tangents(run: Probed, fields: Fields, nodes: Ints) -> tuple[Array, Bools]:
     """Unit tangents ``(k, 3, d)`` at the ``nodes`` ``(k, 3)`` of facets, where two meet without a
     corner their mean; and which facets ``(k,)`` are so followed by the next. At large strain they
     are tangents of the deformed edge, on which true stresses act."""

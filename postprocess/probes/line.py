@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from archord.geometry.vectors import crossed
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.output.cell_fields import row_of
 from archord.postprocess.arrays.fields import Fields
@@ -87,7 +88,7 @@ def _in_cells(
     return np.where(cell >= 0, values, np.nan)
 
 
-def _in_triangles(corners: Array, x: Array) -> tuple[np.ndarray, Array]:
+def _in_triangles(corners: Array, x: Array) -> tuple[Ints, Array]:
     """For each point ``x`` ``(k, 2)`` the triangle ``(k,)`` of these ``corners`` ``(m, 3, 2)`` that
     it lies in or on, -1 for none, and the weights ``(k, 3)`` of the corners.
 

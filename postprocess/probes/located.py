@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.output.files.xdmf import CELLS
 from archord.postprocess.arrays.fields import Fields
@@ -13,7 +14,7 @@ _NEWTON = 10
 _BESIDE = 1e-6  # beyond the reference cell, where a point still lies on its side
 
 
-def located(fields: Fields, x: Array) -> tuple[np.ndarray, np.ndarray, Array]:
+def located(fields: Fields, x: Array) -> tuple[Ints, Ints, Array]:
     """For each point ``x`` ``(k, 3)`` its cell ``(k,)``, -1 outside the bodies, the cell's nodes
     and their weights ``(k, a)`` at the point. Where bodies meet, the cell is of the first one."""
     per_cell = fields.cells.shape[1]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from archord.materials.kinematics import Ints
 from archord.postprocess.arrays.fields import EDGES, Fields
 from archord.report.errors import InputError
 
 
-def meeting(fields: Fields, edge: str) -> np.ndarray:
+def meeting(fields: Fields, edge: str) -> Ints:
     """Nodes ``(k, 3)`` along the edge "A & B" where two named surfaces meet. Raises `InputError`
     for other names, and for surfaces that do not meet in one curve."""
     sides = [name.strip() for name in edge.split("&")]
@@ -24,13 +25,13 @@ def meeting(fields: Fields, edge: str) -> np.ndarray:
     return _chained(shared[once], edge)
 
 
-def _edges_of(faces: np.ndarray) -> np.ndarray:
+def _edges_of(faces: Ints) -> Ints:
     """The edges ``(k, 3)`` of ``faces`` ``(m, 6)`` or ``(m, 9)``."""
     of_face = EDGES[faces.shape[1]]
     return faces[:, of_face].reshape(-1, 3)
 
 
-def _chained(edges: np.ndarray, name: str) -> np.ndarray:
+def _chained(edges: Ints, name: str) -> Ints:
     """The ``edges`` ``(k, 3)`` in the order of one curve, each turned along it. Raises
     `InputError`."""
     vertices, count = np.unique(edges[:, [0, 2]], return_counts=True)

@@ -9,11 +9,13 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
+from archord.materials.kinematics import Ints
+
 _NO_SLOTS = np.zeros((2, 0), dtype=np.int64)
 
 
 def matrix(
-    V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarray] = _NO_SLOTS
+    V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[Ints] = _NO_SLOTS
 ) -> PETSc.Mat:
     """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` blocks
     (rows, columns), in global block dofs and rows that this rank owns. PETSc gives back what is not

@@ -10,7 +10,7 @@ from dolfinx import fem
 
 from archord.geometry.basis import Array, cell_basis
 from archord.geometry.strain import PointStrain
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import Bools, Ints, Kinematics
 from archord.materials.material import Material, Points, of_small_strain
 from archord.report.errors import InputError
 
@@ -27,7 +27,7 @@ class PointFields(NamedTuple):
     - ``material``, and ``state``: its history at these ``n q`` points
     """
 
-    cells: np.ndarray
+    cells: Ints
     coordinates: Array
     weight: Array
     stress: Array
@@ -53,7 +53,7 @@ class BodyPoints:
     def __init__(
         self,
         V: fem.FunctionSpace,
-        cells: np.ndarray,
+        cells: Ints,
         material: Material,
         kinematics: Kinematics,
         rule: int,
@@ -74,10 +74,10 @@ class BodyPoints:
         self.strain: Array = np.zeros((self.weight.size, self.measure.k))
         components = self.measure.k if large else kinematics.n_stress
         self.stress: Array = np.zeros((self.weight.size, components))
-        self.flows: np.ndarray = np.zeros(len(cells), dtype=bool)
+        self.flows: Bools = np.zeros(len(cells), dtype=bool)
 
     @property
-    def flowing(self) -> np.ndarray:
+    def flowing(self) -> Ints:
         """The cells ``(m,)`` with a point that has left its elastic tangent."""
         return self.cells[self.flows]
 

@@ -13,7 +13,6 @@ from copy import deepcopy
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
@@ -21,7 +20,7 @@ from archord.geometry.basis import Array
 from archord.geometry.cell_rules import CellRule, cell_rules
 from archord.geometry.strain import strain_terms
 from archord.materials.faults import overwrites
-from archord.materials.kinematics import PLANE_STRAIN, Kinematics
+from archord.materials.kinematics import PLANE_STRAIN, Ints, Kinematics
 from archord.materials.material import Material, Points, of_small_strain
 from archord.solver.bulk.assembly import assemble, matrix
 from archord.solver.bulk.body_points import BodyPoints, PointFields
@@ -29,7 +28,6 @@ from archord.solver.bulk.distortion import DistortionMeter
 from archord.solver.bulk.point_forms import PointForms
 from archord.solver.bulk.stiffness import CellStiffness
 
-Index = npt.NDArray[np.integer]
 _NONE = np.zeros(0, dtype=np.int32)
 
 
@@ -46,10 +44,10 @@ class Bulk:
     def __init__(
         self,
         V: fem.FunctionSpace,
-        cells: Mapping[int, Index],
+        cells: Mapping[int, Ints],
         materials: Mapping[int, Material],
         kinematics: Kinematics = PLANE_STRAIN,
-        in_contact: Index = _NONE,
+        in_contact: Ints = _NONE,
     ) -> None:
         self.V = V
         self.materials = materials
@@ -111,7 +109,7 @@ class Bulk:
         form = CellStiffness(self.V, self.kinematics, rule.degree, terms, moduli)
         return form.over(rule.among(self.cells[tag]))
 
-    def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
+    def histories(self) -> dict[str, tuple[Ints, Points]]:
         """Cells ``(n,)`` of this rank and their ``n q`` points, of the bodies that are not linear:
         by the body's tag, in cells with the full rule by its tag and "full"."""
         found = {}

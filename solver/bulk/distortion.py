@@ -11,7 +11,7 @@ from dolfinx import fem
 
 from archord.geometry.basis import Array, cell_basis
 from archord.geometry.strain import PointStrain
-from archord.materials.kinematics import SPACE, Kinematics
+from archord.materials.kinematics import SPACE, Ints, Kinematics
 
 
 class Distortion(NamedTuple):
@@ -35,7 +35,7 @@ class DistortionMeter:
     """Measures the distortion of bodies, whose ``cells`` are given by their tags."""
 
     def __init__(
-        self, V: fem.FunctionSpace, cells: Mapping[int, np.ndarray], kinematics: Kinematics
+        self, V: fem.FunctionSpace, cells: Mapping[int, Ints], kinematics: Kinematics
     ) -> None:
         self.V = V
         self.cells = cells

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.strain import strain_terms
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import Ints, Kinematics
 from archord.solver.bulk.assembly import assemble
 from archord.solver.bulk.body_points import BodyPoints
 from archord.solver.bulk.stiffness import CellStiffness
@@ -47,7 +47,7 @@ class PointForms:
         self._correction = fem.Function(fem.functionspace(V.mesh, tensors))
         terms = strain_terms(kinematics, large=large)
         self._stiffness = CellStiffness(V, kinematics, rule, terms, self._correction)
-        self._corrected_cells: np.ndarray | None = None  # cells of the form that was made last
+        self._corrected_cells: Ints | None = None  # cells of the form that was made last
         self._correction_forms: list[fem.Form] = []
 
     def _corrections(self) -> Array:

@@ -15,7 +15,7 @@ from dolfinx import fem
 from archord.geometry.basis import Array, displacement_element, table_of, tabulate
 from archord.kernels.compat import cell_degree, cell_form
 from archord.kernels.compiled import address
-from archord.materials.kinematics import Kinematics
+from archord.materials.kinematics import Ints, Kinematics
 
 _SOURCE = Path(__file__).with_name("stiffness.c")
 
@@ -57,7 +57,7 @@ class CellStiffness:
         packed = np.concatenate([np.ravel(part) for part in parts]).astype(float)
         self._constants = fem.Constant(V.mesh, packed)
 
-    def over(self, cells: np.ndarray) -> fem.Form:
+    def over(self, cells: Ints) -> fem.Form:
         """The form over these ``cells``, of this rank."""
         kernel = address(_SOURCE, "stiffness")
         return cell_form(self.V, kernel, cells, self._functions, [self._constants])

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.kernels.blocks import add_blocks
 from archord.kernels.compat import ghosted_vector
+from archord.materials.kinematics import Bools, Ints
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk.assembly import assemble, matrix
 from archord.solver.contact.tangent import Filled
@@ -36,7 +37,7 @@ class _Slots(NamedTuple):
     """
 
     in_matrix: np.ndarray
-    is_free: np.ndarray
+    is_free: Bools
     row_rate: Array
     column_rate: Array
 
@@ -104,7 +105,7 @@ class TangentMatrix:
         dofs = self.dimension * nodes + axis
         return fem.dirichletbc(0.0, dofs, self.V.sub(axis))
 
-    def _prescribed_rates(self) -> tuple[np.ndarray, Array]:
+    def _prescribed_rates(self) -> tuple[Ints, Array]:
         """The prescribed dofs ``(p,)`` of all ranks, and then the dofs of rigid discs and one that
         is none; and their displacements ``(p, m)`` per unit of the unknown levels."""
         drives = self.drives
@@ -174,7 +175,7 @@ class TangentMatrix:
         if self._both is None or self.bulk.plastic or self.bulk.finite or self.springs:
             self._elastic = self.A.copy()
 
-    def _slots_of(self, rows: np.ndarray, columns: np.ndarray) -> _Slots:
+    def _slots_of(self, rows: Ints, columns: Ints) -> _Slots:
         in_matrix = (rows < self._size) & (columns < self._size)
         is_met = np.zeros(1 + max(rows.max(initial=0), columns.max(initial=0)), dtype=bool)
         is_met[rows] = True
@@ -186,7 +187,7 @@ class TangentMatrix:
         is_free = node_is_free[row][:, :, None] * node_is_free[column][:, None, :]
         return _Slots(in_matrix, is_free, rate[row], rate[column])
 
-    def _at(self, nodes: np.ndarray) -> tuple[np.ndarray, Array]:
+    def _at(self, nodes: Ints) -> tuple[Ints, Array]:
         """Which displacements of block dofs ``nodes`` ``(k,)`` are free ``(k, d)``; the others'
         rates ``(k, d, m)``."""
         dofs = self.dimension * nodes[:, None] + np.arange(self.dimension)
@@ -305,7 +306,7 @@ class TangentMatrix:
         force.destroy()
         return found
 
-    def _with_contact(self, of_bulk: Array, nodes: np.ndarray, values: Array) -> Array:
+    def _with_contact(self, of_bulk: Array, nodes: Ints, values: Array) -> Array:
         """The bulk's forces and the ``values`` ``(k, d)`` of the contact at block dofs
         ``nodes``."""
         inside = nodes < self._size

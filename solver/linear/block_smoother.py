@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.kernels.blocks import Blocks, blocks_of, ghost_exchange
 from archord.kernels.compiled import library, pointer, structure
+from archord.materials.kinematics import Ints
 
 _SOURCE = Path(__file__).with_suffix(".c")
 
@@ -36,7 +37,7 @@ class BlockSmoother:
         self._comm = matrices[0].comm
         self._d = matrices[0].getBlockSize()
         self._n = matrices[0].getLocalSize()[0] // self._d
-        self.ghosts: np.ndarray = np.zeros(0, dtype=np.int32)
+        self.ghosts: Ints = np.zeros(0, dtype=np.int32)
         self.x: np.ndarray = np.zeros((0, self._d), dtype=np.float32)
         self._n_blocks = -1
 
@@ -64,7 +65,7 @@ class BlockSmoother:
             first_ghost += len(ghosts)
         library(_SOURCE).pack_blocks(self._rows, chain[-1])
 
-    def _allocate(self, terms: Sequence[tuple[Blocks, Blocks, np.ndarray]]) -> None:
+    def _allocate(self, terms: Sequence[tuple[Blocks, Blocks, Ints]]) -> None:
         d = self._d
         n = self._n
         self.ghosts = np.concatenate([ghosts for _, _, ghosts in terms])

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
+from archord.materials.kinematics import Bools
 from archord.solver.linear import bordered, condensed, lagged, look_ahead, multigrid, substructured
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
@@ -38,7 +38,7 @@ class Choice:
         return self.why_not[name] is None
 
     def factoriser(
-        self, V: fem.FunctionSpace, fixed: np.ndarray, terms: Sequence[PETSc.Mat]
+        self, V: fem.FunctionSpace, fixed: Bools, terms: Sequence[PETSc.Mat]
     ) -> Strategy:
         """The strategy that solves with the sum of ``terms``, which only multigrid takes more than
         one of, of the displacements ``V``, of which some are ``fixed`` ``(n_local, d)``.

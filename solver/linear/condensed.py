@@ -21,6 +21,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.materials.kinematics import Ints
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.look_ahead import look_ahead
 from archord.solver.linear.strategy import Facts, Product, Strategy
@@ -71,7 +72,7 @@ class Condensed(Strategy):
     def __init__(
         self,
         K: PETSc.Mat,
-        nodes: np.ndarray,
+        nodes: Ints,
         dimension: int,
         revise: Callable[[Array], Array | None],
     ) -> None:
@@ -91,12 +92,12 @@ class Condensed(Strategy):
         self.matrix = PETSc.Mat().createPython(K.getSizes(), context=Product(self), comm=K.comm)
         self.matrix.setUp()
 
-    def _dofs(self, nodes: np.ndarray) -> np.ndarray:
+    def _dofs(self, nodes: Ints) -> Ints:
         """All dofs of each of ``nodes``."""
         dofs = self.dimension * nodes[:, None] + np.arange(self.dimension)
         return dofs.ravel()
 
-    def _responses(self, dofs: np.ndarray) -> Array:
+    def _responses(self, dofs: Ints) -> Array:
         """Displacements ``(n of this rank, d m)`` under unit forces at ``dofs`` ``(d m,)``, one
         after the other."""
         self._found = self._dense(len(dofs))
@@ -112,7 +113,7 @@ class Condensed(Strategy):
         matrix.setUp()
         return matrix
 
-    def _unit_forces(self, dofs: np.ndarray) -> PETSc.Mat:
+    def _unit_forces(self, dofs: Ints) -> PETSc.Mat:
         m = len(dofs)
         if self.comm.size > 1:  # PETSc spoils sparse ones of several ranks
             unit = self._dense(m)
@@ -127,12 +128,12 @@ class Condensed(Strategy):
         rows = PETSc.Mat().createAIJ((m, size), csr=csr, comm=self._K.comm)
         return PETSc.Mat().createTranspose(rows)
 
-    def _own(self, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _own(self, dofs: Ints) -> tuple[Ints, Ints]:
         """Which of ``dofs`` this rank owns, and where they are among its own."""
         mine = np.flatnonzero((dofs >= self._start) & (dofs < self._end))
         return mine, dofs[mine] - self._start
 
-    def _on_all(self, dofs: np.ndarray, own: Array) -> Array:
+    def _on_all(self, dofs: Ints, own: Array) -> Array:
         """The entries of ``own``, of the dofs of each rank, at ``dofs`` on every rank."""
         mine, at = self._own(dofs)
         values = np.zeros((len(dofs), *own.shape[1:]))
@@ -150,7 +151,7 @@ class Condensed(Strategy):
             self.comm.Allreduce(MPI.IN_PLACE, values)
         return values
 
-    def occupy(self, rows: np.ndarray, columns: np.ndarray) -> None:
+    def occupy(self, rows: Ints, columns: Ints) -> None:
         """Let this rank's blocks of `update` be at block dofs ``rows``, among the nodes, and
         ``columns`` ``(b,)``, each place once; all are zero."""
         d = self.dimension
@@ -224,7 +225,7 @@ class Condensed(Strategy):
         return force
 
 
-def filled(blocks: np.ndarray) -> np.ndarray:
+def filled(blocks: np.ndarray) -> Ints:
     """Which of ``blocks`` ``(n, d, d)`` are not all zero; numpy's `any` is several times slower on
     so short axes."""
     found = np.zeros(len(blocks), dtype=bool)

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.kernels.blocks import Blocks, add_blocks, blocks_of
 from archord.kernels.compiled import library, pointer, structure
+from archord.materials.kinematics import Ints
 
 _SOURCE = Path(__file__).with_suffix(".c")
 _ROOM = 40  # for blocks in a row: cells about a node have fewer nodes, but for those in contact
@@ -24,8 +25,8 @@ _ROOM = 40  # for blocks in a row: cells about a node have fewer nodes, but for 
 class _Weights(NamedTuple):
     """What coarse nodes give to fine ones: ``q`` pairs of both, by fine nodes."""
 
-    fine: np.ndarray  # (q,)
-    coarse: np.ndarray  # (q,)
+    fine: Ints  # (q,)
+    coarse: Ints  # (q,)
     weight: Array  # (q, d)
 
 
@@ -61,7 +62,7 @@ class Galerkin:
         self.matrix.setType("baij")
         self.matrix.setUp()
 
-    def _rows_of(self, ghosts: np.ndarray) -> PETSc.Mat:
+    def _rows_of(self, ghosts: Ints) -> PETSc.Mat:
         """The interpolation to ``ghosts``."""
         rows = (self._d * ghosts[:, None] + np.arange(self._d)).astype(PETSc.IntType)
         wanted = PETSc.IS().createGeneral(rows.ravel(), comm=PETSc.COMM_SELF)
@@ -104,7 +105,7 @@ class Galerkin:
 
     def _product(
         self, A: Blocks, right: dict[str, np.ndarray], with_zeros: bool
-    ) -> tuple[np.ndarray, np.ndarray, Array]:
+    ) -> tuple[Ints, Ints, Array]:
         """Rows and columns ``(k,)`` and blocks ``(k, d, d)`` of the product of some columns, also
         of blocks that are zero, ``with_zeros``, to make room for them."""
         of_A = {
@@ -128,6 +129,6 @@ class Galerkin:
         return rows[:needed], columns[:needed], blocks[:needed]
 
 
-def _starts(sorted_numbers: np.ndarray, n: int) -> np.ndarray:
+def _starts(sorted_numbers: Ints, n: int) -> Ints:
     """Where each of the numbers below ``n`` begins, and where the last one ends ``(n + 1,)``."""
     return np.searchsorted(sorted_numbers, np.arange(n + 1)).astype(np.int32)

@@ -24,7 +24,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array, lagrange_element
 from archord.kernels.blocks import without_zeros
-from archord.materials.kinematics import kinematics
+from archord.materials.kinematics import Bools, Ints, kinematics
 from archord.solver.linear.block_product import COMPONENTS, quick_product
 from archord.solver.linear.block_smoother import BlockSmoother, Sweeps
 from archord.solver.linear.forcing import LOOSEST
@@ -101,7 +101,7 @@ class Multigrid(Strategy):
     entries : those of it that were not zero when the levels below were made
     """
 
-    def __init__(self, terms: Sequence[PETSc.Mat], V: fem.FunctionSpace, fixed: np.ndarray) -> None:
+    def __init__(self, terms: Sequence[PETSc.Mat], V: fem.FunctionSpace, fixed: Bools) -> None:
         A = terms[0]
         self.matrix = A
         self._terms = terms
@@ -231,7 +231,7 @@ def _use_options(solver: PETSc.PC, prefix: str, wanted: Mapping[str, Any]) -> No
     solver.setFromOptions()
 
 
-def _linear(V: fem.FunctionSpace, fixed: np.ndarray) -> tuple[fem.FunctionSpace, np.ndarray]:
+def _linear(V: fem.FunctionSpace, fixed: Bools) -> tuple[fem.FunctionSpace, np.ndarray]:
     """The linear displacements on the mesh of ``V``, and which of them are fixed ``(n_local,
     d)``."""
     d = V.dofmap.index_map_bs
@@ -253,7 +253,7 @@ def _weights(V: fem.FunctionSpace) -> Array:
 
 
 def _interpolation(
-    V: fem.FunctionSpace, linear: fem.FunctionSpace, fixed: np.ndarray, fixed_linear: np.ndarray
+    V: fem.FunctionSpace, linear: fem.FunctionSpace, fixed: Bools, fixed_linear: Bools
 ) -> PETSc.Mat:
     """The matrix of the values of ``linear`` displacements at the nodes of ``V``, without
     displacements that are fixed, but for themselves at the same node."""
@@ -276,7 +276,7 @@ def _interpolation(
     return P
 
 
-def _a_cell_of_each_node(V: fem.FunctionSpace) -> tuple[np.ndarray, np.ndarray]:
+def _a_cell_of_each_node(V: fem.FunctionSpace) -> tuple[Ints, Ints]:
     """A cell ``(n_owned,)`` on which each node of ``V`` lies, and its place among the nodes of that
     cell."""
     nodes, first = np.unique(V.dofmap.list, return_index=True)
@@ -286,7 +286,7 @@ def _a_cell_of_each_node(V: fem.FunctionSpace) -> tuple[np.ndarray, np.ndarray]:
     return cell[:n], place[:n]
 
 
-def _free_rigid_motions(V: fem.FunctionSpace, fixed: np.ndarray) -> Array:
+def _free_rigid_motions(V: fem.FunctionSpace, fixed: Bools) -> Array:
     """The rigid motions ``(k, n_owned, d)`` of the nodes, zero where displacements are fixed."""
     d = V.dofmap.index_map_bs
     n = V.dofmap.index_map.size_local

@@ -12,6 +12,7 @@ from dolfinx import fem
 
 from archord.geometry.basis import lagrange_element
 from archord.kernels.compat import METIS
+from archord.materials.kinematics import Ints
 
 _PROTOTYPES = """
 int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights,
@@ -32,7 +33,7 @@ def metis() -> tuple[cffi.FFI, Any]:
     raise OSError("METIS is not installed")
 
 
-def corners(V: fem.FunctionSpace) -> np.ndarray:
+def corners(V: fem.FunctionSpace) -> Ints:
     """The nodes ``(n_owned, k)``, in global numbers, at the corners of the edge or the cell that
     each of this rank's nodes of ``V`` lies on; those at corners are their own."""
     element = V.element.basix_element
@@ -46,7 +47,7 @@ def corners(V: fem.FunctionSpace) -> np.ndarray:
     return index_map.local_to_global(owned.ravel()).reshape(-1, k)
 
 
-def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.ndarray) -> np.ndarray:
+def before_corners(n: int, rows: Ints, columns: Ints, corner: Ints) -> Ints:
     """As `nested_dissection`, quicker: only unknowns at corners are ordered by METIS, the others
     come right before the first one of their corners ``(n, k)``, -1 where that is none of the
     unknowns. That keeps what separates parts: of the nodes of an edge or a cell none is in a part
@@ -63,7 +64,7 @@ def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.nda
     return found
 
 
-def nested_dissection(n: int, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def nested_dissection(n: int, rows: Ints, columns: Ints) -> Ints:
     """Places ``(n,)`` of ``n`` unknowns in an order with little fill-in; ``rows`` and ``columns``
     ``(k,)`` are coupled, one way or the other. Raises MemoryError if METIS does not get what it
     needs."""

@@ -24,6 +24,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.kernels.compiled import CompilerError, library, pointer
+from archord.materials.kinematics import Array, Ints
 from archord.solver.linear.nested_dissection import before_corners, corners, metis
 from archord.solver.linear.strategy import Facts, Strategy
 
@@ -59,7 +60,7 @@ def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | str:
     return Substructures(A, interface, corners(V))
 
 
-def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
+def _interface(A: PETSc.Mat, comm: MPI.Comm) -> Ints:
     """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several
     ranks, and of any others that are, as the contact's, the ones of the higher rank."""
     start, end = A.getOwnershipRange()
@@ -77,7 +78,7 @@ def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
     return (size * blocks[:, None] + np.arange(size)).ravel()
 
 
-def _union(comm: MPI.Comm, dofs: np.ndarray) -> np.ndarray:
+def _union(comm: MPI.Comm, dofs: Ints) -> Ints:
     """The ``dofs`` of all ranks."""
     return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
 
@@ -104,7 +105,7 @@ class Substructures(Strategy):
     _complement : (m, m) the Schur complement of this rank, then of all
     """
 
-    def __init__(self, A: PETSc.Mat, interface: np.ndarray, corner: np.ndarray) -> None:
+    def __init__(self, A: PETSc.Mat, interface: Ints, corner: Ints) -> None:
         self.matrix = A
         self.comm = A.comm.tompi4py()
         self.singular = False
@@ -155,7 +156,7 @@ class Substructures(Strategy):
         self._dense.setOperators(S)
         self._dense.setUp()
 
-    def _factorise(self, values: np.ndarray) -> int:
+    def _factorise(self, values: Array) -> int:
         """Eliminate the own dofs of the block of these ``values``; MUMPS's status, below 0 if that
         fails."""
         status = np.zeros(1, dtype=np.int32)
@@ -204,13 +205,13 @@ class Substructures(Strategy):
 
 
 def _places(
-    rows: np.ndarray,
-    columns: np.ndarray,
+    rows: Ints,
+    columns: Ints,
     last: np.ndarray,
-    corner: np.ndarray,
+    corner: Ints,
     start: int,
     size: int,
-) -> np.ndarray:
+) -> Ints:
     """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)``
     behind the others. Entries are at ``rows`` and ``columns``, in blocks of ``size``. Block ``start
     + i`` has the blocks ``corner[i]`` at its corners; all that are not last have some."""

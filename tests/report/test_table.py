@@ -38,3 +38,12 @@ def test_csv_gives_the_rows_again(tmp_path):
         ]
     assert files[1].read_text(encoding="utf-8") == "words\n"
     assert len(write_report(tmp_path, "costs", ROWS, "words\n")) == 2
+
+
+def test_a_heading_may_have_the_format_of_its_numbers():
+    table = Table(
+        "case", "error {:.1e}", "force [N] {:+.3f}", rows=[("a", 0.00123, 2), ("b", "-", "")]
+    )
+    lines = table.markdown().splitlines()
+    assert lines[0] == "| case | error | force [N] |"
+    assert lines[2:] == ["| a | 1.2e-03 | +2.000 |", "| b | - |  |"]

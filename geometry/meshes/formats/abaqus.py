@@ -30,6 +30,7 @@ from archord.geometry.meshes.formats.abaqus_blocks import (
     scoped_blocks,
 )
 from archord.geometry.meshes.mesh_arrays import MeshArrays, one_kind, require_known
+from archord.materials.kinematics import Ints
 from archord.report.by_name import Words
 
 # trusses; plane stress, plane strain, axisymmetric; solids: each with the number of nodes
@@ -295,7 +296,7 @@ def read_abaqus(path: Path) -> MeshArrays:
     return replace(mesh, notes=tuple(notes), plane=plane)
 
 
-def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarray:
+def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> Ints:
     """Where the numbers ``wanted`` are ``known`` to be. Raises ValueError."""
     try:
         return np.array([known[number] for number in wanted], dtype=np.int64)

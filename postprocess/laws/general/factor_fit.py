@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import elastic_model
 from archord.postprocess.laws.general.factor_model import (
@@ -77,7 +78,7 @@ class Changed:
         )
 
     @property
-    def usual(self) -> np.ndarray:
+    def usual(self) -> Bools:
         """Which nodes are in the range that is judged."""
         x = self.without[:, 0]
         return within(x, JUDGED)
@@ -179,7 +180,7 @@ def errors_of(joints: list[Changed]) -> tuple[dict[str, list[float]], Table]:
     return factors, table
 
 
-def _joined(values: list[Array], chosen: list[np.ndarray]) -> Array:
+def _joined(values: list[Array], chosen: list[Bools]) -> Array:
     """The ``chosen`` values of all joints."""
     return np.concatenate([own[at] for own, at in zip(values, chosen, strict=True)])
 

@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.report.by_name import ByName
 from archord.report.readable import json_of
@@ -407,7 +408,7 @@ class Piece(NamedTuple):
     third: Array
 
     @classmethod
-    def of(cls, nodes: Array, f: Array, df: Array, i: np.ndarray) -> Piece:
+    def of(cls, nodes: Array, f: Array, df: Array, i: Ints) -> Piece:
         """The pieces from the nodes ``i`` on."""
         return cls.between(nodes[i + 1] - nodes[i], f[i], f[i + 1], df[i], df[i + 1])
 
@@ -439,7 +440,7 @@ def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
     return value + slope * (x - inside), slope
 
 
-def interval(nodes: Array, x: Array) -> np.ndarray:
+def interval(nodes: Array, x: Array) -> Ints:
     """The last i below the last node with ``nodes[i] <= x``, or 0."""
     below = np.searchsorted(nodes, x, "right") - 1
     return np.clip(below, 0, len(nodes) - 2)

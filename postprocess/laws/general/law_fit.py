@@ -25,6 +25,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, minimize
 
+from archord.materials.kinematics import Bools
 from archord.materials.material import Array
 from archord.postprocess.curve import rms
 from archord.postprocess.laws.general.elastic_model import (
@@ -162,7 +163,7 @@ class NodeRun:
 
     nodes: Array
     steps: int
-    cut: np.ndarray
+    cut: Bools
 
     @classmethod
     def of(cls, run: Run) -> NodeRun:
@@ -421,7 +422,7 @@ def fit_kernel(points: Array, values: Array, noise: float) -> Kernel:
     return Kernel(np.array(lengths), noise)
 
 
-def within(x: Array, ends: tuple[float, float]) -> np.ndarray:
+def within(x: Array, ends: tuple[float, float]) -> Bools:
     """Which ``x`` (any shape) are between the ``ends``."""
     low, high = ends
     return (x >= low) & (x <= high)

@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from archord.materials.kinematics import Bools, Ints
 from archord.materials.material import Array, Arrays
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel, elastic_model
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
@@ -452,7 +453,7 @@ class SolvedJoints:
             found[name] = np.where(np.isnan(steps), _UNKNOWN, steps).astype(np.int16)
         return found
 
-    def rows(self, side: str) -> np.ndarray:
+    def rows(self, side: str) -> Ints:
         """Those of one of `SIDES`, from the joint known to most `MULTIPLES` down."""
         chosen = np.flatnonzero(self.side == SIDES.index(side))
         order = np.lexsort((self.x0[chosen], -self.count[chosen]))
@@ -495,7 +496,7 @@ def telling_side(strain: bool, pin: npt.ArrayLike, block: npt.ArrayLike) -> npt.
     return np.where(np.isinf(block), PIN_ALONE, told)
 
 
-def _alike(pin: npt.ArrayLike, block: npt.ArrayLike) -> np.ndarray:
+def _alike(pin: npt.ArrayLike, block: npt.ArrayLike) -> Bools:
     return np.isclose(pin, block, rtol=1e-4)
 
 

@@ -73,12 +73,13 @@ def _whole(unit: str) -> str:
 def estimates_table(found: Identification) -> Table:
     """A row for each unknown."""
     units = units_of(found)
-    table = Table("unknown", "unit", "value", "95 % interval", "error by the law", left=2)
+    columns = ("value {:.5g}", "95 % interval", "error by the law {:.2g}")
+    table = Table("unknown", "unit", *columns, left=2)
     for one in as_read(found).estimates:
         name = one.unknown.name
         interval = f"{one.low:.5g} .. {one.high:.5g}"
-        by_law = "unknown" if math.isnan(one.by_law) else f"{one.by_law:.2g}"
-        table.add(name, units[name], f"{one.value:.5g}", interval, by_law)
+        by_law = "unknown" if math.isnan(one.by_law) else one.by_law
+        table.add(name, units[name], one.value, interval, by_law)
     return table
 
 
@@ -86,9 +87,9 @@ def correlation_table(found: Identification) -> Table:
     """The correlations of the unknowns' errors."""
     names = [one.unknown.name for one in found.estimates]
     correlation = as_read(found).correlation
-    table = Table("correlation", *names, left=1)
+    table = Table("correlation", *(f"{name} {{:.2f}}" for name in names), left=1)
     for k, name in enumerate(names):
-        table.add(name, *(f"{value:.2f}" for value in correlation[k, :]))
+        table.add(name, *correlation[k, :])
     return table
 
 
