@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from archord.output.folder import CHECKPOINT, MESH, is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
+from archord.report.by_name import ByName
 from archord.report.errors import InputError
 from archord.scene import file as scene_file
 from archord.scene.file import ABSENT, AnyScene
@@ -168,7 +169,7 @@ def solve(
         checked: Callable[[], AnyScene] = partial(_scene_of, problem)
     else:
         checked = partial(_words_of, given, folder, fields)
-    options: dict[str, Any] = {"force": force}
+    options: ByName = {"force": force}
     if restart:
         planned = _plan(checked, folder, comm)
         if planned.finished:

@@ -23,6 +23,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from archord.report.by_name import Names
+
 LIMIT = 600.0  # seconds
 THREADS = (
     "OMP_NUM_THREADS",
@@ -49,11 +51,11 @@ class Process:
     """
 
     name: str
-    command: tuple[str, ...]
+    command: Names
     folder: Path
     read: Callable[[], Any] = lambda: None
     limit: float = LIMIT
-    clear: tuple[str, ...] = ()
+    clear: Names = ()
     kind: Hashable = None
 
 
@@ -90,7 +92,7 @@ class Timing:
 Said = Callable[[str], None]
 
 
-def solving(scene: str, output: str, *options: str) -> tuple[str, ...]:
+def solving(scene: str, output: str, *options: str) -> Names:
     """The command with which a user solves a ``scene`` into the folder ``output``."""
     command = (sys.executable, "-m", "archord", "solve", scene, "-o", output, "--force", "-q")
     return command + options

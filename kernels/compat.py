@@ -22,6 +22,8 @@ from dolfinx.mesh import Geometry, Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from archord.report.by_name import Words
+
 with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
     # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the
     # process with a page
@@ -103,7 +105,7 @@ def cell_form(
     return fem.Form(form)
 
 
-def versions() -> dict[str, str]:
+def versions() -> Words:
     """The releases of dolfinx, PETSc and MPI."""
     mpi = MPI.Get_library_version().partition("\n")[0].partition(",")[0]
     return {

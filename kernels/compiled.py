@@ -22,6 +22,8 @@ import cffi
 import numpy as np
 import numpy.typing as npt
 
+from archord.report.by_name import Names
+
 _FLAGS = ["-std=c11", "-O3", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off"]
 _ffi = cffi.FFI()
 _TYPES = {
@@ -34,7 +36,7 @@ class CompilerError(RuntimeError):
     """The C compiler is missing or failed."""
 
 
-def library(source: Path, libraries: tuple[str, ...] = ()) -> Any:
+def library(source: Path, libraries: Names = ()) -> Any:
     """The functions of the C file ``source`` that the header beside it declares; they need other
     ``libraries``. Raises `CompilerError`."""
     return _loaded(source, libraries)[1]
@@ -55,7 +57,7 @@ def structure(source: Path, kind: str, members: Mapping[str, int | float | np.nd
 
 
 @cache
-def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
+def _loaded(source: Path, libraries: Names) -> tuple[cffi.FFI, Any]:
     compiler = shlex.split(os.environ.get("CC", "cc"))
     header = source.with_suffix(".h").read_text(encoding="utf-8")
     key = "\0".join([*compiler, *_FLAGS, platform.machine(), header]).encode() + source.read_bytes()
@@ -103,7 +105,7 @@ def _temporary() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="archord-", ignore_cleanup_errors=True)
 
 
-def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str, ...]) -> None:
+def _compile(command: list[str], source: Path, path: Path, libraries: Names) -> None:
     """Several processes may compile at once: each into a file of its own, and the last one
     stays."""
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:

@@ -6,7 +6,9 @@ import difflib
 import tomllib
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from archord.report.by_name import ByName
 
 if TYPE_CHECKING:
     from archord.materials.j2 import J2Material
@@ -26,12 +28,12 @@ _PER_MPA = {
 
 
 @cache
-def metals() -> dict[str, dict[str, Any]]:
+def metals() -> dict[str, ByName]:
     """The tables of named.toml, in MPa."""
     return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
-def metal(name: str, unit: str) -> dict[str, Any]:
+def metal(name: str, unit: str) -> ByName:
     """The metal ``name`` in a ``unit`` of stress: ``E``, ``nu``, the listed strengths ``yield`` (or
     0.2 % proof) and ``tensile``, and ``hardening``, points (PEEQ, true stress) from first yield on.
     Raises ValueError for a name or a unit that is not known."""

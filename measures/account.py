@@ -11,6 +11,7 @@ from archord.measures.doubts import Check
 from archord.measures.energies import energy_balance, work_doubts
 from archord.measures.measure import Accepted, Column, Measure
 from archord.measures.record import Record
+from archord.report.by_name import ByName, Names
 from archord.solver.path.stepping import StepFailure
 
 if TYPE_CHECKING:
@@ -69,10 +70,10 @@ class Account:
     columns: list[Column]
     driven: Callable[[], Driven]
     profiles: Callable[[], Mapping[str, Any]]
-    fixed: tuple[str, ...]
-    per_step: tuple[str, ...]
+    fixed: Names
+    per_step: Names
     balance: Callable[[Accepted, Values], float]
-    facts: Callable[[], dict[str, Any]]
+    facts: Callable[[], ByName]
     warnings: list[str]
     checks: list[Check]
     refusal: Callable[[Sequence[Record]], str]
@@ -136,7 +137,7 @@ class Account:
         return bool(self.system.problem.interactions)
 
 
-def sizes(system: System) -> dict[str, Any]:
+def sizes(system: System) -> ByName:
     """Sizes of the mesh for run.json."""
     lengths = {name: side.facet_lengths() for name, side in system.sides.items()}
     extremes = {name: [float(s.min()), float(s.max())] for name, s in lengths.items()}

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.geometry.vectors import ALIKE
-from archord.materials.kinematics import Ints
+from archord.materials.kinematics import Arrays, Ints
 from archord.materials.material import Array
+from archord.report.by_name import ByName, Names
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
     from archord.geometry.patches import Patches
@@ -186,20 +187,20 @@ class SurfaceProfile(EdgeProfile, _Displaced):
 AnyProfile = SurfaceProfile | PatchProfile
 
 
-def fixed(system: System) -> tuple[str, ...]:
+def fixed(system: System) -> Names:
     """Names of the arrays of contact.h5 that do not change."""
     in_space = system.problem.kinematics.dimension == 3
     return ("weight", "X", "normal", "facet", "corners") if in_space else ("s", "weight", "X")
 
 
-def per_step(system: System) -> tuple[str, ...]:
+def per_step(system: System) -> Names:
     """Names of the arrays of contact.h5 that change."""
     names = PER_STEP + OF_FRICTION if system.contact.has_friction else PER_STEP
     in_space = system.problem.kinematics.dimension == 3
     return (*names, "traction", "facet_pressure", "corner_pressure") if in_space else names
 
 
-def surface_profiles(system: System) -> dict[str, Any]:
+def surface_profiles(system: System) -> ByName:
     """Contact state along the integrated surfaces, by name, at the last evaluation. Collective."""
     u = system.equilibrium.displacement()
     found = {}
@@ -216,7 +217,7 @@ def surface_profiles(system: System) -> dict[str, Any]:
     return found
 
 
-def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> dict[str, Array]:
+def _of_all_ranks(side: Surface, pair: Pair, u: Array) -> Arrays:
     """The arrays ``(n, q)`` and ``(n, q, d)`` of a profile at all facets of the ``side``.
     Collective."""
     from archord.solver.contact.laws.coulomb import Coulomb

@@ -11,6 +11,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.measures.record import Record
+from archord.report.by_name import ByName, Names
 
 if TYPE_CHECKING:
     from archord.solver.contact.interaction import Interaction
@@ -66,7 +67,7 @@ class Accepted:
         self.mean_motion: Callable[[str, tuple[float, ...]], Array] = cache(system.mean_motion)
         self.quantities = cache(lambda name: system.contact.interface(name).quantities())
         self.largest_peeq: Callable[[str], Place] = cache(self._largest_peeq)
-        self._found: dict[str, Any] = {}
+        self._found: ByName = {}
 
     def once(self, name: str, find: Callable[[], Any]) -> Any:
         """What ``find`` finds of this state, found once by this ``name``."""
@@ -79,7 +80,7 @@ class Accepted:
         return self.system.largest_peeq(found)
 
     @property
-    def axes(self) -> tuple[str, ...]:
+    def axes(self) -> Names:
         """The names of the coordinates."""
         return self.system.problem.kinematics.axes
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from archord.report.by_name import Amounts, ByName
+
 # A joint's values, which files of runs hold side by side with the rest of its records (format 1)
 _OF_JOINT = ("delta", "P", "p0", "eps", "peeq_max", "peeq_integral")
 WORST = ("peeq_max", "at x", "at y")  # of a body: the largest PEEQ, and its place
@@ -22,7 +24,7 @@ class Record:
 
     step: int
     at: float
-    values: dict[str, float]
+    values: Amounts
     contact_area: float
     elastic_energy: float
     plastic_dissipation: float
@@ -47,7 +49,7 @@ class Record:
         """Work of the loads that is neither stored nor dissipated."""
         return self.work - self.elastic_energy - self.dissipated
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> ByName:
         """The record as run.json and checkpoints hold it."""
         told = asdict(self)
         if not self.values.keys() >= {*_OF_JOINT}:

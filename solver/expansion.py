@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.meshes.tagged_mesh import unknown
-from archord.materials.kinematics import PLANE_STRAIN, SPACE
+from archord.materials.kinematics import PLANE_STRAIN, SPACE, Arrays
+from archord.report.by_name import ByName
 from archord.solver.conditions import Control, DeadLoad, Dirichlet, Drive, Guess, Mean, Turn
 from archord.solver.contact.interaction import Interaction, Rigid
 from archord.solver.core_load import core_density, require_core
@@ -79,7 +79,7 @@ class _Expansion:
             else:
                 self._mean_point(coupling)
         self._require_one_support()
-        changes: dict[str, Any] = {
+        changes: ByName = {
             "travel": self._farthest(),
             "supports": self.supports,
             "loads": self.loads,
@@ -362,7 +362,7 @@ class _Expansion:
         disc = part.disc
         if disc is part.surfaces[0]:
             loads = [load for load in self.given_loads if load.on == part.name]
-            rates: dict[str, Any] = {load.name: self._along(load) for load in loads}
+            rates: ByName = {load.name: self._along(load) for load in loads}
             part = replace(part, surfaces=(Rigid(disc, rates), part.surfaces[1]))
         return replace(part, slide=part.slide or slide)
 
@@ -375,7 +375,7 @@ class _Expansion:
                 driven.append((load, stated.body_of(load.on).name))
 
         def guess(factor: float) -> Guess:
-            moved: dict[str, Array] = {}
+            moved: Arrays = {}
             for load, body in driven:
                 values = stated.values(load)
                 value = float(np.interp(factor, range(len(values)), values))

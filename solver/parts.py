@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from archord.materials.material import Material
+from archord.report.by_name import Names
 from archord.report.errors import InputError, in_sentences, require_of
 
 Freedom = Literal["x", "y", "rotation", "z", "rotation x", "rotation y", "rotation z"]
@@ -145,7 +146,7 @@ class Support:
         require_of(self, known, "fixed", f"must be directions among {_IN_WORDS}")
         object.__setattr__(self, "fixed", tuple(fixed))
 
-    def held(self, dimension: int) -> tuple[str, ...]:
+    def held(self, dimension: int) -> Names:
         """The directions held in a problem of this ``dimension``."""
         return tuple("xyz"[:dimension]) if self.fixed is None else tuple(self.fixed)
 

@@ -20,6 +20,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.meshes.quality import place
 from archord.materials.kinematics import Ints
+from archord.report.by_name import Amounts
 from archord.solver.problem import Dirichlet, Drive, Problem
 
 _ALIKE = 1e-9  # of the larger of two displacements: a difference that is round-off
@@ -114,7 +115,7 @@ class Prescribed:
         largest = np.array(sizes)
         self._comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         # along an axis in which a turn displaces nothing all is round-off
-        of_name: dict[str, float] = {}
+        of_name: Amounts = {}
         for motion, size in zip(moving, largest, strict=True):
             of_name[motion.name] = max(size, of_name.get(motion.name, 0.0))
         round_off = _ALIKE * np.array([of_name[motion.name] for motion in moving])

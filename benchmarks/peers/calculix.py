@@ -21,6 +21,7 @@ from archord.benchmarks.peers.joint_script import axis_pressure
 from archord.benchmarks.timing import Failure, Process, run_once, solving
 from archord.geometry.basis import Array
 from archord.materials.elasticity import von_mises
+from archord.materials.kinematics import Arrays
 from archord.postprocess.decks.deck import deck, system_of
 from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label, surface_name
 from archord.postprocess.decks.model import thickness
@@ -49,7 +50,7 @@ class SecondOpinion:
     over the whole, nan in space; iterations of all steps."""
 
     mesh: DeckMesh
-    forces: dict[str, Array]
+    forces: Arrays
     displacement: Array
     stress: Array
     p0: float | None
@@ -117,11 +118,11 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
     )
 
 
-def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, Array]:
+def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> Arrays:
     """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step;
     nan where the nodes of a set do not move alike."""
     share = system.problem.whole / thickness(system.problem, mesh)
-    forces: dict[str, Array] = {}
+    forces: Arrays = {}
     for m in moved_sets(system, mesh):
         for drive, rate in m.rates.items():
             alike = m.whole and np.ptp(rate) == 0

@@ -14,7 +14,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options, slices
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options, size_field, slices
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 PIN_RADIUS = 10.0
@@ -144,7 +144,5 @@ def _name(gmsh: Any, body: str, volumes: list[int], arc: str | _Faces, top: floa
 
 
 def _refine(gmsh: Any, size: Size) -> None:
-    field = gmsh.model.mesh.field.add("MathEval")
-    gmsh.model.mesh.field.setString(field, "F", size.field())
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+    gmsh.model.mesh.field.setAsBackgroundMesh(size_field(gmsh, size.field()))
     set_mesh_options(gmsh, _OPTIONS)

@@ -11,7 +11,13 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options
+from archord.geometry.meshes.fenicsx import (
+    gmsh_to_mesh,
+    set_mesh_options,
+    size_field,
+    size_within,
+    use_smallest,
+)
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.sketch import Sketch
 
@@ -35,10 +41,7 @@ def of_quadrilaterals(sketch: Sketch) -> TaggedMesh:
 def _draw_faces(sketch: Sketch, gmsh: Any) -> dict[str, list[int]]:
     """The faces of each body."""
     occ = gmsh.model.occ
-    for _, place in sketch.points:
-        occ.addPoint(*place, 0.0)
-    for start, stop, *centre in sketch.curves:
-        (occ.addCircleArc if centre else occ.addLine)(start, *centre, stop)
+    sketch.draw_lines(occ)
     drawn = {}
     for body, faces in sketch.faces.items():
         loops = [occ.addCurveLoop(sketch.around_face(face)) for face in faces]
@@ -51,7 +54,7 @@ def _draw_flat(sketch: Sketch, gmsh: Any) -> None:
     gmsh.model.occ.synchronize()
     for name, lines in sketch.lines.items():
         gmsh.model.addPhysicalGroup(1, lines, name=name)
-    _name_and_refine(sketch, 2, drawn, gmsh.model)
+    _name_and_refine(sketch, 2, drawn, gmsh)
 
 
 def _draw_revolved(sketch: Sketch, angle: float, gmsh: Any) -> None:
@@ -73,22 +76,15 @@ def _draw_revolved(sketch: Sketch, angle: float, gmsh: Any) -> None:
     for name, surfaces in sets.items():
         if surfaces:
             gmsh.model.addPhysicalGroup(2, sorted(surfaces), name=name)
-    _name_and_refine(sketch, 3, solids, gmsh.model)
+    _name_and_refine(sketch, 3, solids, gmsh)
     set_mesh_options(gmsh, _OPTIONS)
 
 
-def _name_and_refine(sketch: Sketch, dim: int, parts: Mapping[str, list[int]], model: Any) -> None:
+def _name_and_refine(sketch: Sketch, dim: int, parts: Mapping[str, list[int]], gmsh: Any) -> None:
     """Name the ``parts`` of each body, and give them its size of elements in the ``sketch``."""
-    field = model.mesh.field
     within = []
     for body, own in parts.items():
-        model.addPhysicalGroup(dim, own, name=body)
-        size = field.add("MathEval")
-        field.setString(size, "F", re.sub(r"\bx\b", _RADIUS, sketch.sizes[body]))
-        restricted = field.add("Restrict")
-        field.setNumber(restricted, "InField", size)
-        field.setNumbers(restricted, "VolumesList" if dim == 3 else "SurfacesList", own)
-        within.append(restricted)
-    smallest = field.add("Min")
-    field.setNumbers(smallest, "FieldsList", within)
-    field.setAsBackgroundMesh(smallest)
+        gmsh.model.addPhysicalGroup(dim, own, name=body)
+        size = size_field(gmsh, re.sub(r"\bx\b", _RADIUS, sketch.sizes[body]))
+        within.append(size_within(gmsh, size, own, dim))
+    use_smallest(gmsh, within)

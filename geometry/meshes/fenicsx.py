@@ -165,6 +165,31 @@ def set_mesh_options(gmsh: Any, options: Mapping[str, float]) -> None:
         gmsh.option.setNumber(f"Mesh.{name}", value)
 
 
+def size_field(gmsh: Any, size: str) -> int:
+    """A field of gmsh, by its number: an element ``size`` as a formula of x, y and z."""
+    field = gmsh.model.mesh.field
+    number = field.add("MathEval")
+    field.setString(number, "F", size)
+    return number
+
+
+def size_within(gmsh: Any, size: int, parts: Sequence[int], dimension: int) -> int:
+    """A field with the sizes of another one within ``parts`` of the model alone."""
+    field = gmsh.model.mesh.field
+    number = field.add("Restrict")
+    field.setNumber(number, "InField", size)
+    field.setNumbers(number, "VolumesList" if dimension == 3 else "SurfacesList", parts)
+    return number
+
+
+def use_smallest(gmsh: Any, sizes: Sequence[int]) -> None:
+    """Make the smallest of the fields the element size."""
+    field = gmsh.model.mesh.field
+    number = field.add("Min")
+    field.setNumbers(number, "FieldsList", sizes)
+    field.setAsBackgroundMesh(number)
+
+
 @contextmanager
 def own_gmsh() -> Iterator[Any]:
     """gmsh with its defaults and an empty model; a user's model and options come back at the

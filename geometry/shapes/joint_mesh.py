@@ -10,11 +10,16 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import (
+    gmsh_to_mesh,
+    size_field,
+    size_within,
+    use_smallest,
+)
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.sketch import Place, Sketch
 from archord.geometry.shapes.solids import Rims, mesh_solids, slabs_of
+from archord.materials.kinematics import Arrays
 
 _CUT_ABOVE = (
     30_000,
@@ -63,10 +68,7 @@ def mesh_joint(
         geo = gmsh.model.geo
         mesh = gmsh.model.mesh
         coarser = 2.0**refinements
-        for _, place in sketch.points:
-            geo.addPoint(*place, 0)
-        for start, stop, *centre in sketch.curves:
-            (geo.addCircleArc if centre else geo.addLine)(start, *centre, stop)
+        sketch.draw_lines(geo)
         for loop in sketch.loops:
             geo.addPlaneSurface([geo.addCurveLoop(loop, reorient=True)])
         geo.synchronize()
@@ -80,14 +82,9 @@ def mesh_joint(
                     gmsh.model.addPhysicalGroup(dim, entities, tag, name)
         fields = []
         for body in filter(sketch.faces.get, sketch.faces):
-            whole = mesh.field.add("MathEval")
-            mesh.field.setString(whole, "F", f"{coarser!r} * ({sketch.sizes[body]})")
-            fields.append(mesh.field.add("Restrict"))
-            mesh.field.setNumber(fields[-1], "InField", whole)
-            mesh.field.setNumbers(fields[-1], "SurfacesList", sketch.faces[body])
-        smallest = mesh.field.add("Min")
-        mesh.field.setNumbers(smallest, "FieldsList", fields)
-        mesh.field.setAsBackgroundMesh(smallest)
+            whole = size_field(gmsh, f"{coarser!r} * ({sketch.sizes[body]})")
+            fields.append(size_within(gmsh, whole, sketch.faces[body], 2))
+        use_smallest(gmsh, fields)
 
     how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
     joint = gmsh_to_mesh(
@@ -97,9 +94,9 @@ def mesh_joint(
     return replace(joint, point_sets=_centres(pins, radius, 2)) if pins else joint
 
 
-def _centres(pins: Mapping[str, Place], radius: float, dimension: int) -> dict[str, Array]:
+def _centres(pins: Mapping[str, Place], radius: float, dimension: int) -> Arrays:
     """The point set of the centre of each pin, whose place is in radii, at z = 0 in space."""
-    sets: dict[str, Array] = {}
+    sets: Arrays = {}
     for name, place in pins.items():
         centre = np.zeros((1, dimension))
         centre[0, :2] = place

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from archord.geometry.meshes.refine import Circle
+from archord.report.by_name import Words
 
 Place = tuple[float, float]
 _RADII = np.arange(1000, 500, -1) / 100  # tried for the pin
@@ -47,7 +48,7 @@ class Sketch:
         self.faces: dict[str, list[int]] = {name: [] for name in bodies}
         self.lines: dict[str, list[int]] = {name: [] for name in sets}
         self.circles: dict[str, Circle] = {}
-        self.sizes: dict[str, str] = {}
+        self.sizes: Words = {}
         self.parts: dict[int, float] = {}
         self.grid: dict[int, list[int]] = {}
         self.bores: list[Bore] = []
@@ -81,6 +82,13 @@ class Sketch:
             of_set = self.lines[name]
             of_set += [line for line in paths[name] if line not in of_set]
         return face
+
+    def draw_lines(self, kernel: Any) -> None:
+        """Draw all points and curves by gmsh's ``kernel``, with the numbers that they have here."""
+        for _, place in self.points:
+            kernel.addPoint(*place, 0)
+        for start, stop, *centre in self.curves:
+            (kernel.addCircleArc if centre else kernel.addLine)(start, *centre, stop)
 
     def around_face(self, face: int) -> list[int]:
         """The lines around a ``face`` as they follow each other."""

@@ -19,7 +19,14 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import gmsh_to_mesh, set_mesh_options, slices
+from archord.geometry.meshes.fenicsx import (
+    gmsh_to_mesh,
+    set_mesh_options,
+    size_field,
+    size_within,
+    slices,
+    use_smallest,
+)
 from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.mesh_arrays import MeshArrays
 from archord.geometry.meshes.quality import is_folded
@@ -168,10 +175,11 @@ def draw_solids(sketch: Sketch, slabs: Sequence[Slab], rims: Rims, gmsh: Any) ->
             if surface not in sets[name]:
                 sets[name].append(surface)
         for volume, slab in parts.items():
-            fields.append(drawing.size_within(volume, slab))
+            whole = drawing.size(sketch.sizes[slab.profile])
+            fields.append(size_within(gmsh, whole, [volume], 3))
     for name, surfaces in sets.items():
         gmsh.model.addPhysicalGroup(2, surfaces, name=name)
-    drawing.use_smallest(fields)
+    use_smallest(gmsh, fields)
     set_mesh_options(gmsh, _OPTIONS)
 
 
@@ -183,9 +191,9 @@ class _Drawing:
     """A model of gmsh in which profiles of a ``sketch`` are extruded."""
 
     def __init__(self, gmsh: Any, sketch: Sketch, rims: Rims) -> None:
+        self.gmsh = gmsh
         self.model = gmsh.model
         self.occ = gmsh.model.occ
-        self.field = gmsh.model.mesh.field
         self.sketch = sketch
         self.rims = rims
         self.lines = {name: lines_of(sketch, name) for name, faces in sketch.faces.items() if faces}
@@ -300,25 +308,10 @@ class _Drawing:
                 off = (
                     f"Sqrt(({around(circle.centre[0])} - {circle.radius!r})^2 + (z - {height!r})^2)"
                 )
-                fields.append(self._size(f"{smallest!r} + {bore.growth!r} * {off}"))
+                fields.append(self.size(f"{smallest!r} + {bore.growth!r} * {off}"))
         return fields
 
-    def size_within(self, volume: int, slab: Slab) -> int:
-        """A field of the element sizes in a ``volume``."""
-        whole = self._size(self.sketch.sizes[slab.profile])
-        within = self.field.add("Restrict")
-        self.field.setNumber(within, "InField", whole)
-        self.field.setNumbers(within, "VolumesList", [volume])
-        return within
-
-    def _size(self, expression: str) -> int:
-        field = self.field.add("MathEval")
+    def size(self, expression: str) -> int:
+        """A field of the element size by an ``expression``, whose numbers are rounded."""
         size = _NUMBER.sub(lambda number: repr(_rounded(float(number[0]))), expression)
-        self.field.setString(field, "F", size)
-        return field
-
-    def use_smallest(self, fields: Sequence[int]) -> None:
-        """Make the smallest of the ``fields`` the element size."""
-        smallest = self.field.add("Min")
-        self.field.setNumbers(smallest, "FieldsList", fields)
-        self.field.setAsBackgroundMesh(smallest)
+        return size_field(self.gmsh, size)

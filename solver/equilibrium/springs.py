@@ -17,6 +17,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.report.by_name import Amounts
 from archord.solver.bulk.assembly import assemble, matrix
 from archord.solver.bulk.stiffness import CellStiffness, value_terms
 from archord.solver.contact.surface import RigidSurface
@@ -78,7 +79,7 @@ class Springs:
         n_dofs = drives.dimension * drives.n_owned
         self.rest: tuple[Array, Array] = np.zeros(n_dofs), np.zeros(len(drives.rate))
         self.energy = 0.0
-        self.works: dict[str, float] = {}
+        self.works: Amounts = {}
         self.idle = False
         self._tightness = 1.0
 
@@ -122,10 +123,10 @@ class Springs:
         self.works = self._works()
         self.idle = self._leave_all()
 
-    def _works(self) -> dict[str, float]:
+    def _works(self) -> Amounts:
         """What they took up at the last evaluation, as ``works``."""
         drives = self.rigid.drives
-        found: dict[str, float] = {}
+        found: Amounts = {}
         on_dofs = self.forces * self._moved / 2
         on_nodes = on_dofs.reshape(-1, drives.dimension).sum(axis=1)
         for body in self.rigid.loose:

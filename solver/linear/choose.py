@@ -9,6 +9,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.materials.kinematics import Bools
+from archord.report.by_name import Words
 from archord.solver.linear import bordered, condensed, lagged, look_ahead, multigrid, substructured
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
@@ -53,7 +54,7 @@ class Choice:
             self.why_not["substructured"] = parts
         return Direct(A)
 
-    def words(self) -> dict[str, str | dict[str, str]]:
+    def words(self) -> dict[str, str | Words]:
         """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the
         reasons."""
         used = [name for name in self.why_not if self.uses(name)]

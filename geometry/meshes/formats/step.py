@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.geometry.meshes.fenicsx import size_field, use_smallest
+
 SUFFIXES = (".step", ".stp", ".brep")
 # a complex entity, as a rational spline, has several kinds within its brackets and none before them
 _ENTITY = re.compile(r"#(\d+)\s*=\s*(\w*)\s*\((.*?)\)\s*;", re.DOTALL)
@@ -80,13 +82,9 @@ def _set_sizes(gmsh: Any, faces: Mapping[str, list[int]], sizes: Sizes) -> None:
             raise ValueError(f"mesh.sizes: there is no face {name!r} for a size; there are {known}")
         away = field.add("Distance")
         field.setNumbers(away, "SurfacesList", faces[name])
-        growing = field.add("MathEval")
-        field.setString(growing, "F", f"{on_face} + {_GROWTH} * F{away}")
-        grown.append(growing)
+        grown.append(size_field(gmsh, f"{on_face} + {_GROWTH} * F{away}"))
     if grown:
-        smallest = field.add("Min")
-        field.setNumbers(smallest, "FieldsList", grown)
-        field.setAsBackgroundMesh(smallest)
+        use_smallest(gmsh, grown)
 
 
 def _face_names(gmsh: Any, path: Path, solids: list[int]) -> dict[int, str]:

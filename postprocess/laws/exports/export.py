@@ -21,6 +21,7 @@ from archord.postprocess.laws.exports.program import Program, Tables
 from archord.postprocess.laws.exports.translate import select
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.report.by_name import Words
 
 _OF_MEMORY = {"stored_energy"}
 _INNER = {"deeper", "forces", "sector_deeper"}  # which users do not call
@@ -111,7 +112,7 @@ def _constants(program: Program, used: set[str]) -> Tables:
     return numbers
 
 
-def _element_parts(language: str, name: str, program: Program, contact: Contact) -> dict[str, str]:
+def _element_parts(language: str, name: str, program: Program, contact: Contact) -> Words:
     """What surrounds the force element: functions, and Octave's handles; empty without one."""
     if "forces" not in program.functions:
         return {"element": "", "handles": ""}

@@ -15,6 +15,7 @@ from archord.postprocess.laws.exports.translate import (
     in_octave,
     in_python,
 )
+from archord.report.by_name import ByName
 
 _IN_A_ROW = 5  # numbers of a table
 
@@ -28,7 +29,7 @@ class FileForm:
     number: str
     table: str
     line_end: str
-    text: Callable[[dict[str, Any] | str], str]
+    text: Callable[[ByName | str], str]
     function: Callable[..., str]
     whole: str = ""
     words: str = ""
@@ -47,16 +48,16 @@ class FileForm:
         return (form or self.number).format(name=name, key=key, value=repr(value))
 
 
-def _quoted(about: dict[str, Any] | str) -> str:
+def _quoted(about: ByName | str) -> str:
     return json.dumps(about if isinstance(about, str) else json.dumps(about), ensure_ascii=False)
 
 
-def _quoted_once(about: dict[str, Any] | str) -> str:
+def _quoted_once(about: ByName | str) -> str:
     text = about if isinstance(about, str) else json.dumps(about)
     return "'" + text.replace("'", "''") + "'"
 
 
-def _literal(about: dict[str, Any] | str) -> str:
+def _literal(about: ByName | str) -> str:
     return pformat(about, width=110, sort_dicts=False)
 
 

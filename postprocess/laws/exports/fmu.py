@@ -28,6 +28,7 @@ from archord.postprocess.laws.exports.names import check_name
 from archord.postprocess.laws.exports.program import Program
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.report.by_name import Names, Words
 from archord.report.units import METRES
 from archord.report.version import VERSION
 
@@ -61,8 +62,8 @@ class _Variable:
     unit: str  # of _units
     meaning: str
     start: float | None = None
-    depends: tuple[str, ...] = ()  # on which inputs
-    from_start: tuple[str, ...] = ()  # on which parameters
+    depends: Names = ()  # on which inputs
+    from_start: Names = ()  # on which parameters
     part: str = "line"  # of the FMU, which some laws have not: error, or element
 
 
@@ -190,7 +191,7 @@ def _archive(contents: dict[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def _library(sources: dict[str, str], target: Path) -> bytes | None:
+def _library(sources: Words, target: Path) -> bytes | None:
     """The sources as a library for Linux on x86-64; None, with a warning, if that cannot be."""
     if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
         fault = "this is not Linux on x86-64"
@@ -281,7 +282,7 @@ def _structure(parent: ElementTree.Element, variables: tuple[_Variable, ...]) ->
             )
 
 
-def _units(program: Program) -> dict[str, tuple[str, dict[str, str]]]:
+def _units(program: Program) -> dict[str, tuple[str, Words]]:
     """Name and base of the unit of every quantity; none if the law's units are not known ones."""
     length = program.length_unit
     force = program.force_unit.removesuffix(f"/{length}")

@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from archord.materials.material import Array
+from archord.materials.kinematics import Arrays
 from archord.postprocess.laws.exports import dents, element
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.law import ROUND_OFF
+from archord.report.by_name import ByName
 
 # int, float, str or list[float] by the names of algorithm.py, and the units
 Tables = dict[str, Any]
@@ -52,7 +53,7 @@ _UNKNOWN_END = 1e300  # of the range of a law that does not tell it
 class Program:
     """What a law has to say in any language."""
 
-    about: dict[str, Any]  # what it is the law of, from the title on
+    about: ByName  # what it is the law of, from the title on
     rule: str  # how it is used, in words
     functions: list[str]  # of algorithm.py, which users call
     flags: dict[str, bool]  # of algorithm.py
@@ -174,7 +175,7 @@ def _of_tables(curve: JointCurve) -> Program:
     )
 
 
-def _element_tables(curve: JointCurve) -> dict[str, Array]:
+def _element_tables(curve: JointCurve) -> Arrays:
     """The tables of the force element, in the units of the joint."""
     shift, slope = dents.shift(curve)
     energy = curve.length * curve.force

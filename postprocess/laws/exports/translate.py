@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from archord.postprocess.laws.exports import algorithm, element
+from archord.report.by_name import Words
 
 _TREES = [ast.parse(inspect.getsource(module)) for module in (algorithm, element)]
 FUNCTIONS = {
@@ -57,7 +58,7 @@ class Language:
     """How a language writes names, entries of tables (from ``base`` on), statements, the ends of
     blocks, and what takes the place of ``warn_outside``."""
 
-    words: dict[str, str]
+    words: Words
     base: int
     entry: str
     half: str
@@ -68,7 +69,7 @@ class Language:
     for_: str
     ends: tuple[str, str]
     warning: str
-    types: dict[str, str]
+    types: Words
     table: str = "{}"
     function: str = "{}"
     between: str = ", "
@@ -152,9 +153,9 @@ class Signature:
 
     name: str
     doc: str
-    inputs: dict[str, str]
+    inputs: Words
     outputs: list[str]
-    locals: dict[str, str]
+    locals: Words
     body: list[ast.stmt]
 
     @classmethod
@@ -164,7 +165,7 @@ class Signature:
         assert isinstance(last, ast.Return)
         assert last.value is not None
         inputs = {arg.arg: ast.unparse(arg.annotation) for arg in node.args.args if arg.annotation}
-        own: dict[str, str] = {}
+        own: Words = {}
         for part in (n for statement in body for n in ast.walk(statement)):
             if isinstance(part, ast.AnnAssign):
                 own[ast.unparse(part.target)] = ast.unparse(part.annotation)
