@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from archord.report.by_name import Words
-
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 _LONGEST = 200  # characters of an attribute; of more the beginning and a checksum
 _SHOWN = 60
@@ -25,12 +23,12 @@ def described(value: Any) -> str:
     return " ".join(_ADDRESS.sub("", repr(value)).split())
 
 
-def attributes_of(value: Any) -> Words:
+def attributes_of(value: Any) -> dict[str, str]:
     """The attributes of an object in words, by their names; of arrays and long words a SHA-256."""
     return {name: _short(words) for name, words in _own_words(value, ()).items()}
 
 
-def _own_words(value: Any, within: tuple[int, ...]) -> Words:
+def _own_words(value: Any, within: tuple[int, ...]) -> dict[str, str]:
     """The words of all attributes that are no cached properties; ``within`` has the ids of the
     objects that ``value`` is an attribute of."""
     kinds = type(value).__mro__

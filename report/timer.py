@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
-from archord.report.by_name import Amounts
-
 BEFORE_SOLVING = "linear solver's setup"  # orders and factorisations that the setup asks for
 
 
@@ -17,7 +15,7 @@ class Timer:
     """Seconds spent per phase, and how often; ``with timer("mesh"): ...`` books a phase, which
     ``entered`` hears of."""
 
-    seconds: Amounts = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     entered: Callable[[str], None] = lambda name: None
 

@@ -10,7 +10,7 @@ from archord.materials.hardening import LinearHardening, VoceHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
 from archord.materials.kinematics import SPACE
-from archord.materials.spatial_logarithm import SpatialLogarithm
+from archord.materials.logarithm import Logarithm
 from tests.materials.test_space import ASKEW, TWICE, components, tensors, turned
 
 E = 210000.0
@@ -109,10 +109,10 @@ def test_the_strain_is_the_logarithm():
     F = np.eye(3) + 0.3 * np.random.default_rng(0).normal(size=(40, 3, 3))
     F = F[np.linalg.det(F) > 0.05]
     expected = np.array([logm(f.T @ f).real / 2 for f in F])
-    found = SpatialLogarithm(gradients(F)).strain
+    found = Logarithm(gradients(F)).strain
     np.testing.assert_allclose(found, components(expected) * TWICE, atol=1e-12)
     H = 1e-9 * np.random.default_rng(1).normal(size=(40, 9))
-    found = SpatialLogarithm(H).strain
+    found = Logarithm(H).strain
     np.testing.assert_allclose(found, H @ SPACE.small.T, rtol=0, atol=1e-16)
 
 
