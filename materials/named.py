@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from archord.report.by_name import ByName
+from archord.report.files import toml_beside
 
 if TYPE_CHECKING:
     from archord.materials.j2 import J2Material
@@ -30,7 +29,7 @@ _PER_MPA = {
 @cache
 def metals() -> dict[str, ByName]:
     """The tables of named.toml, in MPa."""
-    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    return toml_beside(__file__, "named.toml")
 
 
 def metal(name: str, unit: str) -> ByName:

@@ -29,7 +29,7 @@ def count(case: Case) -> dict[str, int]:
     residual."""
     with tempfile.TemporaryDirectory() as folder:
         case.solve(Path(folder))
-        report = json.loads((case.folder(Path(folder)) / "run.json").read_text(encoding="utf-8"))
+        report = read_json(case.folder(Path(folder)) / "run.json")
     totals = report["totals"]
     return {
         "dofs": report["mesh"]["dofs"],

@@ -7,7 +7,6 @@ where they are unknown.
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from string import Template
@@ -22,10 +21,11 @@ from archord.postprocess.laws.exports.translate import select
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.report.by_name import Words
+from archord.report.files import toml_beside
 
 _OF_MEMORY = {"stored_energy"}
 _INNER = {"deeper", "forces", "sector_deeper"}  # which users do not call
-_TEMPLATES = tomllib.loads(Path(__file__).with_name("templates.toml").read_text(encoding="utf-8"))
+_TEMPLATES = toml_beside(__file__, "templates.toml")
 
 
 def export_law(law: JointCurve | FittedLaw, target: Path, contact: Contact | None = None) -> str:

@@ -6,17 +6,14 @@ import builtins
 import keyword
 import re
 import sys
-import tomllib
 from pathlib import Path
 
 from archord.postprocess.laws.exports.translate import FUNCTIONS
+from archord.report.files import toml_beside
 
-_WORDS = {
-    name: {*words.split()}
-    for name, words in tomllib.loads(
-        Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
-    ).items()
-} | {"python": {*keyword.kwlist, *sys.stdlib_module_names, *dir(builtins)}}
+_WORDS = {name: {*words.split()} for name, words in toml_beside(__file__, "words.toml").items()} | {
+    "python": {*keyword.kwlist, *sys.stdlib_module_names, *dir(builtins)}
+}
 _SPOKEN = {
     "python": "Python",
     "c": "C or C++",
