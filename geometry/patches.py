@@ -139,7 +139,7 @@ class Patches:
         across[other] = one // n_edges
         return across.reshape(self.corners.shape)
 
-    def _are_sharp(self) -> npt.NDArray[np.bool_]:
+    def _are_sharp(self) -> Bools:
         """Whether the edges ``(n_facets, e)`` are sharp and convex."""
         corners = self.reference_corners()
         middles = (corners + np.roll(corners, -1, axis=0)) / 2
@@ -153,7 +153,7 @@ class Patches:
         turned = (normal * normal[there, same_edge]).sum(axis=2)
         centre = self.corner_points().mean(axis=1)
         rise = ((centre[there] - shape @ nodes) * normal).sum(axis=2)
-        is_sharp: npt.NDArray[np.bool_] = (turned < _SHARP) & (rise < 0)
+        is_sharp: Bools = (turned < _SHARP) & (rise < 0)
         return is_sharp
 
     def shapes(self, xi: Array) -> tuple[Array, Array]:

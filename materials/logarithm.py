@@ -191,8 +191,14 @@ class Logarithm:
 def _in_other_axes(change: Array, matrices: Array) -> Array:
     """``change^T M change`` ``(j, j, n)`` of ``matrices`` M ``(i, i, n)``, for ``change`` ``(i, j,
     n)``."""
-    half = sum(matrices[:, i, None] * row for i, row in enumerate(change))
-    return sum(row[:, None] * half[i] for i, row in enumerate(change))
+    i, j, n = change.shape
+    half = np.zeros((i, j, n))
+    for k in range(i):
+        half += matrices[:, k, None] * change[k]
+    changed = np.zeros((j, j, n))
+    for k in range(i):
+        changed += change[k, :, None] * half[k]
+    return changed
 
 
 def _determinant(tensors: Array) -> Array:
