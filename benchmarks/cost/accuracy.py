@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
 import numpy as np
 
 from archord.benchmarks.case import Case, E, paper_joint, varied
+from archord.benchmarks.timing import Said
 from archord.materials.kinematics import Array
 from archord.output.run import Outcome
 from archord.postprocess.judgement.convergence import difference
@@ -45,7 +46,7 @@ CASES = (
 
 
 def run(
-    folder: Path, cases: Sequence[Case], said: Callable[[str], None], asked: Sequence[float] = ()
+    folder: Path, cases: Sequence[Case], said: Said, asked: Sequence[float] = ()
 ) -> tuple[list[dict[str, object]], list[str]]:
     """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or the accuracies of their
     material, references first.
@@ -87,7 +88,7 @@ def run(
     return rows, faults
 
 
-def reference(case: Case, folder: Path, said: Callable[[str], None]) -> Array:
+def reference(case: Case, folder: Path, said: Said) -> Array:
     """The curve on a much finer mesh, extrapolated with order 3 from it and the one before; of a
     plastic joint in steps an eighth as long, whose error is extrapolated with order 1 from steps
     twice as long on the mesh before."""

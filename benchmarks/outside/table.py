@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from archord.benchmarks.case import matches, write_table
 from archord.benchmarks.outside import eyebar, kratos, nafems, others
 from archord.benchmarks.outside.problem import Outside
+from archord.benchmarks.timing import Said
 from archord.report.files import Row
 
 PROBLEMS = (*nafems.PROBLEMS, *others.PROBLEMS, *kratos.PROBLEMS, *eyebar.PROBLEMS)
@@ -18,7 +19,7 @@ def chosen(pattern: str) -> Sequence[Outside]:
     return [problem for problem in PROBLEMS if matches(pattern, problem.name)]
 
 
-def run(problems: Sequence[Outside], say: Callable[[str], None]) -> list[Row]:
+def run(problems: Sequence[Outside], say: Said) -> list[Row]:
     """Solve ``problems``; a row for each published value."""
     rows = []
     for problem in problems:

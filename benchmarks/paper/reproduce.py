@@ -3,7 +3,7 @@ missing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from mpi4py import MPI
 from archord.benchmarks.paper.claims import judged
 from archord.benchmarks.paper.figures import FIGURES, LAYOUTS, draw_zones, write
 from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_missing
+from archord.benchmarks.timing import Said
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
 from archord.report.errors import InputError
@@ -34,7 +35,7 @@ def reproduce(
     names: Sequence[str],
     folder: Path,
     comm: MPI.Comm,
-    said: Callable[[str], None],
+    said: Said,
     strain: str = "small",
 ) -> list[Path]:
     """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and

@@ -8,13 +8,14 @@ taken. The text names (dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from mpi4py import MPI
 
 from archord.benchmarks.case import Case, E, paper_joint, side_by_side
+from archord.benchmarks.timing import Said
 from archord.materials.material import Plane
 from archord.output.ranks import agreed
 from archord.postprocess.curve import RunCurve
@@ -83,9 +84,7 @@ class Runs:
         return self.run(joint, plane, mesh).curve
 
 
-def solve_missing(
-    wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[str], None]
-) -> list[str]:
+def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Said) -> list[str]:
     """Solve the cases that are not done yet into ``folder``, each on one rank, which says so, the
     ranks side by side. Returns the complaints of all that failed. Collective."""
 

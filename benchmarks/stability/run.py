@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,6 +18,7 @@ from mpi4py import MPI
 from archord.benchmarks.case import Case, Expected, matches, side_by_side
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.benchmarks.stability.picture import draw
+from archord.benchmarks.timing import Said
 from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
 from archord.presets.views import view_of
@@ -118,7 +118,7 @@ def with_references(names: list[str]) -> list[str]:
     return [name for name in table if name in wanted]
 
 
-def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[Line]:
+def run(names: list[str], folder: Path, comm: MPI.Comm, said: Said) -> list[Line]:
     """Solve the cases ``names`` and those they are compared with below ``folder``, each on one
     rank; judge ``names``.
 

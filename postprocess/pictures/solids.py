@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from archord.geometry.vectors import unit
 from archord.materials.kinematics import Ints
 from archord.materials.material import Array
 from archord.postprocess.arrays.fields import Fields
@@ -93,10 +94,8 @@ class View(NamedTuple):
     def from_octant(cls, signs: Sequence[int]) -> View:
         """Seen from the octant with these ``signs`` of x, y and z; y points up."""
         x, y, z = signs
-        towards = np.array([x, _STEEP * y, 1.3 * z])
-        towards = towards / np.linalg.norm(towards)
-        right = np.cross([0.0, 1.0, 0.0], towards)
-        right = right / np.linalg.norm(right)
+        towards = unit(np.array([x, _STEEP * y, 1.3 * z]))
+        right = unit(np.cross([0.0, 1.0, 0.0], towards))
         up = np.cross(towards, right)
         return cls(right, up, towards)
 
