@@ -33,7 +33,7 @@ class _Places:
     - ``component``, ``derivative`` ``(p,)``: rows and columns of the components of gradients
     - ``rows``, ``columns`` ``(m,)``: of the components of symmetric tensors
     - ``engineering`` ``(m, 1)``: engineering strains over tensor strains
-    - ``pairs`` ``(m^2, d^3)``: takes what is summed over A_pq B_qs to engineering strains
+    - ``pairs`` ``(m, m, d, d, d)``: takes what is summed over A_pq B_qs to engineering strains
     """
 
     def __init__(
@@ -48,10 +48,8 @@ class _Places:
         self.columns = np.array(columns)
         self.component, self.derivative = np.array(terms).T
         self.engineering = np.where(self.rows == self.columns, 1.0, 2.0)[:, None]
-        m = len(rows)
-        to_tensors = self.tensors(np.eye(m) / self.engineering)
-        pairs = np.einsum("pqa,qsb->abpqs", to_tensors, to_tensors)
-        self.pairs = pairs.reshape(m * m, -1)
+        to_tensors = self.tensors(np.eye(len(rows)) / self.engineering)
+        self.pairs = np.einsum("pqa,qsb->abpqs", to_tensors, to_tensors)
 
     def components(self, tensors: Array) -> Array:
         """The components ``(m, n)`` of symmetric tensors ``(d, d, n)``."""
@@ -182,10 +180,9 @@ class Logarithm:
 
     def _bent(self, T: Array) -> Array:
         """``T : d2E/dC2`` ``(m, m, n)`` along the principal axes, of engineering shears."""
-        m, n = T.shape
         second = _second_differences(self._values, self._first)
         bent = 2 * self._places.tensors(T)[:, None] * second
-        return (self._places.pairs @ bent.reshape(-1, n)).reshape(m, m, n)
+        return np.tensordot(self._places.pairs, bent, 3)
 
 
 def _in_other_axes(change: Array, matrices: Array) -> Array:
