@@ -23,8 +23,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from archord.report.by_name import Names
-
 LIMIT = 600.0  # seconds
 THREADS = (
     "OMP_NUM_THREADS",
@@ -51,11 +49,11 @@ class Process:
     """
 
     name: str
-    command: Names
+    command: tuple[str, ...]
     folder: Path
     read: Callable[[], Any] = lambda: None
     limit: float = LIMIT
-    clear: Names = ()
+    clear: tuple[str, ...] = ()
     kind: Hashable = None
 
 
@@ -92,7 +90,7 @@ class Timing:
 Said = Callable[[str], None]
 
 
-def solving(scene: str, output: str, *options: str) -> Names:
+def solving(scene: str, output: str, *options: str) -> tuple[str, ...]:
     """The command with which a user solves a ``scene`` into the folder ``output``."""
     command = (sys.executable, "-m", "archord", "solve", scene, "-o", output, "--force", "-q")
     return command + options
