@@ -7,6 +7,7 @@ from itertools import product
 
 from mpi4py import MPI
 
+from archord.measures.coupling_doubts import lever_doubts
 from archord.measures.doubts import (
     LARGE,
     LARGE_STRAIN,
@@ -95,6 +96,8 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
         if angle > _FAR_TURN:
             stretch = f"it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
             yield Doubt(f"a coupling turns by {angle:.2g} rad; {stretch}", angle)
+        if len(system.problem.kinematics.turns) == 1 and not small:
+            yield from lever_doubts(scene, state)
 
     def balances(state: Accepted, m: Record) -> Iterator[str]:
         if m.force_balance:

@@ -37,7 +37,7 @@ _SECONDS = 0.5  # of an output step: a guess, as the mesh is not known yet
 _RIGHT_ANGLE = 1.5708
 _TURNS_LINEARLY = (
     "must be at most 1.5708, a right angle in radians: a coupling turns linearly, but at large "
-    "strain a rigid one in space with three prescribed rotations, which may turn by 6.2832"
+    "strain a rigid one whose rotations are all prescribed, which may turn by 6.2832"
 )
 # parts whose names must differ, as results, reactions and drives are found by them
 _APART = {
@@ -136,8 +136,9 @@ class ProblemScene(Checked):
         moved = [load for load in self.load if load.displacement is not None]
         prescribed = {load.direction for load in moved if load.on == coupling}
         prescribed.update(*(part.fixed for part in self.support if part.on == coupling))
-        is_large = self.in_space and self.analysis.strain == "large"
-        return is_large and coupling in rigid and prescribed.issuperset(filter(turns, IN_SPACE))
+        is_large = self.analysis.strain == "large"
+        freedoms = IN_SPACE if self.in_space else IN_PLANE
+        return is_large and coupling in rigid and prescribed.issuperset(filter(turns, freedoms))
 
     @after
     def _consistent(self) -> ProblemScene:

@@ -72,11 +72,11 @@ class Dirichlet:
 @in_sentences
 @dataclass(frozen=True)
 class Turn:
-    """A finite rotation in space of what the Dirichlet conditions of a ``name`` turn linearly.
+    """A finite rotation of what the Dirichlet conditions of a ``name`` turn linearly.
 
-    The drives of the rotations about x, y and z, "" without a rotation, make a rotation vector
-    about the ``point``. Their displacements must be prescribed; what is conjugate to them is work,
-    for a rotation about one axis the moment.
+    The drives of the rotations about x, y and z, "" without a rotation, in a plane of the one
+    rotation, make a rotation vector about the ``point``. Their displacements must be prescribed;
+    what is conjugate to them is work, for a rotation about one axis the moment.
     """
 
     name: str

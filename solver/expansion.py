@@ -316,7 +316,7 @@ class _Expansion:
             drive = self._drive(coupling.name, freedom, "force")
             for axis, rate in self._rates(freedom, coupling.point):
                 self.supports.append(Dirichlet(coupling.name, coupling.facets, axis, rate, drive))
-        if self.dimension == 3 and self._is_large():
+        if self._is_large() and not self.stated.kinematics.has_hoop:
             self._turn_finitely(coupling)
 
     def _rigid_motions(self) -> list[str]:

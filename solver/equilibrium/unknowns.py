@@ -91,7 +91,7 @@ class Unknowns:
         u.x.scatter_forward()
         u.x.array[self.fixed.ravel()] = levels @ self._rate_of_fixed
         for turn in self.drives.turns:
-            turn.displace(u.x.array.reshape(-1, 3), levels)
+            turn.displace(u.x.array.reshape(-1, self.dimension), levels)
 
     def where_free(self, values: Array) -> Array:
         """The ``values`` ``(n_owned, d)`` with zeros where displacements are prescribed."""
