@@ -54,12 +54,15 @@ def in_sentences(cls: type) -> Any:
 
 
 def _copied(value: Any) -> Any:
-    """``value`` with copies of the arrays, lists and dictionaries in it."""
+    """``value`` with copies of the arrays, lists and dictionaries in it, and numpy's scalars as
+    Python's."""
     if type(value) in (list, tuple):
         return type(value)(map(_copied, value))
     if type(value) is dict:
         return {key: _copied(of_key) for key, of_key in value.items()}
     is_array = type(value).__module__ == "numpy" and hasattr(value, "shape")
+    if is_array and value.shape == ():
+        return value.item()
     return value.copy() if is_array else value
 
 

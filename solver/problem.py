@@ -220,6 +220,7 @@ class Problem:
         require_between(self, "tolerance", 0, 1, "must be a number between 0 and 1")
         locks = "displacements of first order lock where cells bend or yield"
         require_of(self, self.degree in (2, 3), "degree", f"must be 2 or 3: {locks}")
+        object.__setattr__(self, "degree", int(self.degree))
         iterations = self.max_iterations
         is_whole = is_number(iterations) and iterations == int(iterations) and iterations >= 1
         require_of(self, is_whole, "max_iterations", "must be a whole number, and 1 at least")

@@ -782,3 +782,21 @@ def test_a_ring_has_no_law_per_length_of_a_pin(tmp_path):
     run = archord.solve(problem, tmp_path / "run")
     with pytest.raises(archord.InputError, match="forces are of the whole ring"):
         read_steps(run)
+
+
+def test_numbers_of_numpy_are_taken_as_pythons(tmp_path):
+    """Single precision among them, which no run.json could hold; and a degree of 2.0."""
+    numbers = {"thickness": np.float32(2.0), "tolerance": np.float32(1e-9), "degree": 2.0}
+    runs = {}
+    for name, given in (("numpy", numbers), ("plain", {"thickness": 2.0, "tolerance": 1e-9})):
+        problem = archord.Problem(
+            archord.rectangles({"block": (0.0, 0.0, 1.0, 1.0)}, size=0.5),
+            [archord.Body("block", archord.Elastic(np.float32(1000.0), 0.3))],
+            supports=[archord.Support("block bottom")],
+            loads=[archord.Load("pull", on="block top", direction="y", displacement=0.01)],
+            steps=1,
+            **given,
+        )
+        runs[name] = archord.solve(problem, tmp_path / name, fields=False)
+    first, second = (run.columns["pull force"] for run in runs.values())
+    assert first == pytest.approx(second, rel=1e-7)
