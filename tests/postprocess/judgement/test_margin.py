@@ -116,6 +116,44 @@ def test_a_pin_bends_about_the_faces_that_bear():
     assert soft["bending, ends bear"] == soft["bending, even bearing"]
 
 
+def test_a_clevis_bears_between_its_rims():
+    """Two fillets shorten the length on which each plate bears, and widen the gap by two."""
+    thickness = {"inner": 16.0, "outer": 6.0}
+    rim = 0.75
+    plates = {
+        name: STEEL | {"hardening": CURVE, "thickness": t, "width": 40.0}
+        for name, t in thickness.items()
+    }
+    scene = parse_any(
+        {
+            "clevis": {"radius": 10.0, "clearance": 0.1} | COARSE,
+            "space": {"gap": 2.0, "fillet": rim},
+        }
+        | plates
+        | {"pin": STEEL | {"yield_stress": 900.0}, "load": {"force": 2e4}}
+    )
+    run = SimpleNamespace(
+        scene=scene,
+        folder="run",
+        number=lambda step: 1,
+        columns={"pull force": [2e4]},
+        units={},
+    )
+    parts = parts_of(run)
+    ultimate = []
+    for name, number in {"inner": 1, "outer": 2}.items():
+        part = parts[name]
+        bears = number * (thickness[name] - 2 * rim)
+        assert part.by_hand("yield", 100.0)["bearing"] == pytest.approx(150 * 20 * bears)
+        sections = part.by_hand("ultimate", tensile_strength(part.body))
+        ultimate.append(min(sections.values()))
+    inner, outer = (t - 2 * rim for t in thickness.values())
+    pin = ClevisPin(10.0, 0.0, inner, outer, 2.0 + 2 * rim)
+    for kind in ("yield", "ultimate"):
+        expected = pin.forces(kind, 900.0, tuple(ultimate))
+        assert parts["pin"].by_hand(kind, 900.0) == pytest.approx(expected)
+
+
 def test_strengths_are_those_of_the_tension_test_behind_the_curve():
     """0.2 % proof and largest engineering stress; of metals with a plateau the yield strength; of
     named ones the listed strengths."""
@@ -255,8 +293,22 @@ def test_the_command_prints_what_the_function_finds(runs, capsys):
     assert (
         capsys.readouterr().out == margin_text(margins(runs["cycled"], 9000.0, factor=1.5)) + "\n"
     )
+    assert command(["margin", folder, "--load", "9000", "--plate", "outer"]) == 2
+    assert "'outer': is for a clevis or for bodies" in capsys.readouterr().err
     assert command(["margin", "--help"]) == 0
     assert "by hand formulas (net" in capsys.readouterr().out
+
+
+def test_the_text_compares_formulas_with_finite_elements(runs):
+    """The last criterion of finite elements with the weakest section by hand."""
+    found = margins(runs["cycled"], 9000.0)
+    told = r"yield: by hand (.*) is the weakest; finite elements \((.*)\) are ([-+.\d]+)% off it"
+    name, criterion, off = re.search(told, margin_text(found)).groups()
+    allowable = {check.name: check.allowable for check in found.checks if check.kind == "yield"}
+    by_hand = [check for check in found.checks if (check.kind, check.by) == ("yield", "hand")]
+    assert name == min(by_hand, key=lambda check: check.allowable).name
+    lacking = allowable[criterion] / allowable[name] - 1
+    assert float(off) == pytest.approx(100 * lacking, abs=0.05)
 
 
 @pytest.mark.parametrize(
