@@ -153,7 +153,7 @@ class Patches:
         turned = (normal * normal[there, same_edge]).sum(axis=2)
         centre = self.corner_points().mean(axis=1)
         rise = ((centre[there] - shape @ nodes) * normal).sum(axis=2)
-        is_sharp: Bools = (turned < _SHARP) & (rise < 0)
+        is_sharp: Bools = (there >= 0) & (turned < _SHARP) & (rise < 0)
         return is_sharp
 
     def shapes(self, xi: Array) -> tuple[Array, Array]:

@@ -59,8 +59,8 @@ def plane_doubts(problem: Problem) -> list[str]:
     if named in ("", solved):
         return []
     return [
-        f'the elements of the mesh are named for "{named}", but "{solved}" is solved: give '
-        f'analysis.plane (of a Problem kinematics), "{solved}" if it is meant'
+        f'the elements of the mesh are named for "{named}", but "{solved}" is solved: give one of '
+        "them as analysis.plane, or the kinematics of the Problem"
     ]
 
 

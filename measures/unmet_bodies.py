@@ -46,7 +46,7 @@ class UnmetBodies:
         if self.system.equilibrium.load % 1:
             return
         u = self.system.equilibrium.displacement()
-        near = [pair for pair in self.pairs if self._boxes_meet(pair, u)]
+        near = self._near(u)
         if not near:
             return
         largest = self.system.comm.allreduce(np.abs(u).max(initial=0.0), op=MPI.MAX)
@@ -58,15 +58,21 @@ class UnmetBodies:
             text = f"{a!r} and {b!r} pass through each other, where no interaction lets them touch"
             yield Doubt(f"{text}: one lies {deep:.3g} deep in the other", deep)
 
-    def _boxes_meet(self, pair: tuple[Body, Body], u: Array) -> bool:
-        """Whether the boxes around both deformed bodies have a part in common."""
+    def _near(self, u: Array) -> list[tuple[Body, Body]]:
+        """The pairs whose boxes around the deformed bodies have a part in common."""
         x = self.system.V.tabulate_dof_coordinates()[:, : u.shape[1]] + u
-        nodes = [self.system.nodes_of(body) for body in pair]
+        bodies = self.system.problem.bodies
+        nodes = [self.system.nodes_of(body) for body in bodies]
         low = np.array([x[of_body].min(axis=0, initial=np.inf) for of_body in nodes])
         high = np.array([x[of_body].max(axis=0, initial=-np.inf) for of_body in nodes])
         self.system.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
         self.system.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-        return bool((low.max(axis=0) < high.min(axis=0)).all())
+        near = []
+        for pair in self.pairs:
+            both = [bodies.index(body) for body in pair]
+            if (low[both].max(axis=0) < high[both].min(axis=0)).all():
+                near.append(pair)
+        return near
 
     @cached_property
     def _drawn(self) -> MeshArrays | None:

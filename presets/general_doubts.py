@@ -80,10 +80,12 @@ def step_checks(scene: ProblemScene, system: System) -> list[Check]:
         yield from hardening_doubts(state)
 
     def pressures(state: Accepted, m: Record) -> Iterator[str]:
+        if small:
+            return
         u = system.equilibrium.displacement()
         for load in system.problem.loads:
             _, pressure = state.driven[load.drive]
-            if small or not load.pressure * pressure:
+            if not load.pressure * pressure:
                 continue
             off = system.equilibrium.drives.loads.dead_error(load.facets, u)
             if off > _FOLLOWING:

@@ -24,6 +24,7 @@ from archord.solver.problem import Problem
 # holds converge badly
 _WITH_FRICTION = 2
 _ALONG = 1e-6  # component of a normal from which on a held axis is not along the surface
+_INTO = 0.1  # of a facet: how deep surfaces may be drawn into each other
 
 
 class CleanSides:
@@ -103,6 +104,8 @@ class CleanSides:
             acts |= np.isin(nodes, spread).all(axis=1)
         if isinstance(opposite, Surface):
             acts &= _beside(surface, opposite)
+        else:
+            acts &= _faces(surface, opposite)
         return self.comm.allreduce(bool(acts.any()), op=MPI.LOR)
 
 
@@ -113,12 +116,26 @@ def _nodes(surface: Surface) -> Ints:
 
 def _beside(surface: Surface, opposite: Surface) -> Bools:
     """Which of this rank's facets ``(n,)`` of a ``surface`` are in the box around the ``opposite``
-    one, grown by a facet and by how far the boxes of both are apart."""
+    one, grown by a facet and by how far the boxes of both are apart, and face the box."""
     own = surface.curve.X
     other = opposite.curve.X
     low = other.min(axis=0)
     high = other.max(axis=0)
     apart = np.maximum(low - own.max(axis=0), own.min(axis=0) - high)
-    margin = np.maximum(apart, 0.0) + surface.facet_lengths().max()
+    facet = surface.facet_lengths().max()
+    margin = np.maximum(apart, 0.0) + facet
     is_in = (surface.point >= low - margin) & (surface.point <= high + margin)
-    return is_in.all(axis=2).any(axis=1)
+    farthest = np.where(surface.outward > 0, high, low)
+    ahead = ((farthest - surface.point) * surface.outward).sum(axis=2)
+    faces = ahead > -_INTO * facet
+    return (is_in.all(axis=2) & faces).any(axis=1)
+
+
+def _faces(surface: Surface, disc: RigidSurface) -> Bools:
+    """Which of this rank's facets ``(n,)`` of a ``surface`` face the centre of a ``disc``, or the
+    axis of a cylinder."""
+    to_centre = disc.curve.centre - surface.point
+    axis = disc.curve.axis
+    if axis is not None:
+        to_centre -= (to_centre @ axis)[..., None] * axis
+    return ((to_centre * surface.outward).sum(axis=2) > 0).any(axis=1)

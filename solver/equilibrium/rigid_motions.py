@@ -221,8 +221,8 @@ class RigidMotions:
         return min(pushes, default=0.0)
 
     def unheld(self, load: float, *, tied: bool = False) -> str:
-        """The body that forces at the ``load`` push along a line on which no contact is in its way,
-        however far it goes; "" without one. Collective.
+        """The body, or the interaction of a disc, that forces at the ``load`` push along a line on
+        which no contact is in its way, however far it goes; "" without one. Collective.
 
         Translations of the bodies are sought that the forces drive most (a linear program), of
         which none goes against the normal of a facet of a contact. Friction counts as a tie; all
@@ -233,7 +233,10 @@ class RigidMotions:
         applied = self._applied(load, self.drives.values(load))
         d = self.drives.dimension
         turns = self._of_bodies[:, :, d:]
-        if not applied.any() or not turns.size:  # around an axis
+        least = self.least_push(load)
+        if np.linalg.norm(applied) <= _BALANCED * least or not least:  # all but round-off balances
+            return ""
+        if not turns.size:  # around an axis
             return ""
         stands: list[Array] = [turns.reshape(len(applied), -1).T]
         opens: list[Array] = [np.zeros((1, len(applied)))]
@@ -257,9 +260,15 @@ class RigidMotions:
         )
         if found.x is None or applied @ found.x <= _UNHELD * np.linalg.norm(applied):
             return ""
-        moved = np.tensordot(found.x, self._of_bodies, 1)
-        farthest = np.abs(moved).max(axis=1).argmax()
-        return str(self.problem.bodies[farthest].name)
+        moved = np.abs(np.tensordot(found.x, self._of_bodies, 1)).max(axis=1)
+        bodies = [str(body.name) for body in self.problem.bodies]
+        moves = dict(zip(bodies, moved.tolist(), strict=True))
+        for interface in self.contact.interfaces:
+            for surface in interface.surfaces:
+                if isinstance(surface, RigidSurface):
+                    along = found.x @ self._velocities(surface)
+                    moves[interface.interaction.name] = float(np.abs(along).max())
+        return max(moves, key=lambda name: moves[name])
 
     def _velocities(self, surface: Surface | RigidSurface) -> Array:
         """Translation ``(r, d)`` of the body of a ``surface`` in each free motion."""

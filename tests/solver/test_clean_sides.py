@@ -13,6 +13,7 @@ from archord import (
     Load,
     Mesh,
     Problem,
+    RigidCircle,
     Support,
     System,
     boxes,
@@ -112,17 +113,41 @@ def test_what_acts_along_smooth_surfaces_changes_nothing(mesh):
     assert len(system.contact.pairs) == 2
 
 
-def test_what_acts_far_from_the_other_body_changes_nothing():
-    """The surfaces go on around a corner to the held and the pressed sides of their bodies."""
-    tagged = MESHES["plane"]()
+AROUND = ("lower around", "upper around")
+
+
+def around(tagged):
+    """The mesh with sets that go on around a corner to the held and the pressed sides of bodies."""
     sets = {
         f"{body} around": [f"{body} {side}" for side in ("bottom", "right", "top")]
         for body in ("lower", "upper")
     }
-    made = Mesh(tagged, sets=sets).on(tagged.mesh.comm)
-    system = solved(lambda: made, loads=[PRESS], surfaces=tuple(sets))
+    return Mesh(tagged, sets=sets).on(tagged.mesh.comm)
+
+
+@pytest.mark.mpi
+def test_what_acts_far_from_the_other_body_changes_nothing():
+    made = around(MESHES["plane"]())
+    system = solved(lambda: made, loads=[PRESS], surfaces=AROUND)
     assert len(system.contact.pairs) == 2
     assert system.drive_displacement("press") == pytest.approx(2 * PRESSURE / E)
+
+
+def test_what_acts_on_the_other_face_of_a_sheet_changes_nothing():
+    """Though it is not farther from the other body than a facet is long."""
+    sheets = {"lower": (0.0, 0.0, 1.0, 0.2), "upper": (0.0, 0.2, 1.0, 0.2)}
+    made = around(rectangles(sheets, size=0.5))
+    system = solved(lambda: made, loads=[PRESS], surfaces=AROUND)
+    assert len(system.contact.pairs) == 2
+
+
+def test_what_acts_on_the_far_side_of_a_disc_changes_nothing():
+    made = around(MESHES["plane"]())
+    held = Support("upper bottom")
+    disc = RigidCircle((0.5, 3.0), 1.0)
+    surfaces = (disc, "upper around")
+    system = System(stated(lambda: made, loads=[], fixed=[held], surfaces=surfaces))
+    assert len(system.contact.pairs) == 1
 
 
 def test_no_side_left_is_refused(tmp_path):

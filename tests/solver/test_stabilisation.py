@@ -352,6 +352,36 @@ def test_what_no_contact_can_hold_is_refused_at_once(in_space, direction, force,
     assert raised.value.attempt.cutbacks <= most
 
 
+def test_forces_that_balance_push_nothing_away():
+    """Their resultant is round-off, which has a direction, too."""
+    loads = [
+        Load(f"from {side}", on=f"lid {side}", direction="x", force=force)
+        for side, force in {"left": 1e3, "right": -1e3}.items()
+    ]
+    problem = Problem(
+        rectangles({"base": (0.0, 0.0, 3.0, 1.0), "lid": (0.5, 1.0, 1.0, 1.0)}, size=0.5),
+        [Body(name, Elastic(210e3, 0.3)) for name in ("base", "lid")],
+        [Interaction("contact", ("lid bottom", "base top"))],
+        [Support("base bottom")],
+        loads,
+    )
+    springs = System(problem).equilibrium.springs
+    assert springs is not None
+    assert springs.rigid.unheld(1.0) == ""
+
+
+def test_a_disc_that_is_pulled_away_is_named():
+    problem = Problem(
+        rectangles({"base": (0.0, 0.0, 3.0, 1.0)}, size=0.5),
+        [Body("base", Elastic(210e3, 0.3))],
+        [Interaction("roller", (RigidCircle((1.5, 2.0), 1.0), "base top"))],
+        [Support("base bottom")],
+        [Load("lift", on="roller", direction="y", force=1.0)],
+    )
+    with pytest.raises(StepFailure, match="no contact carries 'roller'"):
+        System(problem).solve([1.0])
+
+
 def test_a_force_across_a_smooth_contact_may_be_held_by_a_wall():
     """Where another contact is in the way, or friction, nothing is refused before it is tried."""
     boxes = {
