@@ -79,6 +79,8 @@ def general_account(
             from archord.presets.held import require_facing
 
             warnings += require_facing(system)
+        if system.clean_sides.fault:
+            raise ValueError(system.clean_sides.fault)
         if scene.mesh.shape is None:
             warnings += mirror_doubts(system)
     frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}

@@ -32,6 +32,7 @@ class CleanSides:
 
     held : (n_local, d) whether the displacement of a node is prescribed
     spread : nodes (n,) of each set of facets along which a load is spread
+    fault : an interaction without a side on which nothing else acts, "" if there is none
     """
 
     def __init__(self, problem: Problem, V: fem.FunctionSpace) -> None:
@@ -44,6 +45,7 @@ class CleanSides:
         index_map = V.dofmap.index_map
         n_local = index_map.size_local + index_map.num_ghosts
         self.comm = V.mesh.comm
+        self.fault = ""
         self.held = np.zeros((n_local, problem.kinematics.dimension), dtype=bool)
         for support in problem.supports:
             self.held[nodes_of[support.facets], support.axis] = True
@@ -53,7 +55,7 @@ class CleanSides:
         self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]
     ) -> Interaction:
         """The ``interaction`` of the ``surfaces``, integrated on one side alone where something
-        acts on the other. Collective; raises ValueError where no side is left."""
+        acts on the other; as it is where no side is left, which is a fault. Collective."""
         law = contact_law(interaction.law, interaction.friction)
         slips = law.slides and not law.has_friction
         of_bodies = {
@@ -79,10 +81,11 @@ class CleanSides:
             gamma_factor = stiffer * interaction.gamma_factor
             return replace(interaction, integrated=clean[0], gamma_factor=gamma_factor)
         cure = f"give integrated = {clean[0]!r}" if clean else "leave them out of one of the sets"
-        raise ValueError(
+        self.fault = (
             f"supports, couplings or loads act on facets of {' and '.join(map(repr, laden))}, too, "
             f"so that the stress there is not the contact's of {interaction.name!r}: {cure}"
         )
+        return interaction
 
     def _held_along(self, surface: Surface) -> Bools:
         """The axes ``(d,)`` along which any facet of a ``surface`` is held. Collective."""

@@ -114,7 +114,7 @@ class System(Totals):
             self.V = displacement_space(mesh, problem.degree)
             self.bulk = self._bulk()
             self.sides: dict[str, Surface] = {}
-            self._clean_sides = CleanSides(problem, self.V)
+            self.clean_sides = CleanSides(problem, self.V)
             self.contact = Contact(self.V, [self._interface(i) for i in problem.interactions])
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
@@ -166,7 +166,7 @@ class System(Totals):
     def _interface(self, interaction: Interaction) -> Interface:
         surfaces = [self._surface(given, interaction.name) for given in interaction.surfaces]
         try:
-            return Interface(self._clean_sides.integrated(interaction, surfaces), surfaces)
+            return Interface(self.clean_sides.integrated(interaction, surfaces), surfaces)
         except ProjectionError as error:
             said = f'interaction "{interaction.name}": its surfaces do not lie opposite each other'
             raise ProjectionError(f"{said}: {error}") from None
@@ -194,7 +194,10 @@ class System(Totals):
         march(self._path, loads, rules=rules)
 
     def load_path(self, at: Position | None = None, coarse: Companion | None = None) -> LoadPath:
-        """The path of the problem's loads, from the position ``at`` or the beginning."""
+        """The path of the problem's loads, from the position ``at`` or the beginning. Raises
+        ValueError where both sides of a contact have other loads, too."""
+        if self.clean_sides.fault:
+            raise ValueError(self.clean_sides.fault)
         return LoadPath(self.solver, self.first_guess, at, coarse)
 
     def first_guess(self, load: float) -> Array:

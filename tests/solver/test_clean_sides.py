@@ -156,6 +156,8 @@ def test_no_side_left_is_refused(tmp_path):
     said = "act on facets of 'upper bottom' and 'lower top', too, .* leave them out"
     with pytest.raises(InputError, match=said):
         solve(problem, tmp_path / "run")
+    with pytest.raises(ValueError, match=said):
+        System(problem).solve()
 
 
 def test_the_other_side_is_the_cure(tmp_path):
