@@ -7,7 +7,7 @@
 enum { MOST = 25, POWERS = 5, EDGES = 4, STEPS = 30 }; /* nodes of a facet (degree 4), and powers of each coordinate */
 enum { S, T };                                         /* the coordinates xi on a facet */
 enum { SS, ST, TT };                                   /* second derivatives */
-enum { EVERY = -1 };                           /* facet is faced */
+enum { EVERY = -1 };                                   /* facet is faced */
 static const double ACROSS = 1e-6; /* the product of unit normals of surfaces that stand on each other */
 static const double TIE = 1e-10; /* of facets as near, which meet at an angle, the first one, whatever the rounding */
 

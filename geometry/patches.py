@@ -192,8 +192,8 @@ class Patches:
 
     def nearest_facet(self, x: Array, displacement: Array, outward: Array | None = None) -> Index:
         """Facet ``(m,)`` of the displaced surface of whose sample points one comes nearest to each
-        of ``x`` ``(m, 3)``; where the surface has sharp edges, of those that face it by its
-        ``outward`` normal ``(m, 3)``."""
+        of ``x`` ``(m, 3)``; where the surface has sharp edges, the next one that faces the
+        ``outward`` normal ``(m, 3)`` of the point."""
         from scipy.spatial import cKDTree  # a plane problem does not pay for it
 
         xi, _ = basix.make_quadrature(self.cell, 4)

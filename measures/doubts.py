@@ -53,7 +53,7 @@ def contrast_doubts(bodies: Sequence[Body]) -> list[str]:
 
 def plane_doubts(problem: Problem) -> list[str]:
     """A warning of a deck whose elements are named for other kinematics than the ``problem``
-    has, of which its user said nothing."""
+    has by default."""
     named = problem.mesh.plane
     solved = problem.kinematics.name
     if named in ("", solved):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import batched, chain
+from itertools import chain
 
 from mpi4py import MPI
 
@@ -42,7 +42,7 @@ def bushing(
     outside", ..., "bore", "outer edge" and "axis" (y = 0).
     """
     size, *radii = in_radii(radius, element_size, *chain.from_iterable(rings))
-    rings = list(batched(radii, 2))
+    rings = list(zip(radii[::2], radii[1::2], strict=True))
     longest = [longest_edge(outer - inner) for inner, outer in rings]
     size = min(size, *longest)
     within = [1.0, *(outer for _, outer in rings)]

@@ -24,7 +24,7 @@ DRAWINGS = {
 @pytest.mark.parametrize("unit", [1e-3, 1e3, 1e6, INCH])
 @pytest.mark.parametrize(("radius", "lengths"), DRAWINGS.values(), ids=DRAWINGS)
 def test_lengths_over_the_radius_have_the_same_bits(radius, lengths, unit):
-    """In all units those of the quotients in millimetres."""
+    """In all units, as the quotients in millimetres."""
     found = in_radii(radius * unit, *(length * unit for length in lengths))
     assert found == [length / radius for length in lengths]
 
