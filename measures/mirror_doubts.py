@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from archord.materials.kinematics import Bools
 from archord.solver.path.mirrors import flat_held
 
 if TYPE_CHECKING:
@@ -30,20 +31,24 @@ def mirror_doubts(system: System) -> Iterator[str]:
     for mirror in system.mirrors:
         axis = problem.kinematics.axes[mirror.axis]
         at = mirror.at if abs(mirror.at) > mirror.near else 0.0
+        free = _free(system, mirror)
         for body in problem.bodies:
-            if _n_free(system, mirror, system.nodes_of(body)) > problem.degree:
+            n_free = system.comm.allreduce(int(free[system.nodes_of(body)].sum()))
+            if n_free > problem.degree:
                 yield (
                     f"sides of {body.name!r} lie in the mirror {axis} = {at:.6g} of the part, but "
                     f"are not held in {axis}: they may part from their images or pass through them"
                 )
 
 
-def _n_free(system: System, mirror: Mirror, nodes: np.ndarray) -> int:
-    """How many of the ``nodes`` of a body lie in a ``mirror`` and may leave it."""
+def _free(system: System, mirror: Mirror) -> Bools:
+    """Which of this rank's nodes ``(n_nodes,)``, but for ghosts, lie in a ``mirror`` and may leave
+    it. Collective."""
     problem = system.problem
-    owned = nodes[nodes < system.V.dofmap.index_map.size_local]
-    x = system.V.tabulate_dof_coordinates()[owned, mirror.axis]
-    within = owned[np.abs(x - mirror.at) < mirror.near]
+    x = system.V.tabulate_dof_coordinates()[:, mirror.axis]
+    free: Bools = np.abs(x - mirror.at) < mirror.near
+    free[system.V.dofmap.index_map.size_local :] = False
     held = [s.facets for s in problem.supports if s.axis == mirror.axis]
-    held_nodes = [problem.mesh.dofs_in(system.V, name) for name in dict.fromkeys(held)]
-    return system.comm.allreduce(len(np.setdiff1d(within, np.concatenate(held_nodes))))
+    for name in dict.fromkeys(held):
+        free[problem.mesh.dofs_in(system.V, name)] = False
+    return free
