@@ -293,12 +293,12 @@ class Run:
         edge: str = "",
         quantity: str = "",
         step: int | None = None,
-        line: Sequence[float] = (),
+        line: Sequence[float] | None = None,
     ) -> Probe:
         """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1, in space
         x0, y0, z0, x1, y1, z1 (von Mises'): see `archord.postprocess.probes.ask.probe`. Raises
         `InputError`."""
-        return probe(self, edge, quantity, self.number(step), line)
+        return probe(self, edge, quantity, self.number(step), () if line is None else tuple(line))
 
     def number(self, step: int | None) -> int:
         """``step``, or the number of the last accepted step. Raises `InputError` if the run has no
@@ -307,9 +307,10 @@ class Run:
             raise InputError(self.folder, "holds no accepted step.")
         if step is None:
             return self.steps
-        if not (1 <= step <= self.steps and step == int(step)):
+        is_number = isinstance(step, int | float | np.number)
+        if not (is_number and 1 <= step <= self.steps and step == int(step)):
             raise InputError(
-                self.folder, f"has no step {step}; its accepted steps are 1 to {self.steps}."
+                self.folder, f"has no step {step!r}; its accepted steps are 1 to {self.steps}."
             )
         return int(step)
 

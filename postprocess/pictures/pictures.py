@@ -33,7 +33,7 @@ def draw_run(
     run: Run,
     target: Path | str,
     *,
-    steps: Sequence[int] = (),
+    steps: int | Sequence[int] = (),
     field: str = "",
     edges: Sequence[str] = (),
     cut: str = "",
@@ -46,7 +46,7 @@ def draw_run(
         The run. Its field is drawn if the run wrote fields.
     target : str or Path
         The picture, .png, .svg or .pdf.
-    steps : sequence of int
+    steps : int or sequence of int
         The steps of the pressure; the field is drawn at the first of them. By default it is drawn
         at the last step, or of an unloaded run at the step with the largest load.
     field : str
@@ -80,7 +80,8 @@ def draw_run(
     >>> archord.draw_run(run, "joint.svg").name
     'joint.svg'
     """
-    draws = panels_of(run, steps=steps, field=field, edges=edges, cut=cut)
+    chosen = [steps] if isinstance(steps, int | np.integer) else steps
+    draws = panels_of(run, steps=chosen, field=field, edges=edges, cut=cut)
     widths = [1.0] * len(draws)
     if run.kinematics.dimension == 3:
         widths[0] = _WIDER

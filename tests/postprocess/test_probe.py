@@ -296,6 +296,8 @@ def test_a_factor_is_of_the_force_of_one_load(tmp_path, capsys):
         ({"edge": "hole", "quantity": "contact_shear"}, "its contacts have no friction"),
         ({}, "give an edge or a line"),
         ({"edge": "hole", "step": 1.5}, "has no step 1.5; its accepted steps are"),
+        ({"edge": "hole", "step": "1"}, "has no step '1'; its accepted steps are"),
+        ({"line": np.array([100.0, 0.0, 101.0, 0.0])}, "no body lies on the line"),
     ],
 )
 def test_what_cannot_be_probed_is_said(lug, asked, said):
