@@ -161,7 +161,8 @@ class RigidMotions:
             size = float(np.linalg.norm(left))
             most = max(most, push.pressed)
             before = least
-            if size <= (1 if is_near else 2) * least:
+            is_worse = size > (1 if is_near else 2) * least
+            if not is_worse:
                 least = size
                 damping = max(damping / _DAMPING, least_damping)
                 best = push, left, u, levels
@@ -184,6 +185,7 @@ class RigidMotions:
             step = self._shortened(whole_step, push.openings)
             u = u + np.tensordot(step, self.free, 1)
             levels = levels + step @ self.levels
+        _, _, u, levels = best
         return u, levels, is_pushed and least < _STOPPED * float(np.linalg.norm(applied))
 
     def _applied(self, load: float, levels: Array) -> Array:
