@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
 _MAY_DIFFER = ("stepping.", "analysis.max_iterations", *_TARGETS)
+_OUT_OF_BALANCE = 1e-4  # over the largest reaction
 _SAME = 1e-9  # relative difference up to which two targets are one
 
 
@@ -196,3 +197,14 @@ def require_same_sides(folder: Path, before: ByName, system: System) -> None:
         if len(shares.get(name, interface.pairs)) != now:
             said = f"was solved with {name!r} integrated on {len(shares[name])} sides"
             raise InputError(folder, f"{said}, which is {now} in this version: solve it again.")
+
+
+def require_balance(folder: Path, step: int, system: System) -> None:
+    """Raise `InputError` where the ``system`` has taken up a ``step`` that is no equilibrium in
+    this version: what it solves has changed since the run was halted. Collective."""
+    off = system.equilibrium.out_of_balance()
+    if off > max(_OUT_OF_BALANCE, 10 * system.problem.tolerance):
+        said = f"was halted after step {step} by a version that solves it otherwise"
+        raise InputError(
+            folder, f"{said}: forces of {off:.2g} of the largest are left here; solve it again."
+        )

@@ -28,7 +28,7 @@ from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import write_history
 from archord.output.own_mesh import given_mesh, mesh_in_use, scene_text, write_mesh
 from archord.output.ranks import agreed
-from archord.output.restart import Start, require_same_sides
+from archord.output.restart import Start, require_balance, require_same_sides
 from archord.output.run_json import Report, peak_memory
 from archord.presets.account import account_of
 from archord.report.by_name import ByName, Names
@@ -227,6 +227,8 @@ class _Output:
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
             m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
+        if self._problem is None:  # laws of own classes may depend on the length of the step
+            require_balance(self.folder, m.step, system)
         self._on_root(lambda: self._report.unseal())
         profiles = self.account.profiles()
         self._write_arrays(m, profiles)

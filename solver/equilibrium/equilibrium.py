@@ -6,6 +6,8 @@ are one object, whose history is kept where a step is accepted.
 
 from __future__ import annotations
 
+import math
+
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
@@ -108,6 +110,16 @@ class Equilibrium:
         self.evaluate()
         self.linear.follow()
         self.contact.begin(self.displacement())  # now that it is known which points touch
+
+    def out_of_balance(self) -> float:
+        """The norm of the residual of the last evaluation over the largest reaction; 0 of a norm
+        that is round-off."""
+        at = self.evaluation
+        of_levels = at.lacking(self.load)
+        squares = self.comm.allreduce((at.free_forces() ** 2).sum()) + of_levels @ of_levels
+        if squares <= at.noise**2:
+            return 0.0
+        return math.sqrt(squares) / max(at.reaction_norm, self.largest_reaction)
 
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""

@@ -29,6 +29,11 @@ def solved(scenes: dict[str, Scene], folder: Path) -> dict[str, Path]:
     return folders
 
 
+def contents(folder: Path) -> dict[Path, bytes]:
+    """What all files of a run hold."""
+    return {path: path.read_bytes() for path in folder.rglob("*.*") if path.is_file()}
+
+
 def rewrite_report(folder: Path, **changes: object) -> None:
     """Let the run in ``folder`` have these ``changes`` in its run.json, as if it had been written
     so."""

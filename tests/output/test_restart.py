@@ -19,7 +19,7 @@ from archord.postprocess.run import Run
 from archord.report.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from archord.solver.contact.quadrature import points_by
-from tests.output.run_files import accepted_steps, same_run
+from tests.output.run_files import accepted_steps, contents, same_run
 from tests.solver.solving import SEVERAL
 from tests.solver.solving import small_scene as scene
 
@@ -234,6 +234,19 @@ def test_a_run_may_be_halted_after_every_step(whole, tmp_path):
     )
 
 
+def test_a_step_that_is_no_equilibrium_here_is_refused(whole, halted_after):
+    """As a halted run of a version that solved it otherwise has them; nothing is written."""
+    problem, step = CASES["plastic"]
+    halted = halted_after(problem, step)
+    known = checkpoint.read(halted / CHECKPOINT)
+    known.arrays["fields/displacement"] *= 1.001
+    checkpoint.write(halted / CHECKPOINT, known)
+    before = contents(halted)
+    with pytest.raises(InputError, match=f"after step {step} by a version that solves it"):
+        go_on(problem, halted)
+    assert contents(halted) == before
+
+
 CHANGES = [("all", "all", 1e-12), ("one", "all", 1e-8), ("all", "one", 1e-8)]
 
 
@@ -311,11 +324,11 @@ def test_a_path_that_does_not_go_on_is_refused(finished, load, said):
 
 def test_a_finished_run_is_left_alone(finished):
     """Nothing to restart."""
-    before = {path: path.read_bytes() for path in finished.rglob("*.*")}
+    before = contents(finished)
     plan = plan_restart(finished)
     assert plan.finished
     assert "finished" in plan.said
-    assert {path: path.read_bytes() for path in finished.rglob("*.*")} == before
+    assert contents(finished) == before
 
 
 def test_tables_of_a_finished_run_are_written_again(finished, tmp_path):
