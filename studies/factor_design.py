@@ -1,6 +1,7 @@
-"""Sweep files of joints with friction or at large strain, each solved without it, too: those that
-the law's factors are fitted to, and fresh ones to check them on.
+"""Sweep files of joints with friction and at large strain, each solved without them, too: those
+that the law's factors are fitted to, and fresh ones to check them on.
 
+    python3 -m archord.studies.factor_design > factor.sweep.toml
     python3 -m archord.studies.factor_design friction > friction.sweep.toml
     python3 -m archord.studies.factor_design "large strain" > large.sweep.toml
     python3 -m archord.studies.factor_design friction --fresh 60 --seed 1 > fresh.sweep.toml
@@ -12,7 +13,7 @@ hardening_design.py. A third of them comes back.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import cycle
 
 import numpy as np
@@ -36,6 +37,7 @@ from archord.studies.law_design import (
 JOINTS = in_planes(
     {"both": 50, "block": 30, "pin": 25, "block weaker": 25, "pin weaker": 25, "elastic": 45}
 )
+KINDS = (FRICTION, LARGE_STRAIN)
 _SMALLEST = 0.03  # coefficient of friction
 _SEED = 7200
 _FIRST = 0.05  # x
@@ -66,36 +68,42 @@ def drawn(share: float, seed: int) -> Iterator[tuple[Drawn, float]]:
             yield (hardened(joint, random) if hardens else joint), friction
 
 
-def rows(kind: str, share: float, seed: int, *, checks: bool = False) -> Iterator[Row]:
-    """The scenes of a ``share`` of `JOINTS`, without friction or large strain and with it; to check
-    the law also in two step sizes where `steps_count`."""
+def rows(
+    kinds: Collection[str], share: float, seed: int, *, checks: bool = False
+) -> Iterator[Row]:
+    """The scenes of a ``share`` of `JOINTS`, without friction and large strain and with each of
+    these ``kinds``; to check the law also in two step sizes where `steps_count`."""
     for (joint, friction), turn in zip(drawn(share, seed), cycle(range(_BACK)), strict=False):
         x = nodes(joint)
         back = x[-1] * _WAY if turn == 0 else []
         path = {"load.displacement": [*x, *back]}
-        own: Row = {"analysis.strain": "large"}
-        if kind == FRICTION:
-            own = {"analysis.friction": friction}
+        keys: dict[str, Row] = {
+            FRICTION: {"analysis.friction": friction},
+            LARGE_STRAIN: {"analysis.strain": "large"},
+        }
         yield joint.own | path
-        yield joint.own | path | own
-        if checks and steps_count(joint.numbers):
-            yield joint.own | own | {"load.displacement": [*x], "load.steps": 2}
+        for kind in kinds:
+            own = keys[kind]
+            yield joint.own | path | own
+            if checks and steps_count(joint.numbers):
+                yield joint.own | own | {"load.displacement": [*x], "load.steps": 2}
 
 
 def main() -> None:
     """Print a sweep file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kind", choices=[FRICTION, LARGE_STRAIN])
+    parser.add_argument("kind", nargs="?", choices=KINDS, help="both kinds unless given")
     parser.add_argument("--fresh", type=int, help="that many joints to check the law on")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--element-size", type=float, default=ELEMENT_SIZE, help="of fresh ones")
     given = parser.parse_args()
+    kinds = (given.kind,) if given.kind else KINDS
     if given.fresh:
         share = given.fresh / sum(JOINTS.values())
-        own = rows(given.kind, share, 1000 * given.seed, checks=True)
+        own = rows(kinds, share, 1000 * given.seed, checks=True)
         print(sweep_file(own, given.element_size), end="")
         return
-    print(sweep_file(rows(given.kind, 1.0, _SEED)), end="")
+    print(sweep_file(rows(kinds, 1.0, _SEED)), end="")
 
 
 if __name__ == "__main__":

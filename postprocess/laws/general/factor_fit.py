@@ -1,9 +1,9 @@
 """What friction and large strain do to joints, from joints that were solved with one of them and
 without, by least squares of the logarithms of P, p0 and eps over those without.
 
-    python3 -m archord.studies.factor_design friction > friction.sweep.toml
-    mpirun -n 2 archord sweep friction.sweep.toml
-    python3 -m archord.postprocess.laws.general.factor_fit runs/friction
+    python3 -m archord.studies.factor_design > factor.sweep.toml
+    mpirun -n 2 archord sweep factor.sweep.toml
+    python3 -m archord.postprocess.laws.general.factor_fit runs/factor
 
 Every fifth joint is predicted by the other joints: these errors make the expected error, and are
 printed.
@@ -219,16 +219,22 @@ def store(kind: str, model: ByName) -> None:
 
 
 def main(folder: Path) -> None:
-    """Fit to the sweep in ``folder``, write the table beside this file, and print how good it
-    is."""
-    joints = changed_in(folder)
+    """Fit to the sweep in ``folder``, write the table beside this file, and print how good it is,
+    for each kind of its joints."""
+    solved = changed_in(folder)
+    for kind in sorted({joint.kind for joint in solved}):
+        print(f"{kind}\n\n{fit_kind([joint for joint in solved if joint.kind == kind])}\n")
+
+
+def fit_kind(joints: list[Changed]) -> str:
+    """Fit to ``joints`` of one kind and write the table beside this file; how good it is."""
     factors, errors = errors_of(joints)
     gains = {
         plane: [[in_digits(value, 5) for value in row] for row in values]
         for plane, values in fit_gain(joints).items()
     }
     store(joints[0].kind, {"gain": gains, "error": factors, "back error": back_factors(joints)})
-    print(errors.markdown())
+    return errors.markdown()
 
 
 if __name__ == "__main__":
