@@ -36,7 +36,11 @@ class Modelling(Section):
         "closest points on deformed curves, or fixed", default="current"
     )
     gamma_factor: float = key(
-        "Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6
+        "Nitsche's gamma over trace constant; coercive above 0.25; with friction twice as much "
+        "where one side alone is integrated, as the other is held or loaded",
+        default=0.5,
+        ge=1e-3,
+        le=1e6,
     )
     accuracy: Accuracy | None = key(
         "relative error of P (under a force: of delta) to reach by mesh and steps", other=0.001
