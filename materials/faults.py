@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import is_dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
-from archord.materials.material import Material
+from archord.materials.material import Material, Plane
 from archord.report.errors import is_number, shown
 
 _BOUNDS = {"E": (1e-30, 1e30), "nu": (-1.0, 0.5)}
 
 
 def fault_of(material: Material) -> str:
-    """What is wrong with E, nu and hardening of a ``material`` that has them; empty if nothing is.
+    """What is wrong with the constants of a ``material`` that has them; empty if nothing is.
 
     A yield stress that is no number, or that decreases, would be taken for another material
     without a word.
@@ -25,6 +25,9 @@ def fault_of(material: Material) -> str:
         value = getattr(material, key, low)
         if hasattr(material, key) and not (is_number(value) and low < value < high):
             return f"{key} = {shown(value)} must be a number between {low:g} and {high:g}"
+    plane = getattr(material, "plane", None)
+    if not (plane is None or plane in get_args(Plane)):
+        return f"plane = {shown(plane)} must be one of {', '.join(get_args(Plane))}"
     if not isinstance(material.elastic_tangent, np.ndarray):
         return f"elastic_tangent = {shown(material.elastic_tangent)} must be an array"
     hardening: Any = getattr(material, "hardening", None)

@@ -10,6 +10,7 @@ import numpy as np
 
 from archord.materials.kinematics import Ints
 from archord.materials.material import Array
+from archord.report.errors import InputError
 
 
 class Hardening(Protocol):
@@ -125,7 +126,7 @@ class TabularHardening(Hardening):
 
     Raises
     ------
-    ValueError
+    InputError
         If PEEQ does not begin at 0 and increase, or if stresses decrease or are not positive.
 
     Examples
@@ -143,9 +144,9 @@ class TabularHardening(Hardening):
         """Check the points."""
         peeq, stress = self._table
         if not (len(peeq) and peeq[0] == 0 and (np.diff(peeq) > 0).all()):
-            raise ValueError("PEEQ must begin at 0 and increase from point to point")
+            raise InputError("PEEQ must begin at 0 and increase from point to point")
         if not (stress[0] > 0 and np.isfinite(stress).all() and (np.diff(stress) >= 0).all()):
-            raise ValueError("yield stresses must be positive and must not decrease with PEEQ")
+            raise InputError("yield stresses must be positive and must not decrease with PEEQ")
         own = tuple(zip(map(float, peeq), map(float, stress), strict=True))
         object.__setattr__(self, "points", own)  # an array may be changed later
 

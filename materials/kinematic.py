@@ -25,6 +25,7 @@ from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
 from archord.materials.material import Array, State
 from archord.materials.return_map import STEEP, PlasticState, beyond, bracketed_newton
+from archord.report.errors import InputError, shown
 
 _TWICE = ENGINEERING  # products of tensors count shear twice
 # of engineering strains
@@ -87,8 +88,8 @@ class KinematicMaterial(J2Material):
 
     Raises
     ------
-    ValueError
-        For a C that is not positive, or a negative gamma.
+    InputError
+        For what are no pairs, a C that is not positive, or a negative gamma.
 
     Examples
     --------
@@ -109,11 +110,15 @@ class KinematicMaterial(J2Material):
 
     def __post_init__(self) -> None:
         """Check the back stresses."""
-        if not all(C > 0 and gamma >= 0 for C, gamma in self.back_stresses):
-            raise ValueError(
-                "moduli of back stresses must be positive, rates of recovery must not be negative"
+        try:
+            own = tuple((float(C), float(gamma)) for C, gamma in self.back_stresses)
+        except (TypeError, ValueError):
+            own = ((0.0, 0.0),)
+        if not all(C > 0 and gamma >= 0 for C, gamma in own):
+            raise InputError(
+                f"archord.KinematicMaterial: back_stresses = {shown(self.back_stresses)} must be "
+                "pairs of a positive modulus and a rate of recovery that is not negative."
             )
-        own = tuple((float(C), float(gamma)) for C, gamma in self.back_stresses)
         object.__setattr__(self, "back_stresses", own)  # an array may be changed later
 
     @property

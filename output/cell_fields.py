@@ -144,12 +144,19 @@ def cell_means(system: System, parts: Sequence[PointFields], rows: Sequence[Cell
 def _mean_in_bodies(system: System, parts: Sequence[PointFields], row: CellField) -> Array:
     means: Array = np.zeros(0)
     for part in parts:
-        values = np.asarray(row.values(part))
+        found = row.values(part)
+        values = np.asarray(found)
+        if np.ma.is_masked(found) or values.dtype.kind not in "fiub":
+            said = f"must have real numbers at all points, not {values.dtype} or masked ones"
+            raise InputError(f"field {row.name!r}: {said}.")
         if values.shape[:2] != part.weight.shape:
             shape = part.weight.shape
             raise InputError(f"field {row.name!r}: has values {values.shape} at points {shape}.")
         if not means.size:
             means = np.zeros((system.bulk.n_cells, *values.shape[2:]))
+        if means.shape[1:] != values.shape[2:]:
+            said = f"has values {means.shape[1:]} in one body and {values.shape[2:]} in another"
+            raise InputError(f"field {row.name!r}: {said}.")
         share = part.weight / part.weight.sum(axis=1, keepdims=True)
         means[part.cells] = np.einsum("nq,nq...->n...", share, values)
     return means

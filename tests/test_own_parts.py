@@ -651,6 +651,7 @@ def elastic(*numbers) -> dict:
         (elastic(np.nan, 0.3), 'body "slab".E = NaN must be a number between'),
         (elastic("210e3", 0.3), 'body "slab".E = "210e3" must be a number between'),
         (elastic(True, 0.3), 'body "slab".E = true must be a number between'),
+        (elastic(210e3, 0.3, ["strain"]), r'body "slab".plane = \["strain"\] must be one of'),
         (elastic(210e3, 0.5), 'body "slab".nu = 0.5 must be a number between -1 and 0.5'),
         (hardened(300.0), 'body "slab".hardening = 300.0 must be a hardening law'),
         (hardened(archord.LinearHardening(-1.0)), 'body "slab".hardening: yield stresses must be'),

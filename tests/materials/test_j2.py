@@ -16,6 +16,7 @@ from archord.materials.hardening import (
 )
 from archord.materials.j2 import J2Material
 from archord.materials.return_map import PlasticState, return_map
+from archord.report.errors import InputError
 from tests.materials.test_elasticity import NU, E, hooke, turned
 
 SIGY = 250.0
@@ -441,5 +442,5 @@ def test_a_tension_test_becomes_a_table_of_true_stress():
     "points", [(), ((0.1, 1.0),), ((0, 2.0), (0.1, 1.0)), ((0, 1.0), (0, 2.0)), ((0, 0.0),)]
 )
 def test_a_table_that_is_no_hardening_law_is_refused(points):
-    with pytest.raises(ValueError, match="must"):
+    with pytest.raises(InputError, match="must"):
         TabularHardening(points)

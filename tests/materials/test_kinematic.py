@@ -9,6 +9,7 @@ import pytest
 from archord.materials.hardening import LinearHardening, VoceHardening
 from archord.materials.j2 import J2Material
 from archord.materials.kinematic import KinematicMaterial
+from archord.report.errors import InputError
 from tests.materials.test_elasticity import NU, E, hooke
 from tests.materials.test_j2 import SIGY, YIELD_STRAIN
 
@@ -228,6 +229,6 @@ def test_energy_balance(plane, rng):
 
 
 def test_moduli_without_a_meaning_are_refused():
-    for back in ((0.0, 1.0), (1.0, -1.0)):
-        with pytest.raises(ValueError, match="must"):
-            KinematicMaterial(E, NU, "strain", LinearHardening(SIGY), (back,))
+    for back in ([(0.0, 1.0)], [(1.0, -1.0)], (1.0, 1.0), [["1 GPa", 1.0]], 1.0):
+        with pytest.raises(InputError, match="must be pairs of a positive modulus"):
+            KinematicMaterial(E, NU, "strain", LinearHardening(SIGY), back)

@@ -130,6 +130,36 @@ def test_a_name_that_is_taken_or_none_is_refused(tmp_path, name):
     assert not (tmp_path / "run").exists()
 
 
-def test_values_that_are_not_at_the_points_are_refused(tmp_path):
-    with pytest.raises(archord.InputError, match="field 'sum': has values"):
-        archord.solve(bar(), tmp_path / "run", own_fields={"sum": lambda at: at.stress.sum()})
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (lambda at: at.stress.sum(), "has values"),
+        (lambda at: at.peeq * 1j, "must have real numbers at all points, not complex128"),
+        (lambda at: np.ma.masked_less(at.peeq, 1.0), "must have real numbers at all points"),
+    ],
+)
+def test_values_that_are_not_at_the_points_are_refused(values, said, tmp_path):
+    """The imaginary part and the mask of an array were left out without a word."""
+    with pytest.raises(archord.InputError, match=f"field 'own': {said}"):
+        archord.solve(bar(), tmp_path / "run", own_fields={"own": values})
+
+
+def test_a_field_has_one_shape_in_all_bodies(tmp_path):
+    """Four values in cells of one body were spread over the components of the other's tensors."""
+    mesh = archord.rectangles({"one": (0, 0, 1, 1), "two": (2, 0, 1, 1)}, size=1.0)
+    bodies = [
+        archord.Body(name, archord.Elastic(1.0, nu))
+        for name, nu in zip(("one", "two"), (0.1, 0.2), strict=True)
+    ]
+    held = [
+        archord.Support(f"{name} {side}") for name in ("one", "two") for side in ("bottom", "top")
+    ]
+    press = archord.Load("press", on="one", direction="x", force=1e-3)
+    problem = archord.Problem(mesh, bodies, [], held, [press])
+
+    def of_one(at):
+        return at.stress if at.material.nu == 0.1 else at.peeq
+
+    said = r"field 'own': has values \(4,\) in one body and \(\) in another"
+    with pytest.raises(archord.InputError, match=said):
+        archord.solve(problem, tmp_path / "run", own_fields={"own": of_one})

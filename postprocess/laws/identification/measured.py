@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from dataclasses import dataclass
@@ -16,6 +17,9 @@ from archord.scene.file import read_text
 
 FEWEST = 8  # points
 _SEPARATORS = (";", "\t", ",")
+_COMMA = re.compile(r"[-+]?\d+(,\d+)+(\.\d*)?(e[-+]?\d+)?", re.IGNORECASE)
+# a unit behind a name: in brackets, or known, as in "F / kN" and "F in kN"
+_UNIT = re.compile(r"[\[(]([^\])]*)|(?:/|\sin\s)\s*([kM]?N(?:/m?m)?|[cmuµ]?m|kgf?|lbf?|inch)$")
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ def read_curve(
     """
     lines = [line for line in read_text(path).splitlines() if line.strip() and line[0] != "#"]
     separator = next((sign for sign in _SEPARATORS if lines and sign in lines[0]), None)
-    cells = [[cell.strip().strip('"') for cell in line.split(separator)] for line in lines]
+    cells = [_cells(line, separator) for line in lines]
     if separator != ",":
         cells = [[cell.replace(",", ".") for cell in row] for row in cells]
     begin = next((k for k, row in enumerate(cells) if not _is_heading(row)), len(cells))
@@ -80,6 +84,10 @@ def read_curve(
         fault = f"has {whole.sum()} rows with two numbers, and a fit needs {FEWEST} and more"
         raise InputError(path, f"{fault}.")
     said = []
+    if len(heads) > 2 and delta is None and load is None:
+        first, second = (heads[column] for column in columns)
+        taken = f"{first!r} is taken for the displacement and {second!r} for the force"
+        said.append(f"{path}: of {len(heads)} columns {taken}; --delta and --load name others")
     for k, row in enumerate(cells[:begin]):
         named = [row[column] if column < len(row) else "" for column in columns]
         if units:
@@ -87,6 +95,13 @@ def read_curve(
     if not whole.all():
         said.append(f"{path}: {(~whole).sum()} of {len(whole)} rows lack a number; left out")
     return _compressed(path, numbers[whole, 0], numbers[whole, 1], said)
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    """The cells of a ``line``, in which quotes hold separators; alone, as a quote without a second
+    one would take in the next lines."""
+    row = next(csv.reader([line], delimiter=separator)) if separator else line.split()
+    return [cell.strip().strip('"') for cell in row]
 
 
 def _is_number(cell: str) -> bool:
@@ -109,7 +124,7 @@ def _column(path: Path, heads: list[str], name: str | None, default: int) -> int
     """The index of the column headed ``name``, with or without a unit in brackets."""
     if name is None:
         return default
-    plain = [re.split(r"[\[(]", head)[0].strip() for head in heads]
+    plain = [re.split(r"[\[(]|\s/\s|\sin\s", head)[0].strip() for head in heads]
     for known in (heads, plain):
         if known.count(name) > 1:
             raise InputError(path, f"has {known.count(name)} columns headed {name!r}.")
@@ -128,8 +143,12 @@ def _require_one_reading(
     columns: list[int],
 ) -> None:
     """Raise `InputError` where a comma or a point can be a decimal one and one of thousands."""
+    quoted = [cell for row in cells for cell in row if separator == "," and _COMMA.fullmatch(cell)]
+    if quoted:
+        fault = f'has commas between columns and in the number "{quoted[0]}"'
+        raise InputError(path, f"{fault}, for decimals or between thousands; write it without one.")
     rows = cells[begin:]
-    width = max(map(len, cells[: max(begin, 1)]), default=0)
+    width = len(cells[max(begin - 1, 0)]) if cells else 0
     longer = [k for k, row in enumerate(rows) if any(row[width:])]
     if longer:
         k = longer[0]
@@ -155,8 +174,8 @@ def _other_units(
     ``are_units`` themselves, with or without brackets."""
     said = []
     for head, unit in zip(heads, units, strict=True):
-        found = re.search(r"[\[(]([^\])]*)[\])]", head)
-        named = found[1].strip() if found else head * are_units
+        found = None if are_units else _UNIT.search(head)
+        named = (found[found.lastindex or 0] if found else head * are_units).strip(" []()")
         if named and named != unit:
             other = f"{path}: {head!r} has another unit than the scene, {unit}"
             said.append(f"{other}; its numbers are taken as they are")

@@ -236,6 +236,7 @@ def test_a_key_that_cannot_be_free_is_refused(free, words):
         ("time;u [mm];F (N)\n" + "".join(f"0;{k},5;{k}\n" for k in range(9)), (8.5, 8), None),
         ("".join(f"{k} {-2 * k}\n" for k in range(9)), (8, 16), "forces are negative"),
         ("".join(f"{-k} {-2 * k}\n" for k in range(9)), (8, 16), "are turned round"),
+        ('"u, mm","F, N"\n' + "".join(f'"{k}","{2 * k}"\n' for k in range(9)), (8, 16), None),
         ("u,F\n0,nan\n1,\n" + "".join(f"{k},{2 * k}\n" for k in range(9)), (8, 16), "2 of 11 rows"),
     ],
 )
@@ -286,9 +287,11 @@ def test_a_row_that_repeats_the_row_before_is_counted_once(tmp_path):
     [
         ("u,F\n" + "".join(f"{k},05,{2 * k},5\n" for k in range(9)), "has 4 cells in the line"),
         ("u,F\n" + "".join(f"{k},1,{k}00\n" for k in range(9)), "has 3 cells in the line"),
-        ("".join(f"{k},{k}\n" for k in range(9)) + '"9","1,000"\n', "has 3 cells in the line"),
+        ("".join(f"{k},{k}\n" for k in range(9)) + '"9","1,000"\n', 'in the number "1,000"'),
+        ('"u, mm","F, N"\n' + 9 * '"1,05","2,5"\n', 'in the number "1,05"'),
+        ("A, 20 C, run 3, x\nu,F\n" + 9 * "1,05,2,5\n", "has 4 cells in the line"),
         ("".join(f"{k},25,{2 * k},5\n" for k in range(9)), "has no headings and 4 columns"),
-        ("".join(f'"{k},25","{2 * k}"\n' for k in range(9)), "has no headings and 3 columns"),
+        ("".join(f'"{k},25","{2 * k}"\n' for k in range(9)), 'in the number "0,25"'),
         ("u\tF\n" + "".join(f"0.0{k}\t1,{k}00\n" for k in range(9)), "a comma and numbers with a"),
         ("u;F\n" + "".join(f"0,0{k};1.{k}00\n" for k in range(9)), "a comma and numbers with a"),
     ],
@@ -322,6 +325,30 @@ def test_units_below_the_headings_are_compared(tmp_path):
         assert "kN" in warned
         assert "has another unit than the scene, N" in warned
         assert not read_curve(path, "u", "F", units=("mm", "kN")).said
+
+
+@pytest.mark.parametrize(
+    "heads", ["u [mm];F [kN]", "u / mm;F / kN", "u/mm;F/kN", "u in mm;F in kN"]
+)
+def test_units_in_headings_are_compared(heads, tmp_path):
+    """In brackets, and as ISO 80000 and test machines write them."""
+    path = tmp_path / "curve.csv"
+    path.write_text(f"{heads}\n" + "".join(f"{k},5;{k}\n" for k in range(9)))
+    names = ("u", "F") if " " in heads else (None, None)
+    (warned,) = read_curve(path, *names, units=("mm", "N")).said
+    assert "kN' has another unit than the scene, N" in warned.replace("]", "")
+    assert not read_curve(path, *names, units=("mm", "kN")).said
+    path.write_text("u;F in pin\n" + "".join(f"{k},5;{k}\n" for k in range(9)))
+    assert not read_curve(path, units=("mm", "N")).said
+
+
+def test_columns_that_were_not_named_are_told_where_there_are_others(tmp_path):
+    """The time is no displacement, and the displacement no force."""
+    path = tmp_path / "curve.csv"
+    path.write_text("time,u,F\n" + "".join(f"{k},{k},{2 * k}\n" for k in range(9)))
+    (warned,) = read_curve(path).said
+    assert "of 3 columns 'time' is taken for the displacement and 'u' for the force" in warned
+    assert not read_curve(path, "u", "F").said
 
 
 @pytest.mark.parametrize("names", [{"delta": "u"}, {"load": "F"}])
