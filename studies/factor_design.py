@@ -68,9 +68,7 @@ def drawn(share: float, seed: int) -> Iterator[tuple[Drawn, float]]:
             yield (hardened(joint, random) if hardens else joint), friction
 
 
-def rows(
-    kinds: Collection[str], share: float, seed: int, *, checks: bool = False
-) -> Iterator[Row]:
+def rows(kinds: Collection[str], share: float, seed: int, *, checks: bool = False) -> Iterator[Row]:
     """The scenes of a ``share`` of `JOINTS`, without friction and large strain and with each of
     these ``kinds``; to check the law also in two step sizes where `steps_count`."""
     for (joint, friction), turn in zip(drawn(share, seed), cycle(range(_BACK)), strict=False):

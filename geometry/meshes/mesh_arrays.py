@@ -117,7 +117,7 @@ class MeshArrays:
         point_sets = {name: np.unique(place(own.nodes)) for name, own in points.items()}
         numbers = _tags(groups), _tags(facets)
         mesh = cls.of_sets(kind, x, cells, cell_sets, facet_sets, point_sets, numbers)
-        notes = (*_nameless(groups, d), *_nameless(facets, d - 1))
+        notes = (*_nameless(groups, d), *_nameless(facets, d - 1), *_left_out(gmsh, d))
         return replace(mesh, notes=notes)
 
     @classmethod
@@ -317,6 +317,18 @@ def _nameless(groups: Mapping[str, _Group], dim: int) -> Iterator[str]:
             f"the physical group {without[0]} of dimension {dim} has no name, and others have: of "
             "groups with one name gmsh keeps it for the first"
         )
+
+
+def _left_out(gmsh, dim: int) -> Iterator[str]:
+    """A warning of cells of dimension ``dim`` in no physical group, which are no part of the
+    mesh."""
+    left = 0
+    for _, entity in gmsh.model.getEntities(dim):
+        if not len(gmsh.model.getPhysicalGroupsForEntity(dim, entity)):
+            _, numbers, _ = gmsh.model.mesh.getElements(dim, entity)
+            left += sum(map(len, numbers))
+    if left:
+        yield f"{left} cells are in no physical group and are left out of the mesh"
 
 
 def _properties(gmsh, types: set[int], dim: int) -> tuple:

@@ -341,6 +341,19 @@ def test_a_name_that_gmsh_gave_to_one_of_two_groups_is_told(module, tmp_path, co
         assert f"the physical group {again} of dimension 1 has no name" in note
 
 
+def test_cells_in_no_group_are_told(module, comm):
+    """A body of two faces, one of which its group lacks, is half a body."""
+    draw(1)
+    for group in gmsh.model.getPhysicalGroups(2):
+        if gmsh.model.getPhysicalName(*group) != "pin":
+            gmsh.model.removePhysicalGroups([group])
+    _, plate = gmsh.model.getEntities(2)
+    _, (numbers,), _ = gmsh.model.mesh.getElements(*plate)
+    gmsh.model.removePhysicalGroups(gmsh.model.getPhysicalGroups(1))
+    (note,) = gathered(read_mesh(gmsh, comm)).notes
+    assert f"{len(numbers)} cells are in no physical group and are left out" in note
+
+
 def test_lines_and_points_of_one_name_are_refused(module, comm):
     gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
     gmsh.model.occ.synchronize()
