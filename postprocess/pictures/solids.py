@@ -7,7 +7,7 @@ needed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -305,17 +305,21 @@ def _draw_axes(axes: Any, view: View) -> None:
 
 
 def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
-    """Mean contact pressure of the facets of the last surface that is a cylinder, over the angle
-    and the place along its axis, at the first of ``steps`` (see `shown_step`); of other surfaces
-    the facets as they lie in the plane that shows most of them. A tie has tension, too."""
+    """Mean contact pressure of the facets of the last pair's cylinder, of two the shorter, over the
+    angle and the place along its axis, at the first of ``steps`` (see `shown_step`); of other
+    surfaces the facets as they lie in the plane that shows most of them. A tie has tension, too."""
     from matplotlib.collections import PolyCollection
 
     step = steps[0] if steps else shown_step(run)
     surfaces = run.contact(step)
-    name, places, words = _unrolled(surfaces)
+    parts = run.scene.interaction
+    pairs = (
+        [name for name in reversed(part.surfaces) if name in surfaces] for part in reversed(parts)
+    )
+    name, places, words = _unrolled(surfaces, pairs)
     profile = surfaces[name]
     pressure = profile.facet_pressure
-    is_tied = any(name in part.surfaces and part.law == "tied" for part in run.scene.interaction)
+    is_tied = any(name in part.surfaces and part.law == "tied" for part in parts)
     carried = np.abs(pressure) if is_tied else pressure
     pressed = carried > _PRESSED * carried.max(initial=0.0)
     colours = colours_for(pressure, "viridis")
@@ -333,21 +337,17 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     axes.figure.colorbar(drawn, ax=axes, label=f"pressure [{unit}]", shrink=0.85)
 
 
-def _unrolled(surfaces: ByName) -> tuple[str, Array, tuple[str, str]]:
-    """The surface that is drawn, its facets' corners ``(n, c, 2)`` in the picture, and the words on
-    its axes."""
-    # with compiled curves, which other commands do without
-    from archord.geometry.curve import circle_through
-
-    for name in reversed(surfaces):
-        corners = surfaces[name].corners
-        flat = corners.reshape(-1, 3)
-        for axis in (2, 0, 1):
-            a, b = (k for k in range(3) if k != axis)
-            circle = circle_through(flat[:, [a, b]])
-            if circle is not None:
-                places = _angle_and_length(corners, circle[0], (a, b), axis)
-                return name, places, ("angle [°]", f"{AXES[axis]} [{{length}}]")
+def _unrolled(
+    surfaces: ByName, pairs: Iterable[Sequence[str]]
+) -> tuple[str, Array, tuple[str, str]]:
+    """The surface that is drawn, of the first of ``pairs`` that has cylinders, its facets' corners
+    ``(n, c, 2)`` in the picture, and the words on its axes."""
+    for names in pairs:
+        cylinders = [found for name in names if (found := _cylinder(name, surfaces[name]))]
+        if cylinders:
+            name, _, centre, axis = min(cylinders, key=lambda each: each.length)
+            places = _angle_and_length(surfaces[name].corners, centre, axis)
+            return name, places, ("angle [°]", f"{AXES[axis]} [{{length}}]")
     name = next(reversed(surfaces))
     corners = surfaces[name].corners
     thin = int(np.ptp(corners.reshape(-1, 3), axis=0).argmin())
@@ -356,10 +356,34 @@ def _unrolled(surfaces: ByName) -> tuple[str, Array, tuple[str, str]]:
     return name, corners[..., [a, b]], labels
 
 
-def _angle_and_length(corners: Array, centre: Array, across: tuple[int, int], axis: int) -> Array:
-    """``corners`` ``(n, c, 3)`` of facets of a cylinder by the angle in degrees about its axis, and
-    the place along it: ``(n, c, 2)``. No facet is torn apart."""
-    arm = corners[..., list(across)] - centre
+class _Cylinder(NamedTuple):
+    """The surface ``name`` with this ``length``, about a line along ``axis`` through the ``centre``
+    ``(2,)``."""
+
+    name: str
+    length: float
+    centre: Array
+    axis: int
+
+
+def _cylinder(name: str, profile: Any) -> _Cylinder | None:
+    """The surface ``name``, if it is a cylinder along x, y or z that is pressed."""
+    # with compiled curves, which other commands do without
+    from archord.geometry.curve import circle_through
+
+    corners = profile.corners.reshape(-1, 3)
+    for axis in (2, 0, 1):
+        circle = circle_through(np.delete(corners, axis, axis=1))
+        if circle is not None and profile.facet_pressure.any():
+            return _Cylinder(name, np.ptp(corners[:, axis]), circle[0], axis)
+    return None
+
+
+def _angle_and_length(corners: Array, centre: Array, axis: int) -> Array:
+    """``corners`` ``(n, c, 3)`` of facets of a cylinder by the angle in degrees about its axis
+    through the ``centre`` ``(2,)``, and the place along it: ``(n, c, 2)``. No facet is torn
+    apart."""
+    arm = np.delete(corners, axis, axis=-1) - centre
     middle = arm.mean(axis=1)
     direction = middle.mean(axis=0)
     zero = np.arctan2(direction[1], direction[0])

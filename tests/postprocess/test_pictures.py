@@ -4,6 +4,7 @@ colour."""
 import re
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import matplotlib.image
 import numpy as np
@@ -169,6 +170,28 @@ def test_a_tie_in_tension_and_the_near_faces_are_drawn_in_space(tmp_path):
     x, y = np.moveaxis(np.array([path.vertices[:3] for path in drawn.get_paths()]), -1, 0)
     twice = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     assert twice.min() > 0
+
+
+def test_the_shorter_cylinder_of_a_pair_is_unrolled():
+    """A hole, whose facets end where contact ends, and not the longer pin; the other way round; a
+    surface that nothing presses is not drawn."""
+
+    def profile(length, pressure=1.0):
+        angle = np.linspace(0, np.pi, 25)
+        ends = np.array([[[np.cos(a), np.sin(a), z] for a in angle] for z in (0.0, length)])
+        corners = np.stack([ends[0, :-1], ends[0, 1:], ends[1, 1:], ends[1, :-1]], axis=1)
+        return SimpleNamespace(corners=corners, facet_pressure=np.full(len(corners), pressure))
+
+    def drawn(**surfaces):
+        name, places, words = solids._unrolled(surfaces, [["pin", "hole"]])
+        assert np.ptp(places[..., 0]) == pytest.approx(180)
+        assert words == ("angle [°]", "z [{length}]")
+        return name
+
+    assert drawn(hole=profile(2.0), pin=profile(3.0)) == "hole"
+    assert drawn(hole=profile(3.0), pin=profile(2.0)) == "pin"
+    assert drawn(hole=profile(3.0), pin=profile(3.0)) == "pin"
+    assert drawn(hole=profile(2.0, 0.0), pin=profile(3.0)) == "pin"
 
 
 def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, capsys):
