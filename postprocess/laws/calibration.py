@@ -8,7 +8,7 @@ matter.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,6 +142,83 @@ class CurveFit:
         return of_neighbours / squares
 
 
+@dataclass(frozen=True)
+class _Curves:
+    """The curves that the law is fitted to, of the finest run of each group.
+
+    - ``quantity``: "P" or "p0"
+    - ``groups`` ``(g,)``
+    - ``rows`` ``(g,)``: which steps ``(n,)`` of each count
+    """
+
+    quantity: str
+    groups: list[Refined]
+    rows: list[Bools]
+
+    @property
+    def runs(self) -> list[RunCurve]:
+        """The finest runs ``(g,)``."""
+        return [g.run for g in self.groups]
+
+    def on_meshes(self, refined: Refined) -> list[Array]:
+        """The curve of a ``refined`` run on all meshes, finest first."""
+        return [getattr(run, self.quantity) for run in refined.runs]
+
+    def data(self) -> list[Array]:
+        """The curves without dimension."""
+        return self._scaled([self.on_meshes(g)[0] for g in self.groups])
+
+    def extrapolated(self) -> list[Array]:
+        """The curves without dimension, on elements of vanishing size where there is a second
+        mesh."""
+        found: list[Array] = []
+        for g in self.groups:
+            curves = self.on_meshes(g)
+            shift = g.shift(curves) if g.coarser else 0.0
+            found.append(curves[0] + shift)
+        return self._scaled(found)
+
+    def _scaled(self, curves: list[Array]) -> list[Array]:
+        parts = zip(curves, self.rows, self.runs, strict=True)
+        return [curve[rows] / _scale(self.quantity, run) for curve, rows, run in parts]
+
+    def law(self, values: Sequence[float] | Array) -> list[Array]:
+        """The law with these ``values`` of k, or of k and c, at the same steps."""
+        numbers = [float(value) for value in values]
+        parts = zip(self.rows, self.runs, strict=True)
+        return [
+            dimensionless_law(self.quantity, run, run.delta[rows], *numbers) for rows, run in parts
+        ]
+
+    def solve(self, data: list[Array], free: str) -> tuple[list[float], list[float]]:
+        """The values of the ``free`` parameters, "k" or "kc", that fit ``data`` best, and their
+        errors. Raises `InputError` where the data do not determine them."""
+        slopes = [y[0] / unit[0] for y, unit in zip(data, self.law([1.0]), strict=True)]
+        slope = float(np.median(slopes))
+        starts = [[slope, c] for c in _STARTS_OF_C] if free == "kc" else [[slope]]
+        try:
+            return fit(
+                lambda values: np.concatenate(self.law(values)), starts, np.concatenate(data)
+            )
+        except ValueError as error:
+            names = ", ".join(run.name for run in self.runs)
+            said = f"{' and '.join(free)} cannot be fitted to {self.quantity}: {error}"
+            raise InputError(names, f"{said}; widen --range.") from None
+
+    def n_elastic(self) -> int:
+        """The number of steps without yielding."""
+        parts = zip(self.rows, self.runs, strict=True)
+        return sum(int((run.peeq_max[rows] == 0).sum()) for rows, run in parts)
+
+    def n_beyond(self, k: float, c: float) -> int:
+        """The number of steps that have yielded past the onset of the plateau."""
+        count = 0
+        for rows, run in zip(self.rows, self.runs, strict=True):
+            onset = _joint(run, k, c).first_yield
+            count += int((rows & (run.peeq_max > 0) & (run.delta > onset)).sum())
+        return count
+
+
 def fit_curve(
     groups: list[Refined], load_range: tuple[float, float] = (0.0, np.inf), quantity: str = "P"
 ) -> CurveFit:
@@ -154,68 +231,28 @@ def fit_curve(
     size; the change of a parameter is its discretisation error. Raises `InputError` where the range
     has too few steps with contact.
     """
-    chosen = [(g.run, _selected(g.run, load_range)) for g in groups]
-    n_elastic = sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen)
-    if quantity == "p0" and n_elastic < 2:
+    curves = _Curves(quantity, groups, [_selected(g.run, load_range) for g in groups])
+    if quantity == "p0" and curves.n_elastic() < 2:
         raise InputError(
             groups[0].run.name,
             "p0 says nothing of k past yield, and fewer than two steps are before.",
         )
-    curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
-
-    def scaled(data: Iterable[Array]) -> list[Array]:
-        return [
-            y[rows] / _scale(quantity, run) for y, (run, rows) in zip(data, chosen, strict=True)
-        ]
-
-    def law(values: Sequence[float] | Array) -> list[Array]:
-        return [
-            dimensionless_law(quantity, run, run.delta[rows], *map(float, values))
-            for run, rows in chosen
-        ]
-
-    def solve(data: list[Array], free: str) -> tuple[list[float], list[float]]:
-        slopes = [y[0] / unit[0] for y, unit in zip(data, law([1.0]), strict=True)]
-        slope = float(np.median(slopes))
-        starts = [[slope, c] for c in _STARTS_OF_C] if free == "kc" else [[slope]]
-        try:
-            return fit(lambda values: np.concatenate(law(values)), starts, np.concatenate(data))
-        except ValueError as error:
-            names = ", ".join(g.run.name for g in groups)
-            what = " and ".join(free)
-            raise InputError(
-                names, f"{what} cannot be fitted to {quantity}: {error}; widen --range."
-            ) from None
-
-    data = scaled(y[0] for y in curves)
+    data = curves.data()
     free = "k"
-    if any(run.sigY for run, _ in chosen):
-        values, errors = solve(data, "kc")
-        onsets = [_joint(run, *values).first_yield for run, _ in chosen]
-        beyond = [
-            rows & (run.peeq_max > 0) & (run.delta > at)
-            for (run, rows), at in zip(chosen, onsets, strict=True)
-        ]
-        yielded = np.concatenate(beyond).sum()
-        if np.isfinite(errors).all() and yielded >= 2:
+    if any(run.sigY for run in curves.runs):
+        values, errors = curves.solve(data, "kc")
+        if np.isfinite(errors).all() and curves.n_beyond(*values) >= 2:
             free = "kc"
     if free == "k":
-        values, errors = solve(data, free)
+        values, errors = curves.solve(data, free)
+    orders = [(g.run.name, g.order(curves.on_meshes(g))) for g in groups if g.coarser]
     mesh: list[float | None] = [None] * len(free)
-    orders = []
-    extrapolated = []
-    for g, y in zip(groups, curves, strict=True):
-        finest = y[0]
-        if g.coarser:
-            orders.append((g.run.name, g.order(y)))
-            finest = finest + g.shift(y)
-        extrapolated.append(finest)
     if orders:
-        moved, _ = solve(scaled(extrapolated), free)
+        moved, _ = curves.solve(curves.extrapolated(), free)
         mesh = [abs(new - value) for new, value in zip(moved, values, strict=True)]
+    parts = zip(curves.runs, curves.rows, data, curves.law(values), strict=True)
     residuals = tuple(
-        Residual(run.name, run.x[rows], measured, fitted)
-        for (run, rows), measured, fitted in zip(chosen, data, law(values), strict=True)
+        Residual(run.name, run.x[rows], measured, fitted) for run, rows, measured, fitted in parts
     )
     dof = sum(map(len, data)) - len(free)
     k, *c = (Estimate(*numbers, dof) for numbers in zip(values, errors, mesh, strict=True))
