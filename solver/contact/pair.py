@@ -3,8 +3,9 @@ points."""
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -146,8 +147,10 @@ class Pair:
         self._turn_frames()
         self.opening = self._opening()
         self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
-        if self.counts_slip:  # what has no partner has no history
-            self.trial[~self.projection.found, 0] = -1.0
+        if self.counts_slip:  # what has no partner is open, and its history ends
+            lost = ~self.projection.found
+            self.opening[lost, 0] = np.linalg.norm(self.separation[lost], axis=1)
+            self.trial[lost, 0] = -1.0
         self._answer(self.opening, self.trial)
         self._evaluated = self.answers()
 
@@ -247,8 +250,10 @@ class Pair:
         points = self.points
         own = (array.copy() for array in (opening, trial, self.gamma))
         response = points.acting.respond(*own, points.given(), self.dt)
-        points.trial = response.state
         with_partner = self.projection.found
+        points.trial = response.state
+        if not self.counts_slip:  # what has no partner keeps its history
+            points.trial = _kept(points.state, with_partner, response.state)
         self.traction = _where(with_partner, response.traction)
         self.by_trial = _where(with_partner, response.by_trial)
         self.by_opening = None
@@ -375,6 +380,16 @@ class Pair:
             reaction = (partners.shape * forces[:, i, None]).ravel()
             own[:, i] += np.bincount(own_nodes, action, len(own))
             opposite[:, i] -= np.bincount(opposite_nodes, reaction, len(opposite))
+
+
+def _kept(old: Any, chosen: np.ndarray, new: Any) -> Any:
+    """The ``new`` state of ``chosen`` points ``(m,)``, the ``old`` one of the others."""
+    if new is None or chosen.all():
+        return new
+    kept = copy(new)
+    for name, values in vars(new).items():
+        vars(kept)[name] = np.where(chosen, np.transpose(values), vars(old)[name].T).T
+    return kept
 
 
 def _where(chosen: np.ndarray, values: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import archord
 from archord.materials.elasticity import Elastic
 from archord.solver.contact.laws.law import (
     OPEN,
@@ -316,3 +317,48 @@ def gone_on(before: System, after: System) -> System:
 def worn(system: System) -> float:
     """The worn volume."""
     return system.contact.interface().quantities()["worn volume"][0]
+
+
+@dataclass(frozen=True)
+class Spring(Wear):
+    """A stiff layer that keeps its largest pressure, and wears where it slips."""
+
+    counts_slip = False
+    stiffness = 3e3
+
+    def respond(self, opening, trial, gamma, state, dt):
+        touches = (opening[:, 0] < 0).astype(int)
+        traction = np.zeros_like(trial)
+        traction[:, 0] = -self.stiffness * opening[:, 0] * touches
+        by_opening = np.zeros((len(trial), 2, 2))
+        by_opening[:, 0, 0] = -self.stiffness * touches
+        worn = state.depth + self.k * traction[:, 0] * np.abs(opening[:, 1])
+        depth = worn if self.counts_slip else np.maximum(state.depth, traction[:, 0])
+        by_trial = np.zeros_like(by_opening)
+        return Response(traction, by_trial, by_opening, touches, WearState(depth))
+
+
+class Wearing(Spring):
+    counts_slip = True
+
+
+@pytest.mark.parametrize("strain", ["small", "large"])
+@pytest.mark.parametrize("law", [Spring(1.0), Wearing(1e-4)])
+def test_points_without_a_partner_have_no_history(law, strain, tmp_path):
+    """Of a punch on a wider foot the largest pressures make up the force, on the foot over all
+    that the punch has met, and k times force times slip is worn off: what lies beside the punch
+    faces nothing. It had as much again."""
+    mesh = archord.rectangles({"foot": (-3, -2, 6, 2), "punch": (-1, 0, 2, 1)}, size=0.5)
+    bodies = [archord.Body(name, archord.Elastic(1e7, 0.0)) for name in ("foot", "punch")]
+    contact = archord.Interaction("rub", ("punch bottom", "foot top"), law=law)
+    press = archord.Load("press", on="punch top", direction="y", displacement=[-0.1, -0.1])
+    slide = archord.Load("slide", on="punch top", direction="x", displacement=[0.0, 0.1])
+    held = [archord.Support("foot bottom")]
+    loads = [press, slide]
+    problem = archord.Problem(mesh, bodies, [contact], held, loads, strain=strain, steps=[1, 2])
+    run = archord.solve(problem, tmp_path / "run")
+    force = 3e3 * 0.1 * 2.0
+    slid = np.array([0.0, 0.05, 0.1])
+    expected = 1e-4 * force * slid if law.counts_slip else force * (1 + slid / 2 / 2)
+    worn = run.columns["rub worn volume"]
+    np.testing.assert_allclose(worn, expected, rtol=3e-3, atol=1e-7 * force)
