@@ -21,7 +21,7 @@ SOLVED = "c3a9600309cbb23954c7b7e46b6dee098c214f4ae2f4d22956a8c236b3ee7ad6"  # S
 def test_the_recipe_makes_the_sweep_that_was_solved(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """To the byte, by the command of docs/law.md."""
+    """To the byte, by the command of docs/development/law_fit.md."""
     monkeypatch.setattr("sys.argv", ["hardening_design"])
     hardening_design.main()
     text = capsys.readouterr().out

@@ -17,7 +17,7 @@ SOLVED = "36a6e11167c5b6254fc68f35dbffa2ff08e7383eecaf45d4762d4ec2af901e92"  # S
 def test_the_recipe_makes_the_sweep_that_was_solved(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """To the byte, by the command of docs/law.md."""
+    """To the byte, by the command of docs/development/law_fit.md."""
     monkeypatch.setattr("sys.argv", ["law_design"])
     law_design.main()
     text = capsys.readouterr().out
