@@ -150,7 +150,7 @@ class Pair:
         if self.counts_slip:  # what has no partner is open, and its history ends
             lost = ~self.projection.found
             self.opening[lost, 0] = np.linalg.norm(self.separation[lost], axis=1)
-            self.trial[lost, 0] = -1.0
+            self.trial[lost, 0] = -1.0 - self.gamma[lost, 0] * self.opening[lost, 0]
         self._answer(self.opening, self.trial)
         self._evaluated = self.answers()
 

@@ -144,7 +144,7 @@ class _Model:
         if dim == 2:
             self.planes.add(_PLANES[name[:3]])
         size = 1 + n_nodes
-        values = [scope.key(value) for row in rows for value in row if value]
+        values = [scope.key(value) for row in rows for value in row]
         if len(values) % size:
             raise ValueError(
                 f"elements of type {name} have {len(values)} numbers, no multiple of {size}"

@@ -272,6 +272,7 @@ def test_what_an_input_deck_may_look_like(comm, deck, old, new):
         (" Both, S3", " Bath, S3", "there is no .ELSET 'Bath'"),
         (" Both, S3", " Both, S5", "surface 'Top' has the face 'S5', which is none of S1 to S4"),
         (" 8, 2, 3,", " 8, 2, 99,", "no node with the number 99"),
+        (" 8, 2, 3,", " 8, , 2, 3,", "'' is no number of a node or an element"),
         (
             "*ELSET, ELSET=right\n 8,",
             "*ELSET, ELSET=right\n 9,",

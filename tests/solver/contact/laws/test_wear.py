@@ -342,23 +342,53 @@ class Wearing(Spring):
     counts_slip = True
 
 
-@pytest.mark.parametrize("strain", ["small", "large"])
-@pytest.mark.parametrize("law", [Spring(1.0), Wearing(1e-4)])
-def test_points_without_a_partner_have_no_history(law, strain, tmp_path):
-    """Of a punch on a wider foot the largest pressures make up the force, on the foot over all
-    that the punch has met, and k times force times slip is worn off: what lies beside the punch
-    faces nothing. It had as much again."""
+@dataclass(frozen=True)
+class Softened(Wear):
+    """Pressure that sets in smoothly, over a width."""
+
+    width: float = 5.0
+    unilateral = False
+
+    def respond(self, opening, trial, gamma, state, dt):
+        scaled = trial[:, 0] / self.width
+        traction = np.zeros_like(trial)
+        traction[:, 0] = self.width * np.logaddexp(0.0, scaled)
+        by_trial = np.zeros((len(trial), 2, 2))
+        by_trial[:, 0, 0] = np.exp(-np.logaddexp(0.0, -scaled))
+        depth = state.depth + self.k * traction[:, 0] * np.abs(opening[:, 1])
+        return Response(traction, by_trial, None, np.full(len(trial), SLIDE), WearState(depth))
+
+
+def punched(law, folder, strain="small", stress=1.0):
+    """What is worn where a punch, pressed into a wider foot by 0.1, slides by 0.1 in two steps;
+    moduli are 1e7 times the unit of ``stress``."""
     mesh = archord.rectangles({"foot": (-3, -2, 6, 2), "punch": (-1, 0, 2, 1)}, size=0.5)
-    bodies = [archord.Body(name, archord.Elastic(1e7, 0.0)) for name in ("foot", "punch")]
+    steel = archord.Elastic(1e7 * stress, 0.0)
+    bodies = [archord.Body(name, steel) for name in ("foot", "punch")]
     contact = archord.Interaction("rub", ("punch bottom", "foot top"), law=law)
     press = archord.Load("press", on="punch top", direction="y", displacement=[-0.1, -0.1])
     slide = archord.Load("slide", on="punch top", direction="x", displacement=[0.0, 0.1])
     held = [archord.Support("foot bottom")]
     loads = [press, slide]
     problem = archord.Problem(mesh, bodies, [contact], held, loads, strain=strain, steps=[1, 2])
-    run = archord.solve(problem, tmp_path / "run")
+    return np.array(archord.solve(problem, folder).columns["rub worn volume"])
+
+
+@pytest.mark.parametrize("strain", ["small", "large"])
+@pytest.mark.parametrize("law", [Spring(1.0), Wearing(1e-4)])
+def test_points_without_a_partner_have_no_history(law, strain, tmp_path):
+    """The largest pressures make up the force, on the foot over all that the punch has met, and k
+    times force times slip is worn off: what lies beside the punch faces nothing. It had as much
+    again."""
     force = 3e3 * 0.1 * 2.0
     slid = np.array([0.0, 0.05, 0.1])
     expected = 1e-4 * force * slid if law.counts_slip else force * (1 + slid / 2 / 2)
-    worn = run.columns["rub worn volume"]
+    worn = punched(law, tmp_path / "run", strain)
     np.testing.assert_allclose(worn, expected, rtol=3e-3, atol=1e-7 * force)
+
+
+def test_points_without_a_partner_are_open_in_any_unit(tmp_path):
+    """A law whose pressure is never zero wears the same in MPa and in Pa."""
+    mega = punched(Softened(1e-9), tmp_path / "MPa")
+    whole = punched(Softened(1e-15, width=5e6), tmp_path / "Pa", stress=1e6)
+    np.testing.assert_allclose(whole, mega, rtol=1e-7)
