@@ -46,6 +46,8 @@ def fault_of(material: Material) -> str:
     grows = (stress[1:] >= stress[:-1]).all()
     if not (grows and stress[0] > 0):
         return "hardening: yield stresses must be positive and must not decrease with PEEQ"
+    if getattr(material, "back_stresses", ()) and np.isinf(stress[0]):
+        return "back_stresses need a hardening, such as LinearHardening, as nothing yields without"
     return ""
 
 

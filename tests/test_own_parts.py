@@ -640,6 +640,11 @@ def hardened(hardening) -> dict:
     return {"bodies": [archord.Body("slab", archord.J2Material(210e3, 0.3, hardening=hardening))]}
 
 
+def kinematic() -> dict:
+    steel = archord.KinematicMaterial(210e3, 0.3, back_stresses=[(60e3, 400.0)])
+    return {"bodies": [archord.Body("slab", steel)]}
+
+
 def elastic(*numbers) -> dict:
     return {"bodies": [archord.Body("slab", archord.Elastic(*numbers))]}
 
@@ -659,6 +664,7 @@ def elastic(*numbers) -> dict:
         (hardened(archord.LinearHardening(300.0, np.nan)), 'body "slab".hardening: yield'),
         (hardened(archord.LinearHardening(300.0, -1e6)), 'body "slab".hardening: yield'),
         (hardened(archord.VoceHardening(300.0, 400.0, -10.0)), 'body "slab".hardening: yield'),
+        (kinematic(), 'body "slab".back_stresses need a hardening'),
         ({"symmetry": 0}, "symmetry = 0 must be a number, and 1 at least"),
         ({"symmetry": np.nan}, "symmetry = NaN must be a number, and 1 at least"),
         ({"symmetry": "2"}, 'symmetry = "2" must be a number, and 1 at least'),
