@@ -23,20 +23,6 @@ _KEYS = {
     "plane": "analysis.plane",
 }
 _OF_BODIES = ("nu", "yield_stress")
-# The keys of a scene by how laws begin to refuse its joint.
-_REFUSED = {
-    "nu of the pin": "pin.nu",
-    "nu of the block": "block.nu",
-    "Dundurs' beta": "pin.nu, block.nu",
-    "dR/R": "joint.clearance",
-    "E(pin)/E(block)": "pin.E, block.E",
-    "sigY R/(E* dR)": "pin.yield_stress, block.yield_stress",
-    "friction": "analysis.friction",
-    "a body has back stresses": "pin.back_stresses, block.back_stresses",
-    "a body hardens": "pin.hardening, block.hardening",
-    "this is a ring": "joint.model",
-    "is a law for a pin in a block": "joint.model",
-}
 
 
 def joint_of(
@@ -70,8 +56,10 @@ def of_scene(scene: Path | None) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
+        from archord.postprocess.laws.general.joint import keys_of
+
         _, _, reason = str(error).partition(": ")
-        keys = next((key for words, key in _REFUSED.items() if reason.startswith(words)), "")
+        keys = keys_of(reason)
         if scene is None or not keys:
             raise
         raise InputError(f"{scene}: {keys}: {error}") from None

@@ -27,7 +27,12 @@ from archord.postprocess.laws.general.hardening_model import (
     hardened_loss,
     largest_gain,
 )
-from archord.postprocess.laws.general.joint import ROUGH_PRESSURE, LawJoint, LawRangeWarning
+from archord.postprocess.laws.general.joint import (
+    ROUGH_PRESSURE,
+    LawJoint,
+    LawRangeWarning,
+    keys_of,
+)
 from archord.postprocess.laws.general.joint_curve import JointCurve, bent, line_contact_level
 from archord.postprocess.laws.general.spline import monotone_slopes, spline_slopes
 from archord.postprocess.laws.general.yield_model import (
@@ -103,7 +108,10 @@ def law_of_joint(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     plane_and_nu(joint)
     reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
     if reason and not extrapolate:
-        raise ValueError(f"archord: {reason}.")
+        error = ValueError(f"archord: {reason}.")
+        keys = keys_of(reason) or "the joint"
+        error.add_note(f"Change {keys} in its scene, or take general_law(joint, extrapolate=True).")
+        raise error
     law = law_of_numbers(
         joint_numbers(joint), flows(joint), joint.friction, large_strain=joint.large_strain
     )

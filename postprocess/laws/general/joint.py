@@ -28,9 +28,26 @@ FIXED_PAIRS = (
     'of closest points on the deformed curves; with analysis.kinematics = "reference" P of a run '
     "is lower: in the paper's elastic joint at 2 dR by 0.15 %"
 )
-
-
+# The keys of a scene by how laws begin to refuse its joint.
+_REFUSED = {
+    "nu of the pin": "pin.nu",
+    "nu of the block": "block.nu",
+    "Dundurs' beta": "pin.nu, block.nu",
+    "dR/R": "joint.clearance",
+    "E(pin)/E(block)": "pin.E, block.E",
+    "sigY R/(E* dR)": "pin.yield_stress, block.yield_stress",
+    "friction": "analysis.friction",
+    "a body has back stresses": "pin.back_stresses, block.back_stresses",
+    "a body hardens": "pin.hardening, block.hardening",
+    "this is a ring": "joint.model",
+    "is a law for a pin in a block": "joint.model",
+}
 _LATEST = 1.3  # s of a block that yields before 3 dR
+
+
+def keys_of(reason: str) -> str:
+    """The keys of a scene that a law's ``reason`` to refuse its joint is about, "" of others."""
+    return next((keys for words, keys in _REFUSED.items() if reason.startswith(words)), "")
 
 
 class LawRangeWarning(UserWarning):

@@ -221,8 +221,10 @@ def test_friction_in_the_papers_joint() -> None:
     pin = LawJoint(1.0, 0.005, 1.0, plane="strain", nu=0.3, friction=0.1)
     state = general_law(pin).at(0.01)
     assert abs(state.load - 0.0132327) < state.error
-    with pytest.raises(ValueError, match=r"friction = 0.4 is outside 0 to 0.3"):
+    with pytest.raises(ValueError, match=r"friction = 0.4 is outside 0 to 0.3") as refusal:
         general_law(replace(pin, friction=0.4))
+    (note,) = refusal.value.__notes__
+    assert note.startswith("Change analysis.friction in its scene")
 
 
 @given(joints(yields=("none",)), some.floats(3.0, 9.0))
