@@ -96,6 +96,7 @@ class NewtonSolver:
         self._system = equilibrium.linear
         bulk = equilibrium.bulk
         self._has_linear_bulk = not (bulk.plastic or bulk.finite)
+        self._may_touch = any(pair.law.slides for pair in equilibrium.contact.pairs)
         self._updates_while_yielding = iterations_while_bodies_yield(self._system.facts)
         self._take_choice()
         for sums in _RANDOM_SUMS:
@@ -169,8 +170,12 @@ class NewtonSolver:
     def _forcing_term(self) -> float:
         result = self._result
         is_linear = self._has_linear_bulk and not result.active_set_changes[-1]
+        if self._may_touch and result.residuals[-1] > 1.0:
+            is_linear = False  # points will come to touch before the reactions carry the load
         power = AS_NEWTON if self._lagged is None else BELOW_NEWTON
-        return forcing_term(result.residuals, self._goal, is_linear=is_linear, power=power)
+        # not over the reactions, which grow from one iterate to the next
+        goal = self._goal * self._reaction
+        return forcing_term(self._norms, goal, is_linear=is_linear, power=power)
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         self._result.krylov_iterations += krylov_iterations(ksp)
@@ -236,6 +241,7 @@ class NewtonSolver:
         self._goal = goal or self.tolerance
         self._result = Newton(False, "", 0, [])
         self._norms: list[float] = []
+        self._reaction = 1.0
         self._failure = ""
         self._raised = None
         self._renewed = True  # the last factorisation is of another matrix
@@ -335,8 +341,9 @@ class NewtonSolver:
         norm = norms[2]
         reaction = max(evaluation.reaction_norm, self.equilibrium.largest_reaction)
         result.active_set_changes.append(evaluation.changes)
+        self._reaction = reaction if reaction > 0 else 1.0
         self._norms.append(norm)
-        result.residuals.append(float(norm / reaction if reaction > 0 else norm))
+        result.residuals.append(float(norm / self._reaction))
         self.watch(self.equilibrium.load, result)
         if self._is_singular():
             self._failure = self._singular_mode()

@@ -249,8 +249,9 @@ def _only_step(system: System) -> Step:
 
 
 def test_a_force_takes_hardly_more_iterations_than_a_displacement(monkeypatch):
-    """GMRES solves the bordered system once. The matrix alone was solved twice in each Newton
-    iteration, to 1e-10: four times as many iterations."""
+    """GMRES solves the bordered system once, and no more accurately than Newton's method needs. The
+    matrix alone was solved twice in each Newton iteration, to 1e-10: four times as many
+    iterations."""
     monkeypatch.setattr(module, "FEWEST_DOFS", 0)
     by_force = _pressed(Load("press", on="upper", direction="z", force=-300.0))
     step = _only_step(by_force)
@@ -260,7 +261,7 @@ def test_a_force_takes_hardly_more_iterations_than_a_displacement(monkeypatch):
     assert driven.drive_force("press") == pytest.approx(-300.0, rel=1e-8)
     krylov, usual = (sum(solve.krylov_iterations for solve in s.attempts) for s in (step, other))
     assert step.iterations <= other.iterations + 1
-    assert krylov < 2 * usual
+    assert krylov < 1.5 * usual
 
 
 def test_what_nothing_holds_is_told_by_multigrid_as_by_a_factorisation(monkeypatch):
