@@ -57,13 +57,15 @@ def read_curve(
     """The curve in the file ``path``: its first two columns, or those of these headings.
 
     Columns are separated by semicolons, tabs, commas or blanks; but for commas, numbers may have a
-    decimal comma. Lines that begin with # are comments. Rows without one of the numbers are left
-    out, and a row that repeats the one before is counted once. It is said where a heading has
-    another unit in brackets than ``units``, of displacement and force, or the line of units below
-    the headings. Raises `InputError`, also for rows with more cells than there are columns, and
-    for commas beside points in numbers.
+    decimal comma. Lines that begin with # are comments, and so is a first line ``sep=;`` for Excel.
+    Rows without one of the numbers are left out, and a row that repeats the one before is counted
+    once. It is said where a heading has another unit in brackets than ``units``, of displacement
+    and force, or the line of units below the headings. Raises `InputError`, also for rows with more
+    cells than there are columns, and for commas beside points in numbers.
     """
     lines = [line for line in read_text(path).splitlines() if line.strip() and line[0] != "#"]
+    if lines and lines[0].startswith("sep="):  # for Excel
+        del lines[0]
     separator = next((sign for sign in _SEPARATORS if lines and sign in lines[0]), None)
     cells = [_cells(line, separator) for line in lines]
     if separator != ",":

@@ -234,6 +234,7 @@ def test_a_key_that_cannot_be_free_is_refused(free, words):
     [
         ("u,F\n" + "".join(f"{k},{2 * k}\n" for k in range(9)), (8, 16), None),
         ("time;u [mm];F (N)\n" + "".join(f"0;{k},5;{k}\n" for k in range(9)), (8.5, 8), None),
+        ("sep=;\nu;F\n" + "".join(f"{k},5;{k}\n" for k in range(9)), (8.5, 8), None),
         ("".join(f"{k} {-2 * k}\n" for k in range(9)), (8, 16), "forces are negative"),
         ("".join(f"{-k} {-2 * k}\n" for k in range(9)), (8, 16), "are turned round"),
         ('"u, mm","F, N"\n' + "".join(f'"{k}","{2 * k}"\n' for k in range(9)), (8, 16), None),
