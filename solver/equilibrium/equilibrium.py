@@ -113,13 +113,14 @@ class Equilibrium:
 
     def out_of_balance(self) -> float:
         """The norm of the residual of the last evaluation over the largest reaction; 0 of a norm
-        that is round-off."""
+        that is round-off, and without reactions."""
         at = self.evaluation
         of_levels = at.lacking(self.load)
         squares = self.comm.allreduce((at.free_forces() ** 2).sum()) + of_levels @ of_levels
-        if squares <= at.noise**2:
+        reaction = max(at.reaction_norm, self.largest_reaction)
+        if squares <= at.noise**2 or not reaction:
             return 0.0
-        return math.sqrt(squares) / max(at.reaction_norm, self.largest_reaction)
+        return math.sqrt(squares) / reaction
 
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""
