@@ -206,5 +206,5 @@ def require_balance(folder: Path, step: int, system: System) -> None:
     if off > max(_OUT_OF_BALANCE, 10 * system.problem.tolerance):
         said = f"was halted after step {step} by a version that solves it otherwise"
         raise InputError(
-            folder, f"{said}: forces of {off:.2g} of the largest are left here; solve it again."
+            folder, f"{said}: {off:.2g} of its forces are out of balance here; solve it again."
         )

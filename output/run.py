@@ -227,7 +227,10 @@ class _Output:
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
             m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
-        if self._problem is None:  # laws of own classes may depend on the length of the step
+        # laws of own classes may depend on the length of the step, and points that had to stay on
+        # their facets are let go
+        had_to_hold = any(attempt.held for attempt in step.attempts)
+        if self._problem is None and not had_to_hold:
             require_balance(self.folder, m.step, system)
         self._on_root(lambda: self._report.unseal())
         profiles = self.account.profiles()

@@ -29,6 +29,7 @@ from archord.postprocess.pictures.problems import (
 from archord.postprocess.run import Run
 from archord.report.by_name import ByName
 from archord.report.errors import InputError
+from archord.report.table import in_digits
 
 AXES = "xyz"
 _STEEP = 0.45  # height of the view over the plane of the other two axes
@@ -313,9 +314,7 @@ def contact_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
     step = steps[0] if steps else shown_step(run)
     surfaces = run.contact(step)
     parts = run.scene.interaction
-    pairs = (
-        [name for name in reversed(part.surfaces) if name in surfaces] for part in reversed(parts)
-    )
+    pairs = ([name for name in part.surfaces if name in surfaces] for part in reversed(parts))
     name, places, words = _unrolled(surfaces, pairs)
     profile = surfaces[name]
     pressure = profile.facet_pressure
@@ -345,9 +344,9 @@ def _unrolled(
     for names in pairs:
         cylinders = [found for name in names if (found := _cylinder(name, surfaces[name]))]
         if cylinders:
-            name, _, centre, axis = min(cylinders, key=lambda each: each.length)
-            places = _angle_and_length(surfaces[name].corners, centre, axis)
-            return name, places, ("angle [°]", f"{AXES[axis]} [{{length}}]")
+            drawn = min(cylinders, key=lambda each: (not each.is_pressed, each.length))
+            places = _angle_and_length(surfaces[drawn.name].corners, drawn.centre, drawn.axis)
+            return drawn.name, places, ("angle [°]", f"{AXES[drawn.axis]} [{{length}}]")
     name = next(reversed(surfaces))
     corners = surfaces[name].corners
     thin = int(np.ptp(corners.reshape(-1, 3), axis=0).argmin())
@@ -357,25 +356,30 @@ def _unrolled(
 
 
 class _Cylinder(NamedTuple):
-    """The surface ``name`` with this ``length``, about a line along ``axis`` through the ``centre``
-    ``(2,)``."""
+    """A surface about a line along ``axis`` through the ``centre`` ``(2,)``.
+
+    ``length`` is in six digits, so that round-off makes no cylinder the shorter one. ``is_pressed``
+    tells whether anything presses it.
+    """
 
     name: str
     length: float
     centre: Array
     axis: int
+    is_pressed: bool
 
 
 def _cylinder(name: str, profile: Any) -> _Cylinder | None:
-    """The surface ``name``, if it is a cylinder along x, y or z that is pressed."""
+    """The surface ``name``, if it is a cylinder along x, y or z."""
     # with compiled curves, which other commands do without
     from archord.geometry.curve import circle_through
 
     corners = profile.corners.reshape(-1, 3)
     for axis in (2, 0, 1):
         circle = circle_through(np.delete(corners, axis, axis=1))
-        if circle is not None and profile.facet_pressure.any():
-            return _Cylinder(name, np.ptp(corners[:, axis]), circle[0], axis)
+        if circle is not None:
+            length = in_digits(np.ptp(corners[:, axis]), 6)
+            return _Cylinder(name, length, circle[0], axis, bool(profile.facet_pressure.any()))
     return None
 
 

@@ -25,6 +25,7 @@ _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still, but for a few points
 _FEW = 1e-4  # part of all points, which open and close as they jump between two facets
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
+_NOT_CARRIED = 1.0  # residual over reaction, beyond which reactions do not carry the load yet
 _CONVERGES = 0.2  # the same by which levels of multigrid are kept
 _ITERATIONS_WITH_LEVELS = 2  # of a solve, which make the levels of multigrid
 _R = PETSc.SNES.ConvergedReason
@@ -170,8 +171,8 @@ class NewtonSolver:
     def _forcing_term(self) -> float:
         result = self._result
         is_linear = self._has_linear_bulk and not result.active_set_changes[-1]
-        if self._may_touch and result.residuals[-1] > 1.0:
-            is_linear = False  # points will come to touch before the reactions carry the load
+        if self._may_touch and result.residuals[-1] > _NOT_CARRIED:
+            is_linear = False  # points will come to touch
         power = AS_NEWTON if self._lagged is None else BELOW_NEWTON
         # not over the reactions, which grow from one iterate to the next
         goal = self._goal * self._reaction
